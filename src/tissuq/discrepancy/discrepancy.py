@@ -1,0 +1,77 @@
+"""The contract of every discrepancy: a mean that is linear in its parameters, and a covariance."""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ModelError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.parameters import Parameter
+from tissuq.registry import find, variants
+
+__all__ = ["Discrepancy", "discrepancies", "discrepancy_named"]
+
+
+@dataclass(frozen=True)
+class Discrepancy(ABC):
+    """What the material cannot explain: measured stress = material + discrepancy + noise (eq. 15).
+
+    A new discrepancy is one subclass in one file. It names its parameters and overrides what it has: a mean (a
+    basis, one column for each linear parameter), an independent variance (the same at every point), or a
+    correlated part (a variance and a correlation between stretches). Parameters reach it as a mapping
+    from symbol to value; arithmetic only, so that NumPy and JAX values both pass through.
+    """
+
+    name: ClassVar[str]
+    formula: ClassVar[str]
+    source: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    shape_symbols: ClassVar[tuple[str, ...]] = ()
+    """The parameters on which the correlation depends."""
+    caution: ClassVar[str] = ""
+    """What a reader of its result must know about the material's parameters."""
+
+    def mean_basis(self, mode: LoadingMode, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the (n, k) mean stresses of unit linear parameters, in their order."""
+        return np.zeros((len(stretch), 0))
+
+    def independent_variance(self, values: Mapping[str, Any]) -> Any:
+        """Return the variance (MPa^2) that the discrepancy adds to every point by itself."""
+        return 0.0
+
+    def correlated_variance(self, values: Mapping[str, Any]) -> Any:
+        """Return the variance (MPa^2) of the correlated part."""
+        return 0.0
+
+    def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
+        """Return the (n, m) correlation of the correlated part between two sets of stretches."""
+        raise NotImplementedError(f"discrepancy '{self.name}' has no correlated part")
+
+    @property
+    def is_correlated(self) -> bool:
+        """Whether the discrepancy at one stretch tells something about another."""
+        return bool(self.shape_symbols)
+
+
+def discrepancies() -> dict[str, type[Discrepancy]]:
+    """Return every discrepancy by name, those with few parameters first."""
+    return dict(sorted(variants(Discrepancy).items(), key=lambda item: len(item[1].parameters)))
+
+
+def discrepancy_named(discrepancy: str | Discrepancy) -> Discrepancy:
+    """Return the discrepancy of that name; a discrepancy is returned as it is.
+
+    Raises
+    ------
+    ModelError
+        When no discrepancy has that name.
+    """
+    if isinstance(discrepancy, Discrepancy):
+        return discrepancy
+    return find(Discrepancy, "discrepancy", discrepancy, ModelError)()

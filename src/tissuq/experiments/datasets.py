@@ -1,0 +1,116 @@
+"""Measured curves that come with the package: CSV files whose comment lines tell their source and mode."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import loading_modes
+from tissuq.experiments.reading import read_experiment
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["copy", "load", "names", "path", "table"]
+
+FOLDER = Path(__file__).parent / "data"
+
+
+def names() -> list[str]:
+    """Return the names of the data sets in alphabetical order.
+
+    Examples
+    --------
+    >>> names()
+    ['brain-cortex-shear', 'brain-cortex-uniaxial', 'rubber-treloar-uniaxial']
+    """
+    return sorted(file.stem for file in FOLDER.glob("*.csv"))
+
+
+def path(name: str) -> Path:
+    """Return the CSV file of a data set.
+
+    Raises
+    ------
+    InputError
+        When there is no data set of that name.
+    """
+    if name not in names():
+        close = get_close_matches(str(name), names(), n=1)
+        hint = f" Did you mean '{close[0]}'?" if close else ""
+        raise InputError(f"there is no data set named '{name}'.{hint} Choose one of: {', '.join(names())}.")
+    return FOLDER / f"{name}.csv"
+
+
+def load(name: str) -> Experiment:
+    """Return a data set as an experiment, ready to fit.
+
+    Raises
+    ------
+    InputError
+        When there is no data set of that name.
+    ModelError
+        When it was measured in a loading mode that cannot be fitted; :func:`table` has its values.
+
+    Examples
+    --------
+    >>> brain = load("brain-cortex-uniaxial")
+    >>> len(brain), brain.stress_unit
+    (34, 'kPa')
+    """
+    file = path(name)
+    about = _comments(file)
+    if about["mode"] not in loading_modes():
+        raise ModelError(
+            f"data set '{name}' was measured in {about['mode']}, which cannot be fitted yet. "
+            f"datasets.table('{name}') has its values. "
+            f"Modes that can be fitted: {', '.join(loading_modes())}."
+        )
+    experiment = read_experiment(file, mode=about["mode"], name=name)
+    return replace(experiment, source=f"{about['citation']} ({experiment.source})")
+
+
+def table(name: str) -> pd.DataFrame:
+    """Return the values of a data set with its columns and units as they are in the file.
+
+    Raises
+    ------
+    InputError
+        When there is no data set of that name.
+    """
+    import pandas as pd
+
+    return pd.read_csv(path(name), comment="#")
+
+
+def copy(name: str, folder: str | os.PathLike[str], force: bool = False) -> Path:
+    """Copy the CSV file of a data set into a folder, which is made if need be, and return the new file.
+
+    Raises
+    ------
+    InputError
+        When there is no data set of that name, the folder cannot be written, or the file is already
+        there and ``force`` is false.
+    """
+    source = path(name)
+    target = Path(folder) / source.name
+    if target.exists() and not force:
+        raise InputError(f"{target} is already there; give force=True (--force) to overwrite it.")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(source, target)
+    except OSError as error:
+        raise InputError(f"{target} cannot be written: {error}.") from error
+    return target
+
+
+def _comments(file: Path) -> dict[str, str]:
+    """Return the ``# key: value`` lines at the head of a data file."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return dict(line[1:].strip().split(": ", maxsplit=1) for line in lines if line.startswith("#"))

@@ -1,0 +1,105 @@
+"""What was measured: stretches and engineering stresses of one specimen in one loading mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode, loading_mode
+
+__all__ = ["Experiment"]
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Stress-stretch measurements of one test.
+
+    Parameters
+    ----------
+    mode : str or LoadingMode
+        How the specimen was loaded.
+    stretch : (n,) array, dimensionless
+        Deformed over undeformed length, positive; any order, repetitions allowed.
+    stress : (n,) array, MPa
+        Engineering (nominal) stress, tension positive and compression negative.
+    name : str
+        A short name for tables and figures.
+    source : str
+        Where the values come from (a file and its columns, or a citation).
+    stress_unit : str
+        The unit in which people want to read the stresses; the values here are MPa whatever it is.
+
+    Raises
+    ------
+    InputError
+        When the arrays differ in length, are empty, or hold values that are not finite or not stretches.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> data = tq.Experiment(mode="uniaxial", stretch=[0.9, 1.0, 1.2], stress=[-0.3, 0.0, 0.5])
+    >>> len(data)
+    3
+    """
+
+    mode: LoadingMode
+    stretch: NDArray[np.float64]
+    stress: NDArray[np.float64]
+    name: str = "experiment"
+    source: str = ""
+    stress_unit: str = "MPa"
+
+    def __init__(
+        self,
+        mode: str | LoadingMode,
+        stretch: ArrayLike,
+        stress: ArrayLike,
+        name: str = "experiment",
+        source: str = "",
+        stress_unit: str = "MPa",
+    ) -> None:
+        values = {
+            "mode": loading_mode(mode),
+            "stretch": _column("stretch", stretch),
+            "stress": _column("stress", stress),
+            "name": name,
+            "source": source,
+            "stress_unit": stress_unit,
+        }
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+        if len(self.stretch) != len(self.stress):
+            raise InputError(
+                f"experiment '{name}': {len(self.stretch)} stretches but {len(self.stress)} stresses; "
+                "give one stress for every stretch."
+            )
+        not_positive = np.flatnonzero(self.stretch <= 0)
+        if len(not_positive):
+            row = not_positive[0]
+            raise InputError(
+                f"experiment '{name}': stretch {self.stretch[row]:g} at position {row} is not positive. "
+                "A stretch is deformed over undeformed length; if this is a strain, add 1."
+            )
+
+    def __len__(self) -> int:
+        return len(self.stretch)
+
+
+def _column(name: str, values: Any) -> NDArray[np.float64]:
+    try:
+        column = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be an array of numbers: {error}.") from error
+    if column.ndim != 1 or not len(column):
+        raise InputError(f"{name} must be a one-dimensional array with values, not of shape {column.shape}.")
+    bad = np.flatnonzero(~np.isfinite(column))
+    if len(bad):
+        raise InputError(
+            f"{name} is {column[bad[0]]} at position {bad[0]}; every value must be a finite number."
+        )
+    column.flags.writeable = False
+    return column

@@ -1,0 +1,138 @@
+"""How a text file lays out its table: separator, first row of data, names and units above it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from tissuq.experiments.units import looks_like_unit
+
+__all__ = ["NUMBER", "WHITESPACE", "Layout", "column_names", "find_layout", "split"]
+
+WHITESPACE = " "
+SEPARATORS = ("\t", ";", ",", WHITESPACE)
+NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
+MISSING = frozenset(["", "-", "--", "---", "n/a", "#n/a", "na", "nan", "null", "none", "inf", "+inf", "-inf"])
+LINES_TO_JUDGE = 500
+
+Split = Callable[[str], list[str]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the table is in a list of lines; all positions count from 0.
+
+    Parameters
+    ----------
+    separator : str
+        What stands between two cells; a space means any run of whitespace.
+    first_row : int
+        Position of the first row of data.
+    width : int
+        Number of cells in the first row of data without fault.
+    names : int or None
+        Position of the row of column names.
+    units : int or None
+        Position of the row of units beneath the names.
+    """
+
+    separator: str
+    first_row: int
+    width: int
+    names: int | None
+    units: int | None
+
+
+def find_layout(lines: Sequence[str]) -> Layout | None:
+    """Return the layout of the first table in lines without blanks and comments; None if there is none."""
+    separator = _likely_separator(lines[:LINES_TO_JUDGE])
+    cells = partial(split, separator=separator)
+    confirmed = _first_numeric_row(lines, cells)
+    if confirmed is None:
+        return None
+    first = _with_faulty_rows_above(lines, cells, confirmed)
+    has_units = first > 1 and _is_units_row(cells(lines[first - 1])) and _are_names(cells(lines[first - 2]))
+    above = first - 2 if has_units else first - 1
+    width = len(cells(lines[confirmed]))
+    named = above >= 0 and bool(column_names(lines[above], width, separator))
+    return Layout(separator, first, width, above if named else None, first - 1 if has_units else None)
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, without quotation marks and surrounding blanks."""
+    if '"' not in line:
+        return line.split() if separator == WHITESPACE else [cell.strip() for cell in line.split(separator)]
+    if separator == WHITESPACE:
+        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|\S+', line)]
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+
+
+def column_names(line: str, width: int, separator: str) -> list[str]:
+    """Return the column names in a line above ``width`` columns of data; none when it holds no names.
+
+    Columns separated by blanks may have blanks in their names when two or more stand between names.
+    """
+    names = split(line, separator)
+    if separator == WHITESPACE and len(names) != width:
+        names = re.split(r"\s{2,}|\t", line.strip())
+        if len(names) != width:
+            return []
+    while names and not names[-1]:
+        names.pop()
+    return names if _are_names(names) else []
+
+
+def _likely_separator(lines: Sequence[str]) -> str:
+    def share_of_numbers(line: str, separator: str) -> float:
+        cells = [cell for cell in split(line, separator) if cell]
+        numbers = _count_numbers(cells)
+        return numbers / len(cells) if numbers >= 2 else 0.0
+
+    return max(SEPARATORS, key=lambda separator: sum(share_of_numbers(line, separator) for line in lines))
+
+
+def _first_numeric_row(lines: Sequence[str], cells: Split) -> int | None:
+    """Find a row of numbers alone, or of two numbers before more data: metadata may hold numbers too."""
+    for position, line in enumerate(lines):
+        row = cells(line)
+        next_row = cells(lines[position + 1]) if position + 1 < len(lines) else []
+        if _count_numbers(row) >= 2 and (_are_values(row) or _is_data(next_row)):
+            return position
+    return None
+
+
+def _with_faulty_rows_above(lines: Sequence[str], cells: Split, first: int) -> int:
+    """Take in rows above that hold a number or a mark for none: faulty data to report, not names."""
+    width = len(cells(lines[first]))
+    while first > 0:
+        above = cells(lines[first - 1])
+        is_row = _are_values(above) or (_is_data(above) and len(above) == width)
+        beneath_names = first > 1 and _are_names(cells(lines[first - 2]))
+        if not is_row or (beneath_names and _is_units_row(above)):
+            break
+        first -= 1
+    return first
+
+
+def _count_numbers(cells: Sequence[str]) -> int:
+    return sum(NUMBER.fullmatch(cell) is not None for cell in cells)
+
+
+def _are_values(cells: Sequence[str]) -> bool:
+    return all(cell.lower() in MISSING or NUMBER.fullmatch(cell) for cell in cells)
+
+
+def _is_data(cells: Sequence[str]) -> bool:
+    return _count_numbers(cells) > 0 or _are_values(cells)
+
+
+def _are_names(cells: Sequence[str]) -> bool:
+    words = [cell for cell in cells if cell.lower() not in MISSING and any(map(str.isalpha, cell))]
+    return len(cells) >= 2 and len(words) >= 1 and _count_numbers(cells) == 0
+
+
+def _is_units_row(cells: Sequence[str]) -> bool:
+    return all(map(looks_like_unit, cells)) and any(re.search(r"[^\W\d_]|%", cell) for cell in cells)

@@ -1,0 +1,94 @@
+"""Gaussians within bounds: how much mass a box holds, and points that stand for what it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, ndtr, ndtri
+
+__all__ = ["NEGLIGIBLE", "Box"]
+
+FloatArray = NDArray[np.float64]
+
+NEGLIGIBLE = 1e-8
+"""Mass outside the bounds below which the unbounded closed form stands."""
+POINTS = 512
+SMALLEST = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Lower and upper bounds (p,) of p jointly Gaussian parameters."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return, for N Gaussians, an upper bound on the mass outside and the log of the mass inside.
+
+        The bound is the sum over parameters (Boole). Where it is negligible the log mass is taken from it; elsewhere
+        the mass inside is computed, exactly for one parameter and by Genz's sequential conditioning
+        on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
+        """
+        sd = np.sqrt((root**2).sum(2))
+        outside = (ndtr((self.lower - mean) / sd) + ndtr((mean - self.upper) / sd)).sum(1)
+        log_inside = np.log1p(-np.minimum(outside, 0.5))
+        crossed = np.flatnonzero(outside > 1e-3 * NEGLIGIBLE)
+        if len(crossed) and mean.shape[1] > 1:
+            weights, _ = self.points(mean[crossed], root[crossed])
+            log_inside[crossed] = np.log(np.maximum(weights.mean(1), SMALLEST))
+        elif len(crossed):
+            inside = _log_interval((self.lower - mean) / sd, (self.upper - mean) / sd)
+            log_inside[crossed] = inside[crossed, 0]
+        return outside, log_inside
+
+    def points(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return weights (N, P) and points (N, P, p) inside the box whose weighted law is the bounded Gaussian.
+
+        The mean weight is the mass inside.
+        """
+        count, p = mean.shape
+        triangle = np.linalg.cholesky(root @ root.swapaxes(1, 2))
+        uniforms = _quasi_random(p)
+        weights = np.ones((count, len(uniforms)))
+        standard = np.empty((count, len(uniforms), p))
+        points = np.empty_like(standard)
+        for j in range(p):
+            centre = mean[:, None, j] + np.einsum("nqk,nk->nq", standard[:, :, :j], triangle[:, j, :j])
+            scale = triangle[:, j, j][:, None]
+            low, high = (self.lower[j] - centre) / scale, (self.upper[j] - centre) / scale
+            standard[:, :, j], mass = _truncated_quantile(uniforms[:, j], low, high)
+            weights *= mass
+            points[:, :, j] = np.clip(centre + scale * standard[:, :, j], self.lower[j], self.upper[j])
+        return weights, points
+
+
+def _truncated_quantile(probability: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return quantiles of a standard normal between bounds, and the mass between them; right in both tails."""
+    flip = low > 0
+    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
+    below, above = ndtr(a), ndtr(b)
+    mass = above - below
+    position = np.where(flip, 1 - probability, probability)
+    value = ndtri(np.clip(below + position * mass, SMALLEST, 1 - 1e-16))
+    value = np.clip(value, a, b)
+    return np.where(flip, -value, value), mass
+
+
+def _log_interval(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return log(Phi(high) - Phi(low)), right in both tails."""
+    flip = low > 0
+    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
+    upper, lower = log_ndtr(b), log_ndtr(a)
+    return np.asarray(upper + np.log1p(-np.exp(lower - upper)))
+
+
+def _quasi_random(dimension: int) -> FloatArray:
+    """Return points of the Kronecker sequence of the generalised golden ratio in the unit cube."""
+    ratio = 2.0
+    for _ in range(64):
+        ratio = (1 + ratio) ** (1 / (dimension + 1))
+    steps = ratio ** -np.arange(1.0, dimension + 1)
+    return np.asarray((0.5 + np.arange(1, POINTS + 1)[:, None] * steps) % 1.0)

@@ -1,0 +1,130 @@
+"""The exact route: linear parameters in closed form, quadrature over the nonlinear ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ModelError
+from tissuq.inference.bounds import resampled, split_at_bounds
+from tissuq.inference.conditional import ConditionalGaussian
+from tissuq.inference.marginal import (
+    Marginal,
+    blended,
+    marginal_of_mixture,
+    marginal_of_points,
+    marginal_of_quadrature,
+)
+from tissuq.inference.quadrature import MAX_DIMENSION, Quadrature, integrate
+from tissuq.inference.solution import Components, Solution
+from tissuq.model import StatisticalModel
+
+__all__ = ["is_exact", "solve_exactly"]
+
+FloatArray = NDArray[np.float64]
+
+CHAINS, DRAWS = 4, 1000
+
+
+def is_exact(model: StatisticalModel) -> bool:
+    """Return whether the exact route applies: at most three parameters that are not linear Gaussian."""
+    return len(model.nonlinear) <= MAX_DIMENSION
+
+
+def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
+    """Return the posterior and the evidence of a model with at most three nonlinear parameters.
+
+    The nonlinear parameters are integrated over their prior probability, so that the integral is the evidence
+    with respect to the normalised priors. Bounds of the linear parameters that cut off less than 1e-8 of the
+    posterior leave it a mixture of Gaussians; where they cut off more, it is represented by points within them.
+
+    Parameters
+    ----------
+    model : StatisticalModel
+    seed : int
+        Of the draws; nothing else is random.
+
+    Raises
+    ------
+    ModelError
+        When the model has more than three nonlinear parameters.
+    ConvergenceError
+        When the quadrature does not reach its tolerance.
+
+    References
+    ----------
+    Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
+    """
+    if not is_exact(model):
+        raise ModelError(
+            f"the exact route integrates at most {MAX_DIMENSION} nonlinear parameters; this model has "
+            f"{len(model.nonlinear)} ({', '.join(model.nonlinear)}). Use the sampler 'nuts'."
+        )
+    conditional = ConditionalGaussian(model)
+    rule = _integrate_nonlinear(model, conditional) if model.nonlinear else None
+    settings = _settings(model, rule.points) if rule else np.zeros((1, 0))
+    given = conditional(settings)
+    components = Components(rule.weights if rule else np.ones(1), settings, given.mean, given.root)
+    inner, cut = split_at_bounds(components, given.outside, conditional.box)
+    marginals = _nonlinear_marginals(model, rule, components) if rule else {}
+    marginals |= {symbol: _linear_marginal(inner, cut, j) for j, symbol in enumerate(model.linear)}
+    components = inner.joined(resampled(cut)) if len(cut.weights) else inner
+    drawn_from, draws = _draw(components, seed)
+    columns = dict(zip((*model.nonlinear, *model.linear), draws, strict=True))
+    return Solution(
+        model=model,
+        route="exact",
+        reason=_reason(model, is_bounded=len(cut.weights) > 0),
+        components=components,
+        marginals={symbol: marginals[symbol] for symbol in model.symbols},
+        draws={symbol: columns[symbol] for symbol in model.symbols},
+        drawn_from=drawn_from,
+        log_evidence=rule.log_integral if rule else float(given.log_likelihood[0]),
+        log_evidence_error=rule.log_error if rule else 0.0,
+    )
+
+
+def _integrate_nonlinear(model: StatisticalModel, conditional: ConditionalGaussian) -> Quadrature:
+    return integrate(lambda u: conditional(_settings(model, u)).log_likelihood, len(model.nonlinear))
+
+
+def _settings(model: StatisticalModel, probabilities: FloatArray) -> FloatArray:
+    """Return the nonlinear parameters at prior probabilities (N, d)."""
+    priors = [model.priors[symbol] for symbol in model.nonlinear]
+    return np.column_stack([prior.quantile(u) for prior, u in zip(priors, probabilities.T, strict=True)])
+
+
+def _nonlinear_marginals(model: StatisticalModel, rule: Quadrature, components: Components) -> dict[str, Marginal]:
+    return {
+        symbol: marginal_of_quadrature(
+            model.priors[symbol], rule.marginal(side), components.settings[:, side], components.weights
+        )
+        for side, symbol in enumerate(model.nonlinear)
+    }
+
+
+def _linear_marginal(inner: Components, cut: Components, place: int) -> Marginal:
+    parts = []
+    if len(inner.weights):
+        heavy = inner.leading(1 - 1e-10)
+        sds = np.sqrt((heavy.root[:, place] ** 2).sum(axis=1))
+        parts.append((inner.weights.sum(), marginal_of_mixture(heavy.weights, heavy.mean[:, place], sds)))
+    if len(cut.weights):
+        parts.append((cut.weights.sum(), marginal_of_points(cut.mean[:, place], cut.weights)))
+    return blended(parts)
+
+
+def _draw(components: Components, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return which component each draw comes from, and the draws of (nonlinear, linear) parameters."""
+    generator = np.random.default_rng(seed)
+    chosen = generator.choice(len(components.weights), size=(CHAINS, DRAWS), p=components.weights)
+    noise = generator.standard_normal((CHAINS, DRAWS, components.root.shape[2]))
+    linear = components.mean[chosen] + np.einsum("cdij,cdj->cdi", components.root[chosen], noise)
+    return chosen, np.moveaxis(np.concatenate([components.settings[chosen], linear], axis=2), 2, 0)
+
+
+def _reason(model: StatisticalModel, is_bounded: bool) -> str:
+    linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
+    nonlinear = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
+    bounds = "; bounds of the linear parameters cut the posterior and were honoured" if is_bounded else ""
+    return f"{linear}; {nonlinear}{bounds}"

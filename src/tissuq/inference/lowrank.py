@@ -1,0 +1,77 @@
+"""Correlation matrices as a thin orthonormal factor: K = U diag(spectrum) U' to rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.discrepancy import Discrepancy
+
+__all__ = ["Spectrum", "correlation_spectrum"]
+
+FloatArray = NDArray[np.float64]
+
+TOLERANCE = 1e-13
+"""Share of the trace that the factor may leave out."""
+FEW_POINTS = 128
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Leading eigenvectors (n, r), orthonormal, and eigenvalues (r,) of a correlation matrix."""
+
+    vectors: FloatArray
+    values: FloatArray
+
+
+def correlation_spectrum(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
+    """Return the spectrum of a discrepancy's correlation on points (n,), at a cost of n r^2 for numerical rank r.
+
+    Pivoted Cholesky finds a root of the matrix without forming it; its singular values give the rest. Smooth
+    kernels have a small numerical rank: about ten for a squared exponential as wide as half the data's range.
+    Spectra on few points are remembered, because many data sets share their stretches.
+
+    Parameters
+    ----------
+    discrepancy : Discrepancy
+    points : (n,) array, dimensionless
+        Stretches.
+    shape : tuple of float
+        Values of ``discrepancy.shape_symbols``.
+    """
+    if len(points) <= FEW_POINTS:
+        return _remembered(discrepancy, points.tobytes(), shape)
+    return _decompose(discrepancy, points, shape)
+
+
+@lru_cache(maxsize=2048)
+def _remembered(discrepancy: Discrepancy, points: bytes, shape: tuple[float, ...]) -> Spectrum:
+    return _decompose(discrepancy, np.frombuffer(points), shape)
+
+
+def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
+    values = dict(zip(discrepancy.shape_symbols, shape, strict=True))
+    root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points)
+    vectors, singular, _ = np.linalg.svd(root, full_matrices=False)
+    return Spectrum(vectors, singular**2)
+
+
+def _pivoted_root(correlation: Callable[[FloatArray, FloatArray], FloatArray], points: FloatArray) -> FloatArray:
+    n = len(points)
+    root = np.zeros((n, n if n <= 64 else 64))
+    remaining = np.ones(n)
+    for rank in range(n):
+        pivot = int(remaining.argmax())
+        if remaining.sum() <= TOLERANCE * n or remaining[pivot] <= 0:
+            return root[:, :rank]
+        if rank == root.shape[1]:
+            root = np.hstack([root, np.zeros((n, min(rank, n - rank)))])
+        column = correlation(points, points[pivot : pivot + 1])[:, 0] - root[:, :rank] @ root[pivot, :rank]
+        root[:, rank] = column / np.sqrt(remaining[pivot])
+        remaining = np.maximum(remaining - root[:, rank] ** 2, 0.0)
+        remaining[pivot] = 0.0
+    return root

@@ -1,0 +1,113 @@
+"""Marginal posteriors of one parameter: mean, standard deviation, density and highest-density interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
+
+from tissuq.inference.quadrature import PiecewiseDensity
+from tissuq.priors import Prior
+
+__all__ = ["Marginal", "blended", "marginal_of_mixture", "marginal_of_points", "marginal_of_quadrature"]
+
+FloatArray = NDArray[np.float64]
+
+GRID = 1001
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal:
+    """A one-dimensional posterior, tabulated finely.
+
+    Attributes
+    ----------
+    mean, sd : float
+        In the parameter's unit; exact to the accuracy of the route, not of the table.
+    points, density, cumulative : (k,) arrays
+        Values, probability density and cumulative probability at them.
+    """
+
+    mean: float
+    sd: float
+    points: FloatArray
+    density: FloatArray
+    cumulative: FloatArray
+
+    def pdf(self, values: ArrayLike) -> FloatArray:
+        """Return the posterior density at values (zero outside the table)."""
+        return np.interp(values, self.points, self.density, left=0.0, right=0.0)
+
+    def quantile(self, probability: ArrayLike) -> FloatArray:
+        """Return the values below which the given probabilities lie."""
+        return np.interp(probability, self.cumulative, self.points)
+
+    def hdi(self, prob: float = 0.95) -> tuple[float, float]:
+        """Return the shortest interval that holds ``prob`` of the posterior (95 % HPD for 0.95)."""
+        start = np.linspace(0.0, 1.0 - prob, GRID)
+        best = int((self.quantile(start + prob) - self.quantile(start)).argmin())
+        low, high = start[max(best - 1, 0)], start[min(best + 1, GRID - 1)]
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            rising = self.pdf(self.quantile(middle)) < self.pdf(self.quantile(middle + prob))
+            low, high = (middle, high) if rising else (low, middle)
+        return float(self.quantile(low)), float(self.quantile(low + prob))
+
+
+def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray) -> Marginal:
+    """Return the marginal of a mixture of M Gaussians with weights, means and standard deviations (M,)."""
+    mean = float(weights @ means)
+    sd = float(np.sqrt(weights @ (sds**2 + (means - mean) ** 2)))
+    points = np.linspace(mean - 10 * sd, mean + 10 * sd, GRID)
+    scores = (points - means[:, None]) / sds[:, None]
+    density = (weights / sds) @ np.exp(-0.5 * scores**2) / np.sqrt(2 * np.pi)
+    return Marginal(mean, sd, points, density, _proper(weights @ ndtr(scores)))
+
+
+def marginal_of_quadrature(prior: Prior, density: PiecewiseDensity, values: FloatArray, weights: FloatArray) -> Marginal:
+    """Return the marginal of a parameter whose prior probability was the side of a quadrature."""
+    mean = float(weights @ values)
+    sd = float(np.sqrt(weights @ (values - mean) ** 2))
+    inner = np.clip(density.points, 1e-12, 1 - 1e-12)
+    points = np.asarray(prior.quantile(inner))
+    return Marginal(mean, sd, points, density.density * np.exp(prior.log_density(points)), density.cumulative)
+
+
+def marginal_of_points(points: FloatArray, weights: FloatArray) -> Marginal:
+    """Return the marginal of weighted points; its density is a kernel estimate (Silverman's bandwidth)."""
+    order = np.argsort(points)
+    points, weights = points[order], weights[order]
+    weights = weights / weights.sum()
+    mean = float(weights @ points)
+    sd = float(np.sqrt(weights @ (points - mean) ** 2))
+    cumulative = np.cumsum(weights) - 0.5 * weights
+    effective = 1 / (weights @ weights)
+    bandwidth = 0.9 * sd * effective**-0.2
+    grid = np.linspace(points[0], points[-1], 401)
+    heights, edges = np.histogram(points, bins=800, weights=weights)
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    kernel = np.exp(-0.5 * ((grid[:, None] - centres) / bandwidth) ** 2) / (bandwidth * np.sqrt(2 * np.pi))
+    return Marginal(mean, sd, points, np.interp(points, grid, kernel @ heights), _proper(cumulative))
+
+
+def blended(parts: list[tuple[float, Marginal]]) -> Marginal:
+    """Return the mixture of marginals with weights that sum to one."""
+    if len(parts) == 1:
+        return parts[0][1]
+    mean = sum(weight * part.mean for weight, part in parts)
+    variance = sum(weight * (part.sd**2 + (part.mean - mean) ** 2) for weight, part in parts)
+    low, high = min(part.points[0] for _, part in parts), max(part.points[-1] for _, part in parts)
+    points = np.linspace(low, high, 2 * GRID)
+    density = sum(weight * part.pdf(points) for weight, part in parts)
+    cumulative = sum(
+        weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0) for weight, part in parts
+    )
+    return Marginal(mean, float(np.sqrt(variance)), points, np.asarray(density), _proper(np.asarray(cumulative)))
+
+
+def _proper(cumulative: FloatArray) -> FloatArray:
+    """Return the cumulative probabilities made monotone and ending at one."""
+    rising = np.maximum.accumulate(np.clip(cumulative, 0.0, None))
+    return rising / rising[-1] if rising[-1] > 0 else rising

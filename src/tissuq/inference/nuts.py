@@ -1,0 +1,370 @@
+"""The no-U-turn sampler for any differentiable log density on a box, with the evidence that it converged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import blackjax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from blackjax.adaptation.step_size import dual_averaging_adaptation
+from blackjax.adaptation.window_adaptation import build_schedule
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.errors import ConvergenceError, InputError
+from tissuq.inference.coordinates import (
+    Box,
+    Derivatives,
+    LogDensity,
+    Mode,
+    derivatives_on_line,
+    find_modes,
+    log_density_on_line,
+)
+
+__all__ = ["NutsDraws", "NutsSettings", "sample_nuts"]
+
+Floats = NDArray[np.float64]
+
+MAX_RHAT = 1.01
+MIN_ESS_PER_CHAIN = 100
+MAX_DIVERGENT_SHARE = 0.01
+MIN_BFMI = 0.3
+OVERDISPERSION = 1.5
+"""Standard deviation of the starting points around a mode, in posterior standard deviations."""
+
+
+@dataclass(frozen=True)
+class NutsSettings:
+    """How long to sample and how carefully.
+
+    Parameters
+    ----------
+    chains : int
+        Independent chains, at least two: their agreement is the check.
+    warmup : int
+        Trajectories per chain that tune the sampler and are thrown away; all chains tune together.
+    draws : int
+        Draws per chain that are kept.
+    thinning : int
+        Trajectories from one kept draw to the next.
+    target_acceptance : float
+        Mean acceptance that the step size is tuned to; closer to one takes smaller steps.
+    seed : int
+        Fixes every random number.
+    """
+
+    chains: int = 4
+    warmup: int = 500
+    draws: int = 1000
+    thinning: int = 2
+    target_acceptance: float = 0.9
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, least in (("chains", 2), ("warmup", 20), ("draws", 4), ("thinning", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(f"NUTS {name}: {getattr(self, name)} is too few; use at least {least}.")
+        if not 0 < self.target_acceptance < 1:
+            raise InputError(f"NUTS target_acceptance: {self.target_acceptance} is not between 0 and 1.")
+
+
+@dataclass(frozen=True)
+class NutsDraws:
+    """Draws from a posterior with the diagnostics of their quality.
+
+    Parameters
+    ----------
+    values : (chains, draws, d) array
+        Parameter values, in the unit of each.
+    energies : (chains, draws) array
+        Energy of the simulated dynamics at each draw.
+    divergences : int
+        Draws whose trajectory the integrator lost.
+    leapfrogs_per_draw : float
+        Mean number of gradients that one draw took.
+    names : tuple of str
+        What the messages call the d parameters.
+
+    References
+    ----------
+    Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021), Bayesian Analysis 16, 667-718 (R-hat, effective sample size).
+    Betancourt (2016), arXiv:1604.00695 (BFMI).
+    """
+
+    values: Floats
+    energies: Floats
+    divergences: int
+    leapfrogs_per_draw: float
+    names: tuple[str, ...]
+
+    @cached_property
+    def rhat(self) -> Floats:
+        """Rank-normalised split R-hat of each parameter, the larger of bulk and tail: (d,) array."""
+        return _statistics().rhat(self.values, chain_axis=0, draw_axis=1)
+
+    @cached_property
+    def ess_bulk(self) -> Floats:
+        """Effective sample size for the centre of each marginal: (d,) array."""
+        return _statistics().ess(self.values, chain_axis=0, draw_axis=1, method="bulk")
+
+    @cached_property
+    def ess_tail(self) -> Floats:
+        """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
+        return _statistics().ess(self.values, chain_axis=0, draw_axis=1, method="tail", prob=0.05)
+
+    @cached_property
+    def bfmi(self) -> Floats:
+        """Estimated fraction of missing information of the energy: (chains,) array."""
+        return _statistics().bfmi(self.energies)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every diagnostic passes its threshold."""
+        return not self._failures()
+
+    @property
+    def verdict(self) -> str:
+        """One sentence that says so, or what failed, and then what to try."""
+        failures = self._failures()
+        if failures:
+            found, remedies = zip(*failures, strict=True)
+            return f"Not converged: {'; '.join(found)}. Try this: {'; '.join(dict.fromkeys(remedies))}."
+        return (
+            f"Converged: R-hat at most {self.rhat.max():.4f}, effective sample sizes at least "
+            f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), {self.divergences} divergences "
+            f"and BFMI at least {self.bfmi.min():.2f} in {len(self.values)} x {self.values.shape[1]} draws."
+        )
+
+    def _failures(self) -> list[tuple[str, str]]:
+        """Return what failed and its remedy; a diagnostic that is not a number fails."""
+        chains, draws, _ = self.values.shape
+        least = MIN_ESS_PER_CHAIN * chains
+        longer = "more warm-up and draws"
+        checks = [
+            (
+                bool((self.rhat < MAX_RHAT).all()),
+                f"R-hat is {self._worst(-self.rhat, self.rhat, '.3f')} and must be below {MAX_RHAT}",
+                f"{longer}, and if it stays high, a narrower prior: some modes or directions are not explored",
+            ),
+            (
+                bool((self.ess_bulk > least).all()),
+                f"the bulk effective sample size is {self._worst(self.ess_bulk, self.ess_bulk, '.0f')} "
+                f"and must exceed {least}",
+                longer,
+            ),
+            (
+                bool((self.ess_tail > least).all()),
+                f"the tail effective sample size is {self._worst(self.ess_tail, self.ess_tail, '.0f')} "
+                f"and must exceed {least}",
+                longer,
+            ),
+            (
+                self.divergences < MAX_DIVERGENT_SHARE * chains * draws,
+                f"{self.divergences} of {chains * draws} draws diverged",
+                "a target acceptance closer to one, such as 0.99",
+            ),
+            (
+                bool((self.bfmi > MIN_BFMI).all()),
+                f"the BFMI is {self.bfmi.min():.2f} and must exceed {MIN_BFMI}",
+                "a narrower prior on the parameters that set a scale",
+            ),
+        ]
+        return [(found, remedy) for passes, found, remedy in checks if not passes]
+
+    def _worst(self, order: Floats, shown: Floats, style: str) -> str:
+        index = int(np.argmin(order))
+        return f"{shown[index]:{style}} for {self.names[index]}"
+
+
+def sample_nuts(
+    log_density: LogDensity,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    start: ArrayLike,
+    settings: NutsSettings | None = None,
+    names: Sequence[str] | None = None,
+) -> NutsDraws:
+    """Sample a log density on a box.
+
+    The density is moved to the real line and whitened by the Hessian at its mode (`tissuq.inference.coordinates`),
+    where one step length fits all directions however stiff the posterior is. Chains start overdispersed around the
+    mode; when several modes hold probability they start around each, so that R-hat tells. Warm-up tunes one step
+    size and one dense mass matrix on the draws of all chains.
+
+    Parameters
+    ----------
+    log_density : callable
+        Log density, up to a constant, of a (d,) JAX array inside the box; JAX traces and differentiates it.
+    lower, upper : (d,) array
+        Bounds of the box; infinite where there is none.
+    start : (d,) array
+        A point inside the box with a finite log density.
+    settings : NutsSettings, optional
+        Lengths, target and seed.
+    names : sequence of str, optional
+        What to call the parameters in messages.
+
+    Returns
+    -------
+    NutsDraws
+        The draws; look at ``converged`` before use. The same seed gives the same bits.
+
+    Raises
+    ------
+    InputError
+        When the bounds, the start or the names do not fit, or the log density is not finite at the start.
+    ConvergenceError
+        When no starting point with a finite log density is found around a mode.
+
+    References
+    ----------
+    Hoffman & Gelman (2014), Journal of Machine Learning Research 15, 1593-1623.
+    Betancourt (2017), arXiv:1701.02434 (multinomial trajectories; BlackJAX implements them).
+
+    Examples
+    --------
+    >>> settings = NutsSettings(warmup=200, draws=500)
+    >>> draws = sample_nuts(lambda x: -3.0 * x[0], [0.0], [np.inf], [1.0], settings)
+    >>> bool(abs(draws.values.mean() - 1 / 3) < 0.05)
+    True
+    """
+    settings = settings or NutsSettings()
+    box = Box(lower, upper)
+    dimension = box.is_bounded.size
+    labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
+    if len(labels) != dimension:
+        raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
+    generator = np.random.default_rng(settings.seed)
+    derivatives = derivatives_on_line(log_density, box)
+    modes = find_modes(derivatives, box, start, generator)
+    states = _overdispersed(derivatives, modes, settings.chains, generator)
+    values, energies, divergent, leapfrogs = _run(log_density, box, modes[0], states, settings)
+    return NutsDraws(values, energies, int(divergent.sum()), float(leapfrogs.mean()), labels)
+
+
+def _overdispersed(
+    derivatives: Derivatives, modes: Sequence[Mode], chains: int, generator: np.random.Generator
+) -> Any:
+    """Return one starting state per chain around the modes in turn, in the coordinates whitened at the first."""
+    starts = [_start_around(derivatives, modes[chain % len(modes)], generator) for chain in range(chains)]
+    positions, values, gradients = zip(*starts, strict=True)
+    whitened = np.stack([modes[0].whiten(line) for line in positions])
+    return blackjax.mcmc.hmc.HMCState(whitened, np.stack(values), np.stack(gradients) @ modes[0].scale)
+
+
+def _start_around(
+    derivatives: Derivatives, mode: Mode, generator: np.random.Generator
+) -> tuple[Floats, Floats, Floats]:
+    """Return a point around a mode, closer at every failed attempt, with its finite log density and gradient."""
+    for shrinkage in 0.8 ** np.arange(50):
+        offset = OVERDISPERSION * shrinkage * generator.standard_normal(mode.location.size)
+        line = mode.unwhiten(offset)
+        value, gradient, _ = derivatives(line)
+        if np.isfinite(value) and np.isfinite(gradient).all():
+            return line, value, gradient
+    raise ConvergenceError(
+        f"the log density is not finite anywhere around its mode at {mode.location} on the line."
+    )
+
+
+class _Tuning(NamedTuple):
+    """What warm-up learns: the step size, the mass matrix, and the moments of the window in progress."""
+
+    step_size: Any
+    inverse_mass: Any
+    count: Any
+    total: Any
+    squares: Any
+
+
+def _run(
+    log_density: LogDensity, box: Box, mode: Mode, states: Any, settings: NutsSettings
+) -> tuple[NDArray[Any], ...]:
+    """Run all chains in one compiled loop and return values, energies, divergences and leapfrogs by chain and draw.
+
+    Warm-up and sampling share the loop body: the trajectory code, by far the costliest to compile, appears once.
+    """
+    on_line = log_density_on_line(log_density, box)
+    kernel = blackjax.nuts.build_kernel()
+
+    def whitened_density(whitened: Any) -> Any:
+        return on_line(mode.unwhiten(whitened))
+
+    def iterate(carry: tuple[Any, _Tuning], step: tuple[Any, ...]) -> tuple[Any, Any]:
+        states, tuning = carry
+        key, is_warmup, is_slow, ends_window = step
+        learning = tuning.step_size
+        step_size = jnp.exp(jnp.where(is_warmup, learning.log_step_size, learning.log_step_size_avg))
+        keys = jax.random.split(key, settings.chains)
+        move = partial(
+            kernel,
+            logdensity_fn=whitened_density,
+            step_size=step_size,
+            inverse_mass_matrix=tuning.inverse_mass,
+        )
+        states, info = jax.vmap(move)(keys, states)
+        tuned = _tune(
+            tuning, states.position, info.acceptance_rate, is_slow, ends_window, settings.target_acceptance
+        )
+        tuning = jax.tree.map(partial(jnp.where, is_warmup), tuned, tuning)
+        return (states, tuning), (states.position, info.energy, info.is_divergent, info.num_integration_steps)
+
+    @jax.jit
+    def run(key: Any, states: Any, schedule: Any) -> Any:
+        keys = jax.random.split(key, settings.warmup + settings.draws)
+        start = (states, _untuned(mode.location.size, settings.target_acceptance))
+        _, trace = jax.lax.scan(iterate, start, (keys, *schedule))
+        positions, *others = (jnp.swapaxes(array[settings.warmup :], 0, 1) for array in trace)
+        to_box = jax.vmap(jax.vmap(lambda whitened: box.from_line(mode.unwhiten(whitened))))
+        return to_box(positions), *others
+
+    trace = run(jax.random.key(settings.seed), states, _schedule(settings))
+    return tuple(np.asarray(array) for array in trace)
+
+
+def _schedule(settings: NutsSettings) -> tuple[NDArray[np.bool_], ...]:
+    """Return, for each iteration, whether it is warm-up, feeds the mass matrix, and ends a window (Stan's windows)."""
+    windows = np.asarray(build_schedule(settings.warmup), dtype=bool)
+    is_slow, ends_window = np.concatenate([windows, np.zeros((settings.draws, 2), dtype=bool)]).T
+    return np.arange(settings.warmup + settings.draws) < settings.warmup, is_slow, ends_window
+
+
+def _untuned(dimension: int, target_acceptance: float) -> _Tuning:
+    start, _, _ = dual_averaging_adaptation(target_acceptance)
+    step_size = jax.tree.map(jnp.asarray, start(1.0))
+    return _Tuning(
+        step_size, jnp.eye(dimension), 0.0, jnp.zeros(dimension), jnp.zeros((dimension, dimension))
+    )
+
+
+def _tune(
+    tuning: _Tuning, positions: Any, acceptance: Any, is_slow: Any, ends_window: Any, target_acceptance: float
+) -> _Tuning:
+    """Return the tuning after one iteration of all chains: dual averaging, and the covariance at a window's end.
+
+    The covariance is shrunk towards a small multiple of the identity, as in Stan.
+    """
+    start, update, finish = dual_averaging_adaptation(target_acceptance)
+    chains, dimension = positions.shape
+    step_size = update(tuning.step_size, acceptance.mean())
+    count = tuning.count + is_slow * chains
+    total = tuning.total + is_slow * positions.sum(0)
+    squares = tuning.squares + is_slow * positions.T @ positions
+    mean = total / jnp.maximum(count, 1)
+    covariance = squares / jnp.maximum(count, 1) - jnp.outer(mean, mean)
+    shrunk = (count * covariance + 5e-3 * jnp.eye(dimension)) / (count + 5)
+    going_on = _Tuning(step_size, tuning.inverse_mass, count, total, squares)
+    restarted = _Tuning(start(finish(step_size)), shrunk, 0.0, jnp.zeros_like(total), jnp.zeros_like(squares))
+    return _Tuning(*jax.tree.map(partial(jnp.where, ends_window), restarted, going_on))
+
+
+def _statistics() -> Any:
+    """Return ArviZ's array functions, imported when first needed."""
+    from arviz_stats.base import array_stats
+
+    return array_stats

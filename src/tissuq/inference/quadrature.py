@@ -1,0 +1,227 @@
+"""Adaptive quadrature of a positive function on the unit cube, known through its logarithm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from tissuq.errors import ConvergenceError
+
+__all__ = ["MAX_DIMENSION", "PiecewiseDensity", "Quadrature", "integrate"]
+
+FloatArray = NDArray[np.float64]
+
+MAX_DIMENSION = 3
+ORDERS = {1: 10, 2: 10, 3: 7}
+"""Gauss-Legendre points along each side of a cell, by dimension."""
+KNOTS = np.array([0.0, 2.0**-8, 2.0**-6, 2.0**-4, 2.0**-2, 0.5, 1.0])
+"""First cells along each side: scale parameters may be far smaller than their prior allows."""
+TOLERANCE = 1e-3
+MAX_CELLS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """C boxes in the unit cube of dimension d, with the function's logarithm at their m^d Gauss points."""
+
+    lower: FloatArray
+    width: FloatArray
+    log_values: FloatArray
+
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> Cells:
+        return Cells(self.lower[chosen], self.width[chosen], self.log_values[chosen])
+
+    def joined(self, other: Cells) -> Cells:
+        """Return these cells followed by others."""
+        return Cells(
+            np.concatenate([self.lower, other.lower]),
+            np.concatenate([self.width, other.width]),
+            np.concatenate([self.log_values, other.log_values]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseDensity:
+    """A density on [0, 1] tabulated finely: points (k,), density and cumulative probability at them."""
+
+    points: FloatArray
+    density: FloatArray
+    cumulative: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Quadrature:
+    """The integral of exp(log f), and f normalised, as weighted points and marginal densities.
+
+    Attributes
+    ----------
+    log_integral : float
+    log_error : float
+        Estimated error of log_integral, from the decay of the Legendre coefficients in every cell (an upper
+        estimate: it is the error of the interpolant, and Gauss quadrature is more accurate).
+    points : (M, d) array
+    weights : (M,) array
+        Non-negative, sum one.
+    """
+
+    cells: Cells
+    log_integral: float
+    log_error: float
+    points: FloatArray
+    weights: FloatArray
+
+    def marginal(self, side: int) -> PiecewiseDensity:
+        """Return the marginal density along one side: the cells' interpolants, other sides integrated."""
+        dimension = self.cells.lower.shape[1]
+        order = ORDERS[dimension]
+        values = np.exp(self.cells.log_values - self.log_integral)
+        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1)
+        lines = lines.reshape(len(lines), order, -1) @ _rule(order, dimension - 1)
+        lines = lines * (np.prod(self.cells.width, axis=1) / self.cells.width[:, side])[:, None]
+        series = lines @ _to_legendre(order).T
+        start, width = self.cells.lower[:, side], self.cells.width[:, side]
+        edges = np.unique(np.concatenate([start, start + width]))
+        points = np.unique(np.concatenate([np.linspace(a, b, 13) for a, b in zip(edges, edges[1:], strict=False)]))
+        middles = 0.5 * (points[1:] + points[:-1])
+        density, at_middles = (_sum_series(series, start, width, x) for x in (points, middles))
+        steps = np.diff(points) * (density[1:] + 4 * at_middles + density[:-1]) / 6
+        cumulative = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 0.0))])
+        return PiecewiseDensity(points, np.maximum(density, 0.0), cumulative / cumulative[-1])
+
+
+def integrate(log_function: Callable[[FloatArray], FloatArray], dimension: int) -> Quadrature:
+    """Integrate exp(log_function) over the unit cube of one to three dimensions.
+
+    Cells are halved along the side in which the function is worst resolved until the estimated error is below
+    a thousandth of the integral; the integral itself is then right to about a millionth.
+
+    Parameters
+    ----------
+    log_function : callable
+        Maps (N, d) points to (N,) values; -inf where the function vanishes.
+    dimension : int
+        One to three.
+
+    Raises
+    ------
+    ConvergenceError
+        When the tolerance is not reached with the largest number of cells, or the function vanishes everywhere.
+    """
+    cells = _first_cells(log_function, dimension)
+    while True:
+        top = cells.log_values.max()
+        if not np.isfinite(top):
+            raise ConvergenceError(
+                "the posterior density is not finite or zero at every point tried: data and priors contradict "
+                "each other, or a prior is far too wide."
+            )
+        integrals, errors = _resolve(cells, top)
+        total, error = integrals.sum(), errors.max(axis=1)
+        if error.sum() <= TOLERANCE * total:
+            return _finish(cells, top, integrals, float(error.sum() / total))
+        if len(cells.lower) > MAX_CELLS:
+            raise ConvergenceError(
+                f"quadrature over {dimension} nonlinear parameters did not reach its tolerance "
+                f"(relative error {error.sum() / total:.1g}); use the sampler 'nuts' or narrower priors."
+            )
+        cells = _halved(log_function, cells, error, errors.argmax(axis=1))
+
+
+def _first_cells(log_function: Callable[[FloatArray], FloatArray], dimension: int) -> Cells:
+    corners = np.meshgrid(*[KNOTS[:-1]] * dimension, indexing="ij")
+    widths = np.meshgrid(*[np.diff(KNOTS)] * dimension, indexing="ij")
+    lower, width = (np.stack([axis.ravel() for axis in grid], axis=1) for grid in (corners, widths))
+    return _evaluated(log_function, lower, width)
+
+
+def _evaluated(log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray) -> Cells:
+    points = _cell_points(lower, width)
+    values = log_function(points.reshape(-1, lower.shape[1])).reshape(points.shape[:2])
+    return Cells(lower, width, np.where(np.isnan(values), -np.inf, values))
+
+
+def _cell_points(lower: FloatArray, width: FloatArray) -> FloatArray:
+    dimension = lower.shape[1]
+    nodes = _gauss(ORDERS[dimension])[0]
+    grid = np.stack([axis.ravel() for axis in np.meshgrid(*[nodes] * dimension, indexing="ij")], axis=1)
+    return np.asarray(lower[:, None, :] + width[:, None, :] * grid)
+
+
+def _resolve(cells: Cells, top: float) -> tuple[FloatArray, FloatArray]:
+    """Return every cell's integral (relative to the largest value) and its error along every side."""
+    dimension = cells.lower.shape[1]
+    order = ORDERS[dimension]
+    values = np.exp(cells.log_values - top)
+    volume = np.prod(cells.width, axis=1)
+    integrals = volume * (values @ _rule(order, dimension))
+    errors = np.empty(cells.lower.shape)
+    across = _rule(order, dimension - 1)
+    for side in range(dimension):
+        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1).reshape(len(values), order, -1)
+        coefficients = np.einsum("kj,cjo->cko", _to_legendre(order)[-2:], lines)
+        errors[:, side] = volume * (np.abs(coefficients).sum(axis=1) @ across)
+    return integrals, errors
+
+
+def _halved(
+    log_function: Callable[[FloatArray], FloatArray], cells: Cells, error: FloatArray, side: NDArray[np.intp]
+) -> Cells:
+    """Halve the worst cells that together hold nine tenths of the error."""
+    order = np.argsort(error)[::-1]
+    count = int(np.searchsorted(np.cumsum(error[order]), 0.9 * error.sum())) + 1
+    chosen = np.zeros(len(error), dtype=bool)
+    chosen[order[:count]] = True
+    halved = (np.arange(cells.lower.shape[1]) == side[chosen][:, None]) * 0.5
+    width = cells.width[chosen] * (1 - halved)
+    upper_half = cells.lower[chosen] + cells.width[chosen] * halved
+    lower = np.concatenate([cells.lower[chosen], upper_half])
+    return cells[~chosen].joined(_evaluated(log_function, lower, np.concatenate([width, width])))
+
+
+def _finish(cells: Cells, top: float, integrals: FloatArray, error: float) -> Quadrature:
+    dimension = cells.lower.shape[1]
+    rule = _rule(ORDERS[dimension], dimension)
+    masses = np.prod(cells.width, axis=1)[:, None] * np.exp(cells.log_values - top) * rule
+    total = integrals.sum()
+    weights = (masses / total).ravel()
+    kept = np.flatnonzero(weights > 1e-12 * weights.max())
+    points = _cell_points(cells.lower, cells.width).reshape(-1, dimension)[kept]
+    return Quadrature(cells, float(top + np.log(total)), error, points, weights[kept] / weights[kept].sum())
+
+
+def _sum_series(series: FloatArray, start: FloatArray, width: FloatArray, x: FloatArray) -> FloatArray:
+    """Sum, at every x, the Legendre series of the cells that hold it (half of each at a common edge)."""
+    total = np.zeros(len(x))
+    for coefficients, a, w in zip(series, start, width, strict=True):
+        first, last = np.searchsorted(x, [a, a + w])
+        inside = slice(first, min(last + 1, len(x)))
+        values = legendre.legval(2 * (x[inside] - a) / w - 1, coefficients)
+        at_edge = ((x[inside] == a) & (a > 0)) | ((x[inside] == a + w) & (a + w < 1))
+        total[inside] += np.where(at_edge, 0.5, 1.0) * values
+    return total
+
+
+@lru_cache
+def _gauss(order: int) -> tuple[FloatArray, FloatArray]:
+    """Return Gauss-Legendre nodes and weights on [0, 1]."""
+    nodes, weights = legendre.leggauss(order)
+    return 0.5 * (nodes + 1), 0.5 * weights
+
+
+@lru_cache
+def _to_legendre(order: int) -> FloatArray:
+    """Return the matrix that takes values at the Gauss nodes to Legendre coefficients."""
+    nodes, weights = legendre.leggauss(order)
+    degrees = np.arange(order)
+    return (degrees + 0.5)[:, None] * legendre.legvander(nodes, order - 1).T * weights
+
+
+@lru_cache
+def _rule(order: int, dimension: int) -> FloatArray:
+    """Return the weights of the tensor Gauss rule on the unit cube, flattened."""
+    return np.asarray(reduce(np.multiply.outer, [_gauss(order)[1]] * dimension, np.array(1.0)).ravel())

@@ -1,0 +1,112 @@
+"""What every route of inference returns: the posterior as a mixture of Gaussians, with draws and marginals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.marginal import Marginal
+from tissuq.model import StatisticalModel
+
+__all__ = ["Components", "Diagnostics", "Solution"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """A posterior as M weighted settings of the nonlinear parameters, the linear ones Gaussian given each.
+
+    Attributes
+    ----------
+    weights : (M,) array
+        Non-negative, sum one.
+    settings : (M, d) array
+        Values of the nonlinear parameters.
+    mean : (M, p) array
+        Means of the linear parameters.
+    root : (M, p, p) array
+        Roots of their covariances; zero where a component is a point.
+    """
+
+    weights: FloatArray
+    settings: FloatArray
+    mean: FloatArray
+    root: FloatArray
+
+    def __getitem__(self, chosen: NDArray[Any]) -> Components:
+        return Components(self.weights[chosen], self.settings[chosen], self.mean[chosen], self.root[chosen])
+
+    def joined(self, other: Components) -> Components:
+        """Return these components followed by others; the weights of both together must sum to one."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Components(*(np.concatenate(pair) for pair in pairs))
+
+    def leading(self, mass: float = 1 - 1e-7) -> Components:
+        """Return the heaviest components that together hold a share ``mass`` of the weight, reweighted to one."""
+        order = np.argsort(self.weights)[::-1]
+        shares = np.cumsum(self.weights[order]) / self.weights.sum()
+        heavy = self[np.sort(order[: int(np.searchsorted(shares, mass)) + 1])]
+        return Components(heavy.weights / heavy.weights.sum(), heavy.settings, heavy.mean, heavy.root)
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """Whether sampling converged: R-hat and effective sample sizes by parameter, and a verdict in words."""
+
+    converged: bool
+    verdict: str
+    rhat: dict[str, float]
+    ess_bulk: dict[str, float]
+    ess_tail: dict[str, float]
+    divergences: int
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The posterior of one model.
+
+    Attributes
+    ----------
+    model : StatisticalModel
+    route : str
+        ``"exact"`` or ``"nuts"``, and ``reason`` says why it was taken.
+    components : Components
+        The posterior as a mixture; predictions rest on it.
+    marginals : dict of str to Marginal
+        One for each parameter.
+    draws : dict of str to (chains, draws) array
+        Draws of every parameter; independent of each other on the exact route.
+    drawn_from : (chains, draws) array of int
+        The component that each draw belongs to.
+    log_evidence, log_evidence_error : float or None
+        Log of p(y) with respect to the normalised priors, y in MPa; None where the route has none.
+    diagnostics : Diagnostics or None
+        Of the sampler; None on the exact route.
+    warnings : tuple of str
+        What a reader of the result must know.
+    """
+
+    model: StatisticalModel
+    route: Literal["exact", "nuts"]
+    reason: str
+    components: Components
+    marginals: dict[str, Marginal]
+    draws: dict[str, FloatArray]
+    drawn_from: NDArray[np.intp]
+    log_evidence: float | None = None
+    log_evidence_error: float | None = None
+    diagnostics: Diagnostics | None = None
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def is_approximate(self) -> bool:
+        """Whether the result must not be used as it stands, because sampling has not converged."""
+        return self.diagnostics is not None and not self.diagnostics.converged
+
+    def drawn_values(self) -> dict[str, Any]:
+        """Return the draws as flat arrays, chain after chain."""
+        return {symbol: values.ravel() for symbol, values in self.draws.items()}

@@ -1,0 +1,19 @@
+"""What the material says: strain energies, and stress as their derivative along a loading mode."""
+
+from tissuq.mechanics.material import Material, material_named, materials
+from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Yeoh
+from tissuq.mechanics.simulate import simulate
+from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, stress_basis
+
+__all__ = [
+    "Material",
+    "MooneyRivlin",
+    "NeoHookean",
+    "Yeoh",
+    "engineering_stress",
+    "initial_shear_modulus",
+    "material_named",
+    "materials",
+    "simulate",
+    "stress_basis",
+]

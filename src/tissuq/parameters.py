@@ -1,0 +1,51 @@
+"""The one line on which a parameter's name, unit, support and place in the model stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+from tissuq.priors import Prior, Uniform
+
+__all__ = ["Parameter"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a material, a discrepancy or the noise.
+
+    Attributes
+    ----------
+    symbol : str
+        The name in the papers, for example ``C10``.
+    description : str
+        What it is, in a few words.
+    dimension : str
+        ``"stress"`` (MPa), ``"stretch"`` or ``"number"`` (both dimensionless).
+    support : tuple of float
+        The lowest and highest value that has a meaning.
+    is_linear : bool
+        Whether the stress is proportional to it.
+    relative_prior : Prior or None
+        The default prior in units of the data: the largest measured stress for a stress, the range of the
+        measured stretches for a stretch. Linear parameters have none: theirs is a box that the data's own
+        least-squares solution sets (`tissuq.model.StatisticalModel`).
+    """
+
+    symbol: str
+    description: str
+    dimension: Literal["stress", "stretch", "number"] = "stress"
+    support: tuple[float, float] = (-inf, inf)
+    is_linear: bool = True
+    relative_prior: Prior | None = None
+
+    @property
+    def unit(self) -> str:
+        """The unit of its values: MPa, or nothing."""
+        return "MPa" if self.dimension == "stress" else ""
+
+    @classmethod
+    def scale(cls, symbol: str, description: str) -> Parameter:
+        """Return a positive parameter that sets the size of a random error in stress."""
+        return cls(symbol, description, "stress", (0.0, inf), False, Uniform(0.0, 1.0))

@@ -1,0 +1,170 @@
+"""The posterior as a user meets it: a table, predictions, labelled draws for ArviZ, a file."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tissuq.inference.solution import Solution
+from tissuq.model import StatisticalModel
+from tissuq.prediction.bands import predict_band, share_inside
+from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["Posterior"]
+
+
+class Posterior:
+    """What `tissuq.fit` returns.
+
+    Attributes
+    ----------
+    solution : Solution
+        Marginals, mixture components and draws.
+    seed : int
+        From which the draws follow.
+    """
+
+    def __init__(self, solution: Solution, seed: int) -> None:
+        self.solution = solution
+        self.seed = seed
+
+    @property
+    def model(self) -> StatisticalModel:
+        """The model that was fitted, with its data and priors."""
+        return self.solution.model
+
+    @property
+    def log_evidence(self) -> float | None:
+        """Log of p(data), data in MPa, priors normalised (uniform densities included); None from a sampler."""
+        return self.solution.log_evidence
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of this posterior must know, in sentences."""
+        return self.solution.warnings
+
+    def summary(self, prob: float = 0.95) -> pd.DataFrame:
+        """Return mean, sd and the highest-density interval of every parameter (MPa; psi in stretch).
+
+        Parameters
+        ----------
+        prob : float
+            Probability inside the interval; 0.95 gives the paper's 95 % HPD.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter: mean, sd, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat when
+            the posterior was sampled.
+        """
+        import pandas as pd
+
+        rows = {}
+        for symbol, marginal in self.solution.marginals.items():
+            low, high = marginal.hdi(prob)
+            rows[symbol] = {"mean": marginal.mean, "sd": marginal.sd, "hdi_low": low, "hdi_high": high}
+        table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+        found = self.solution.diagnostics
+        if found is not None:
+            table["ess"] = [min(found.ess_bulk[symbol], found.ess_tail[symbol]) for symbol in table.index]
+            table["rhat"] = [found.rhat[symbol] for symbol in table.index]
+        return table
+
+    def predict(
+        self, stretch: ArrayLike, *, discrepancy: bool = True, noise: bool = True, prob: float = 0.95
+    ) -> pd.DataFrame:
+        """Return the predicted engineering stress at new stretches, in the loading mode of the data.
+
+        Parameters
+        ----------
+        stretch : (g,) array, dimensionless
+        discrepancy : bool
+            With the discrepancy's share (eq. 27), or the model alone (eq. 28).
+        noise : bool
+            For a new measurement, or for the stress itself.
+        prob : float
+            Probability between low and high, equal tails.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns stretch, mean, low, high; MPa.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(
+            vars(predict_band(self.solution, stretch, discrepancy=discrepancy, noise=noise, prob=prob))
+        )
+
+    def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
+        """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""
+        return share_inside(self.solution, discrepancy=discrepancy, prob=prob)
+
+    @cached_property
+    def data(self) -> xr.DataTree:
+        """Everything as labelled arrays that ArviZ reads.
+
+        Groups posterior, posterior_predictive, log_likelihood (dimensions chain, draw and, for the latter two,
+        measurement), observed_data and constant_data.
+        """
+        import xarray as xr
+
+        solution, experiment = self.solution, self.model.experiment
+        point = {"measurement": np.arange(len(experiment))}
+        sample = {"chain": np.arange(solution.drawn_from.shape[0]), "draw": np.arange(solution.drawn_from.shape[1])}
+        parameters = {parameter.symbol: parameter for parameter in self.model.parameters}
+        stress = ("chain", "draw", "measurement")
+        in_mpa = {"units": "MPa"}
+        groups = {
+            "posterior": xr.Dataset(
+                {
+                    symbol: (("chain", "draw"), values, {"units": parameters[symbol].unit or "1"})
+                    for symbol, values in solution.draws.items()
+                },
+                sample,
+            ),
+            "posterior_predictive": xr.Dataset(
+                {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, sample | point
+            ),
+            "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, sample | point),
+            "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
+            "constant_data": xr.Dataset({"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point),
+        }
+        tree = xr.DataTree.from_dict(groups)
+        tree.attrs.update(self._labels())
+        return tree
+
+    def save(self, path: str | Path) -> None:
+        """Write `data` as NetCDF, which ArviZ and xarray open."""
+        self.data.to_netcdf(path, engine="h5netcdf")
+
+    def _labels(self) -> dict[str, str | float]:
+        model, solution = self.model, self.solution
+        labels: dict[str, str | float] = {
+            "inference_library": "tissuq",
+            "experiment": model.experiment.name,
+            "loading_mode": model.experiment.mode.name,
+            "material": model.material.name,
+            "discrepancy": model.discrepancy.name,
+            "noise_sd": str(model.noise_sd),
+            "sampler": solution.route,
+            "sampler_reason": solution.reason,
+            "seed": self.seed,
+        }
+        labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
+        return labels if solution.log_evidence is None else labels | {"log_evidence": solution.log_evidence}
+
+    def __repr__(self) -> str:
+        model = self.model
+        return (
+            f"<Posterior of {', '.join(model.symbols)}: {model.material.name}, discrepancy {model.discrepancy.name}, "
+            f"{len(model.experiment)} measurements, {self.solution.route}>"
+        )

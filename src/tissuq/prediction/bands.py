@@ -1,0 +1,91 @@
+"""Posterior predictive bands: quantiles of the stress under the whole posterior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri
+
+from tissuq.errors import InputError
+from tissuq.inference.solution import Solution
+from tissuq.prediction.moments import stress_moments
+
+__all__ = ["Band", "predict_band", "share_inside"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Mean and central interval of the stress (MPa) at stretches, all of shape (g,)."""
+
+    stretch: FloatArray
+    mean: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def predict_band(
+    solution: Solution, stretch: ArrayLike, *, discrepancy: bool = True, noise: bool = True, prob: float = 0.95
+) -> Band:
+    """Return the mean stress and the interval that holds ``prob`` of it, at each stretch.
+
+    Parameters
+    ----------
+    solution : Solution
+        The posterior.
+    stretch : (g,) array, dimensionless
+        Where to predict, in the loading mode of the data.
+    discrepancy : bool
+        With the discrepancy's share (eq. 27), or the model alone (eq. 28).
+    noise : bool
+        For a new measurement, or for the stress itself.
+    prob : float
+        Probability between the ends, equal tails.
+
+    Raises
+    ------
+    InputError
+        When a stretch is not positive or prob is not between 0 and 1.
+    """
+    points = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
+    if points.ndim != 1 or not (np.isfinite(points) & (points > 0)).all():
+        raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
+    if not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    components = solution.components.leading()
+    mean, variance = stress_moments(solution.model, components, points, discrepancy=discrepancy, noise=noise)
+    tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
+    low, high = (_mixture_quantile(tail, components.weights, mean, variance) for tail in tails)
+    return Band(points, components.weights @ mean, low, high)
+
+
+def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
+    """Return the share of the measurements inside the predictive band at their own stretches."""
+    data = solution.model.experiment
+    band = predict_band(solution, data.stretch, discrepancy=discrepancy, prob=prob)
+    return float(np.mean((band.low <= data.stress) & (data.stress <= band.high)))
+
+
+def _mixture_quantile(
+    probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray
+) -> FloatArray:
+    """Return the quantile of a mixture of M Gaussians, at each of g places; safeguarded Newton iteration."""
+    centre = weights @ mean
+    spread = np.sqrt(weights @ (variance + (mean - centre) ** 2))
+    sd = np.sqrt(np.maximum(variance, (0.01 * spread) ** 2))
+    sd = np.maximum(sd, 1e-300)
+    low, high = (mean - 10 * sd).min(axis=0), (mean + 10 * sd).max(axis=0)
+    value = np.clip(centre + ndtri(probability) * spread, low, high)
+    for _ in range(60):
+        scores = (value - mean) / sd
+        excess = weights @ ndtr(scores) - probability
+        if np.abs(excess).max() < 1e-9:
+            break
+        low, high = np.where(excess < 0, value, low), np.where(excess < 0, high, value)
+        density = weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
+        step = value - excess / np.maximum(density, 1e-300)
+        value = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+    return value

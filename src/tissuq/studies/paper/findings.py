@@ -1,0 +1,64 @@
+"""What one data set says about one formulation: the numbers on which the paper's claims rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from tissuq.posterior import Posterior
+from tissuq.prediction.bands import Band, predict_band
+
+__all__ = ["Finding", "find", "passes"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The posterior of C10 and the predictive checks of one formulation on one data set."""
+
+    low: float
+    high: float
+    holds_truth: bool
+    measurements: int
+    inside: float
+    inside_model_only: float
+    band_width: float
+    mean_shift: float
+    """Largest distance of the predicted mean from that of no discrepancy, relative to the largest stress."""
+    log_evidence: float | None
+
+    @property
+    def passes(self) -> bool:
+        """Whether the data pass the predictive check with the discrepancy (eq. 27)."""
+        return passes(self.inside, self.measurements)
+
+    @property
+    def passes_model_only(self) -> bool:
+        """Whether the data pass the predictive check of the model alone (eq. 28)."""
+        return passes(self.inside_model_only, self.measurements)
+
+
+def find(posterior: Posterior, truth: float, base: Band | None = None) -> Finding:
+    """Return the finding of a posterior; ``base`` is the predictive band without discrepancy."""
+    data = posterior.model.experiment
+    low, high = posterior.solution.marginals["C10"].hdi()
+    band = predict_band(posterior.solution, data.stretch)
+    alone = predict_band(posterior.solution, data.stretch, discrepancy=False)
+    shift = np.abs(band.mean - base.mean).max() / np.abs(data.stress).max() if base else 0.0
+    inside, inside_alone = (
+        float(np.mean((b.low <= data.stress) & (data.stress <= b.high))) for b in (band, alone)
+    )
+    width = float(np.mean(band.high - band.low))
+    return Finding(
+        low, high, low <= truth <= high, len(data), inside, inside_alone, width, float(shift), posterior.log_evidence
+    )
+
+
+def passes(share: float, measurements: int, prob: float = 0.95) -> bool:
+    """Return whether a share inside a 95 % band is what chance allows: not in the lowest 2.5 % of a binomial law."""
+    inside = round(share * measurements)
+    at_most = sum(
+        comb(measurements, k) * prob**k * (1 - prob) ** (measurements - k) for k in range(inside + 1)
+    )
+    return at_most > 0.025

@@ -1,0 +1,98 @@
+"""The study itself: seven formulations on synthetic data, the claims, and what they depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Literal
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.fitting import fit
+from tissuq.posterior import Posterior
+from tissuq.prediction.bands import Band, predict_band
+from tissuq.studies.paper.claims import Findings, Verdict, judge
+from tissuq.studies.paper.findings import Finding, find
+from tissuq.studies.paper.sensitivity import Cell, sensitivity
+from tissuq.studies.paper.settings import FORMULATIONS, PaperSettings
+
+__all__ = ["Fitted", "PaperStudy", "run_paper", "steps_of"]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One formulation fitted to the run's own data set, with its wall time."""
+
+    formulation: str
+    posterior: Posterior
+    finding: Finding
+    seconds: float
+
+
+@dataclass(frozen=True)
+class PaperStudy:
+    """Everything that a run found. ``main`` is the exact route unless only NUTS was asked for."""
+
+    settings: PaperSettings
+    experiment: Experiment
+    main: dict[str, Fitted]
+    sampled: dict[str, Fitted]
+    verdicts: list[Verdict]
+    cells: list[Cell]
+
+    @property
+    def not_converged(self) -> list[str]:
+        """Formulations whose sampling has not converged."""
+        every = {**self.main, **self.sampled}
+        return [name for name, fitted in every.items() if fitted.posterior.solution.is_approximate]
+
+
+def steps_of(settings: PaperSettings) -> int:
+    """Return how many steps a run announces."""
+    fits = len(FORMULATIONS) * (2 if settings.sampler == "both" else 1)
+    return fits + settings.replicates - 1 + 5
+
+
+def run_paper(settings: PaperSettings, step: Callable[[str], None] = lambda text: None) -> PaperStudy:
+    """Carry out the study.
+
+    Parameters
+    ----------
+    settings : PaperSettings
+    step : callable
+        Called with a few words before each step, for a progress display.
+    """
+    experiment = settings.experiment()
+    main = _fit_all(settings, experiment, "nuts" if settings.sampler == "nuts" else "exact", step)
+    sampled = _fit_all(settings, experiment, "nuts", step) if settings.sampler == "both" else {}
+    data_sets: list[Findings] = [{name: fitted.finding for name, fitted in main.items()}]
+    for replicate in range(1, settings.replicates):
+        step(f"replicate {replicate + 1} of {settings.replicates}")
+        again = _fit_all(settings, settings.experiment(replicate), "exact", lambda text: None)
+        data_sets.append({name: fitted.finding for name, fitted in again.items()})
+    return PaperStudy(settings, experiment, main, sampled, judge(data_sets), sensitivity(settings, step))
+
+
+def _fit_all(
+    settings: PaperSettings,
+    experiment: Experiment,
+    sampler: Literal["exact", "nuts"],
+    step: Callable[[str], None],
+) -> dict[str, Fitted]:
+    fitted: dict[str, Fitted] = {}
+    base: Band | None = None
+    for name in FORMULATIONS:
+        step(f"{name} ({sampler})")
+        start = perf_counter()
+        posterior = fit(
+            experiment,
+            discrepancy=name,
+            noise_sd=settings.noise_sd,
+            priors=settings.priors_of(name),
+            sampler=sampler,
+            seed=settings.seed,
+        )
+        seconds = perf_counter() - start
+        base = base or predict_band(posterior.solution, experiment.stretch)
+        fitted[name] = Fitted(name, posterior, find(posterior, settings.truth["C10"], base), seconds)
+    return fitted

@@ -1,0 +1,434 @@
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.reading import read_experiment
+
+LAB_FILES = Path(__file__).parent / "lab_files"
+BAD_FILES = Path(__file__).parent / "bad_files"
+
+GOOD = {
+    "plain.csv": ({}, [1.0, 1.1, 1.2], [0.0, 0.5, 1.25]),
+    "zwick_semicolon_decimal_comma_latin1.csv": ({}, [1.0, 1.05, 1.1], [0.0, 0.125, 0.25]),
+    "instron_metadata_block.csv": ({}, [1.0, 1.1, 1.2], [0.0, 4.5e-3, 12.5e-3]),
+    "tabs_units_row.tsv": ({}, [1.0, 1.1, 1.2], [0.0, 2e-3, 5e-3]),
+    "blanks.txt": ({}, [1.0, 1.5, 2.0], [0.0, 1.5, 2.5]),
+    "cauchy.csv": ({"stress_type": "cauchy"}, [1.0, 1.25, 2.0], [0.0, 4e-3, 15e-3]),
+    "strain_percent.csv": ({}, [0.9, 1.0, 1.1], [-2e-3, 0.0, 1.5e-3]),
+    "unsorted_repeated.csv": ({}, [1.2, 1.0, 1.1, 1.1, 1.0], [3e-3, 0.0, 1.5e-3, 1.25e-3, 0.125e-3]),
+    "compression_positive.csv": ({"compression_positive": True}, [1.0, 0.9, 0.8], [0.0, -2e-3, -5e-3]),
+    "no_header.csv": ({"columns": {"stretch": 1, "stress": 2}}, [1.0, 1.1, 1.2], [0.0, 0.5, 1.25]),
+    "numpy_savetxt.txt": ({}, [1.0, 1.1], [0.0, 0.5]),
+    "utf16_excel.txt": ({}, [1.0, 1.1], [0.0, 4.5e-3]),
+    "utf8_bom.csv": ({}, [1.0, 1.1], [0.0, 4.5e-3]),
+    "quoted_decimal_commas.csv": ({}, [1.0, 1.1], [0.0, 0.5]),
+    "noise_near_one.csv": (
+        {},
+        [0.999, 0.9995, 1.0, 1.0005, 1.1, 1.2],
+        [0.02e-3, 0.01e-3, -0.01e-3, -0.02e-3, 2e-3, 5e-3],
+    ),
+    "text_column.csv": ({}, [1.0, 1.1], [0.0, 4.5e-3]),
+    "minus_sign.csv": ({}, [0.9, 1.0, 1.1], [-1.5, 0.0, 1.2]),
+}
+
+BAD = {
+    "empty.csv": ["empty.csv is empty"],
+    "only_comments.csv": ["holds only comments and blank lines"],
+    "only_header.csv": ["holds no rows of numbers", "(1) reads 'stretch,stress_kPa'"],
+    "binary.csv": ["is a binary file, not text", "CSV"],
+    "workbook.csv": ["Excel workbook", "CSV"],
+    "one_line.csv": ["not a table in text form"],
+    "unknown_columns.csv": [
+        "no column is recognised as stress",
+        "'elongation', 'load'",
+        "--column stress=NAME",
+    ],
+    "no_header.csv": ["2 columns have no names", 'columns={"stretch": 1, "stress": 2}'],
+    "stretch_and_strain.csv": ["'stretch' (number 1) and 'strain' (number 2)", 'columns={"stretch": "NAME"}'],
+    "two_stresses.csv": ["'stress_kPa' (number 2) and 'nominal stress [kPa]' (number 3)"],
+    "true_stress.csv": ["'true stress [kPa]' is a stress of the cauchy kind", "--stress-type cauchy"],
+    "log_strain.csv": ["no column is recognised as stretch or strain", "'log strain'"],
+    "text_in_number_column.csv": ["line 3, column 'stress': 'n/a' is not a number"],
+    "text_in_first_row.csv": ["line 2, column 'stretch': '--' is not a number"],
+    "footer.csv": ["line 4, column 'stretch': 'End of test' is not a number"],
+    "nan.csv": ["line 5, column 'stress': 'nan' is not a finite number"],
+    "infinite.csv": ["line 3, column 'stress': 'inf' is not a finite number"],
+    "empty_cell.csv": ["line 3, column 'stress': the cell is empty"],
+    "short_row.csv": ["line 3, column 'stress': the cell is empty"],
+    "long_row.csv": ["line 3 has 3 cells, but line 1 with the column names has 2", "decimal commas"],
+    "negative_stretch.csv": ["line 3, column 'stretch': stretch -1.1 is not positive"],
+    "strain_named_stretch.csv": ["line 2, column 'stretch': stretch 0 is not", "--column strain=stretch"],
+    "strain_without_zero_named_stretch.csv": ["look like strain, not stretch", "--column strain=stretch"],
+    "stretch_named_strain.csv": [
+        "line 2, column 'strain'",
+        "looks like a stretch",
+        "--column stretch=strain",
+    ],
+    "percent_without_unit.csv": ["line 4, column 'strain': strain 20 without a unit", "--strain-unit %"],
+    "strain_below_minus_one.csv": ["line 2, column 'strain'", "larger than -1"],
+    "compression_positive.csv": [
+        "line 4, column 'stress_kPa'",
+        "at stretch 0.8 (compression) the stress is positive",
+        "compression_positive=True (--compression-positive)",
+    ],
+    "tension_negative.csv": ["line 4, column 'stress_kPa'", "(tension) the stress is negative"],
+    "unknown_unit.csv": ["column 'stress [furlong]'", "not a unit of stress", "--stress-unit"],
+    "force.csv": ["column 'stress [N]': 'N' is a force", "undeformed cross-section"],
+    "mass_over_area.csv": ["'kg/cm2' is a mass over an area", "kgf/cm2"],
+    "two_units.csv": ["the name says 'kPa'", "says 'MPa'"],
+    "mixed_decimals.csv": ["points and decimal commas are mixed", "'0.0' in line 2", "'1,0' in line 2"],
+    "thousands.csv": ["line 3, column 'stress': '1,234.5' seems to have a thousands separator"],
+    "comma_is_separator_and_decimal.csv": [
+        "line 2 has 4 cells",
+        "separate the columns by semicolons or tabs",
+    ],
+    "commas_without_header.csv": ["may be decimal commas or separators (line 1: 1,05)"],
+    "pause_after_first_row.csv": ["2 columns have no names"],
+    "short_first_row.txt": ["line 2, column 'stress': the cell is empty"],
+    "two_tables.csv": ["line 3, column 'stretch': 'stretch' is not a number"],
+    "open_quotation_mark.csv": ["line 3: a quotation mark has no partner"],
+}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text, name="test.csv"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def message(path, **options):
+    with pytest.raises(InputError) as caught:
+        read_experiment(path, **options)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", sorted(GOOD))
+def test_a_laboratory_file_is_read(name):
+    options, stretch, stress = GOOD[name]
+    data = read_experiment(LAB_FILES / name, **options)
+    np.testing.assert_allclose(data.stretch, stretch, rtol=1e-15)
+    np.testing.assert_allclose(data.stress, stress, rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", sorted(BAD))
+def test_a_bad_file_is_refused_with_place_finding_and_advice(name):
+    text = message(BAD_FILES / name)
+    assert name in text
+    for words in BAD[name]:
+        assert words in text
+
+
+def test_every_file_beside_this_test_is_tested():
+    assert {file.name for file in LAB_FILES.iterdir()} == set(GOOD)
+    assert {file.name for file in BAD_FILES.iterdir()} == set(BAD)
+
+
+def test_the_source_tells_file_columns_units_conversions_and_rows():
+    data = read_experiment(LAB_FILES / "strain_percent.csv")
+    assert data.source == (
+        "strain_percent.csv: stretch = 1 + column 'Strain (%)' x 0.01; "
+        "engineering stress from column 'Stress (kPa)' in kPa (from the file); 3 rows (lines 2 to 4)"
+    )
+    assert (data.name, data.stress_unit, data.mode.name) == ("strain_percent", "kPa", "uniaxial")
+
+
+def test_the_source_tells_that_mpa_was_assumed():
+    data = read_experiment(LAB_FILES / "plain.csv")
+    assert "MPa (assumed: the file states no unit)" in data.source
+    assert data.stress_unit == "MPa"
+
+
+def test_the_source_tells_that_cauchy_stress_was_divided_by_stretch():
+    data = read_experiment(LAB_FILES / "cauchy.csv", stress_type="cauchy")
+    assert "cauchy stress from column 'Cauchy stress [kPa]'" in data.source
+    assert "divided by stretch" in data.source
+
+
+def test_the_source_tells_that_the_sign_was_changed():
+    data = read_experiment(LAB_FILES / "compression_positive.csv", compression_positive=True)
+    assert "sign changed at stretch < 1" in data.source
+
+
+def test_mode_and_name_are_those_given():
+    data = read_experiment(LAB_FILES / "plain.csv", mode="planar", name="sheet 3")
+    assert (data.mode.name, data.name) == ("planar", "sheet 3")
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "stress_kPa",
+        "Stress [kPa]",
+        "Stress (kPa)",
+        "stress/kPa",
+        "Stress / kPa",
+        "STRESS kPa",
+        "Stress in kPa",
+        "Engineering stress [kPa]",
+        "nominal_stress_kPa",
+        "engineering-stress (kPa)",
+    ],
+)
+def test_the_heading_of_the_stress_gives_its_unit(written, heading):
+    data = read_experiment(written(f"stretch,{heading}\n1.0,0\n1.1,2\n"))
+    assert data.stress.tolist() == [0.0, 0.002]
+    assert data.stress_unit == "kPa"
+
+
+@pytest.mark.parametrize(
+    "heading", ["stretch", "Stretch [-]", "stretch_ratio", "lambda", "λ", "Λ", "Stretch (mm/mm)"]
+)
+def test_the_stretch_is_recognised_by_its_name(written, heading):
+    assert read_experiment(written(f"stress,{heading}\n0,1.0\n2,1.5\n")).stretch.tolist() == [1.0, 1.5]
+
+
+@pytest.mark.parametrize("heading", ["strain", "Engineering strain", "nominal_strain [mm/mm]", "Strain (1)"])
+def test_the_strain_is_recognised_by_its_name_and_one_is_added(written, heading):
+    assert read_experiment(written(f"stress,{heading}\n0,0.0\n2,0.5\n")).stretch.tolist() == [1.0, 1.5]
+
+
+def test_a_strain_rate_is_not_taken_for_the_strain(written):
+    data = read_experiment(written("strain_rate,strain,stress\n0.01,0.0,0\n0.01,0.5,2\n"))
+    assert data.stretch.tolist() == [1.0, 1.5]
+
+
+@pytest.mark.parametrize("wanted", ["Load / area", "load / area", "2", 2])
+def test_a_column_is_given_by_name_in_any_capitals_or_by_number(written, wanted):
+    path = written("Lambda,Load / area\n1.0,0\n1.1,2\n")
+    data = read_experiment(path, columns={"stress": wanted}, stress_unit="kPa")
+    assert data.stress.tolist() == [0.0, 0.002]
+
+
+def test_an_exact_name_goes_before_one_in_other_capitals(written):
+    path = written("stretch,S,s\n1.0,0,0\n1.1,2,3\n")
+    assert read_experiment(path, columns={"stress": "s"}).stress.tolist() == [0.0, 3.0]
+
+
+def test_a_column_is_given_by_its_name_without_the_unit(written):
+    data = read_experiment(written("x [%],P [kPa]\n0,0\n10,2\n"), columns={"strain": "x", "stress": "P"})
+    assert data.stretch.tolist() == [1.0, 1.1]
+    assert data.stress.tolist() == [0.0, 0.002]
+
+
+def test_a_column_named_strain_may_hold_stretches(written):
+    data = read_experiment(written("Strain,Stress\n1.0,0\n1.1,2\n"), columns={"stretch": "Strain"})
+    assert data.stretch.tolist() == [1.0, 1.1]
+
+
+def test_a_strain_given_as_stretch_is_answered_with_how_to_say_it(written):
+    text = message(written("Strain,Stress\n0.0,0\n0.1,2\n"), columns={"stretch": "Strain"})
+    assert 'columns={"strain": "Strain"} or --column strain=Strain' in text
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"stress": "Stess"}, "no column 'Stess' (asked for as stress). Did you mean 'Stress'?"),
+        ({"stress": "force"}, "The columns are: 'Strain', 'Stress', 'Stress'"),
+        ({"stress": "Stress"}, "'Stress' (number 2) and 'Stress' (number 3)"),
+        ({"stress": 4}, "no column '4'"),
+        ({"stress": 0}, "no column '0'"),
+        ({"strain": 1, "stretch": 1}, "both stretch and strain"),
+        ({"strain": 2, "stress": 2}, "cannot be both strain and stress"),
+        ({"force": "Stress"}, "cannot be given as 'force'"),
+    ],
+)
+def test_a_mapping_that_does_not_fit_is_refused(written, columns, words):
+    assert words in message(written("Strain,Stress,Stress\n0.0,0,0\n0.1,2,2\n"), columns=columns)
+
+
+@pytest.mark.parametrize("name", ["true strain", "Green strain", "log_strain [%]"])
+def test_another_measure_of_strain_is_refused_as_strain(written, name):
+    text = message(written(f"{name},stress\n0.0,0\n0.1,2\n"), columns={"strain": 1})
+    assert "is not an engineering strain" in text
+
+
+def test_a_column_named_true_stress_is_refused_as_engineering_stress(written):
+    text = message(written("stretch,True stress\n1.0,0\n1.1,2\n"), columns={"stress": "True stress"})
+    assert "named a Cauchy stress but read as an engineering stress" in text
+
+
+def test_a_column_named_nominal_stress_is_refused_as_cauchy_stress(written):
+    path = written("stretch,nominal stress\n1.0,0\n1.1,2\n")
+    text = message(path, columns={"stress": 2}, stress_type="cauchy")
+    assert "named an engineering stress but read as a Cauchy stress" in text
+
+
+def test_a_given_stress_unit_may_repeat_that_of_the_file_in_another_spelling(written):
+    data = read_experiment(written("stretch,stress [N/mm2]\n1.0,0\n1.1,2\n"), stress_unit="MPa")
+    assert data.stress.tolist() == [0.0, 2.0]
+
+
+def test_a_given_stress_unit_goes_before_words_that_are_no_unit(written):
+    data = read_experiment(written("stretch,stress (mean)\n1.0,0\n1.1,2\n"), stress_unit="kPa")
+    assert data.stress.tolist() == [0.0, 0.002]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"stress_unit": "MPa"}, "stress_unit='MPa' is given, but the file says 'kPa'"),
+        ({"strain_unit": "1"}, "strain_unit='1' is given, but the file says '%'"),
+        ({"stress_unit": "N"}, "'N' is a force"),
+        ({"strain_unit": "mm"}, "'mm' is not a unit of strain"),
+        (
+            {"columns": {"stretch": "Strain"}, "strain_unit": "%"},
+            "is read as stretch, but strain_unit='%' is given",
+        ),
+        ({"stress_type": "Kirchhoff"}, "stress_type must be one of engineering, cauchy, not 'Kirchhoff'"),
+        ({"compression_positive": True}, "the stress is already negative in the file"),
+        ({"skip_rows": -1}, "skip_rows must be a number of lines"),
+        ({"skip_rows": 99}, "holds only comments and blank lines"),
+    ],
+)
+def test_options_that_contradict_the_file_or_each_other_are_refused(options, words):
+    assert words in message(LAB_FILES / "strain_percent.csv", **options)
+
+
+def test_a_strain_unit_is_given_when_the_file_has_none(written):
+    data = read_experiment(written("strain,stress\n0,0\n50,2\n"), strain_unit="%")
+    assert data.stretch.tolist() == [1.0, 1.5]
+
+
+def test_large_strains_without_unit_are_read_when_said_to_be_plain(written):
+    data = read_experiment(written("strain,stress\n0,0\n11,2\n"), strain_unit="1")
+    assert data.stretch.tolist() == [1.0, 12.0]
+
+
+def test_an_unknown_mode_is_refused_before_the_file_is_read():
+    with pytest.raises(ModelError, match="no loading mode named 'shear'"):
+        read_experiment("no such file", mode="shear")
+
+
+def test_skipped_rows_are_not_looked_at_but_counted(written):
+    path = written("stretch,stress\n1,2\n3,4\nstretch,stress\n1.0,0.0\n1.1,oops\n1.2,1\n")
+    assert "line 6, column 'stress': 'oops'" in message(path, skip_rows=3)
+
+
+def test_no_row_is_dropped_when_text_interrupts_the_table():
+    text = message(BAD_FILES / "pause_after_first_row.csv", columns={"stretch": 1, "stress": 2})
+    assert "line 2, column number 1: 'PAUSE' is not a number" in text
+
+
+def test_a_missing_file_is_answered_with_the_one_that_is_there(written):
+    path = written("stretch,stress\n1.0,0.0\n", name="cortex.csv")
+    text = message(path.with_name("cortx.csv"))
+    assert "there is no such file" in text
+    assert "cortex.csv'?" in text
+
+
+def test_a_missing_folder_is_reported():
+    assert "there is no such file" in message("no/such/folder/test.csv")
+
+
+def test_a_folder_is_refused(tmp_path):
+    assert "is a folder" in message(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(PermissionError(), "no permission"), (OSError("disk on fire"), "disk on fire")]
+)
+def test_a_file_that_cannot_be_opened_is_reported(written, monkeypatch, error, words):
+    def refuse(self):
+        raise error
+
+    path = written("stretch,stress\n1.0,0.0\n")
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    assert words in message(path)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_lines_may_end_in_any_way(tmp_path, end):
+    path = tmp_path / "test.csv"
+    path.write_bytes(end.join(["stretch,stress", "1.0,0.0", "", "1.1,x", "1.2,1"]).encode())
+    assert "line 4, column 'stress': 'x'" in message(path)
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1"]
+)
+def test_files_may_be_in_any_usual_encoding(tmp_path, encoding):
+    path = tmp_path / "test.csv"
+    path.write_bytes("stretch,stress [N/mm²]\n1.0,0.0\n1.1,2.0\n".encode(encoding))
+    assert read_experiment(path).stress_unit == "N/mm²"
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "   "])
+def test_cells_may_be_separated_in_any_usual_way(written, separator):
+    path = written(
+        "\n".join(separator.join(row) for row in [("stretch", "stress"), ("1.0", "0"), ("1.1", "2")])
+    )
+    assert read_experiment(path).stretch.tolist() == [1.0, 1.1]
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_decimal_commas_are_understood_with_every_separator_but_the_comma(written, separator):
+    path = written(
+        "\n".join(separator.join(row) for row in [("stretch", "stress"), ("1,0", "0"), ("1,1", "2,5e-1")])
+    )
+    data = read_experiment(path)
+    assert data.stretch.tolist() == [1.0, 1.1]
+    assert data.stress.tolist() == [0.0, 0.25]
+
+
+def test_a_trailing_separator_adds_no_column(written):
+    assert read_experiment(written("stretch,stress,\n1.0,0.0,\n1.1,0.5,\n")).stress.tolist() == [0.0, 0.5]
+
+
+def test_a_single_row_is_an_experiment(written):
+    assert len(read_experiment(written("stretch,stress\n1.1,0.5\n"))) == 1
+
+
+def test_a_preload_before_tension_does_not_trip_the_check_of_signs(written):
+    data = read_experiment(written("stretch,stress\n0.99,0.02\n1.0,0.03\n1.1,0.5\n1.2,1.0\n"))
+    assert data.stress.tolist() == [0.02, 0.03, 0.5, 1.0]
+
+
+def test_hysteresis_in_tension_does_not_trip_the_check_of_signs(written):
+    data = read_experiment(written("stretch,stress\n1.0,0\n1.2,1.0\n1.1,0.1\n1.05,-0.15\n"))
+    assert data.stress[-1] == -0.15
+
+
+def test_the_sign_is_asked_for_in_compression_even_when_tension_is_right(written):
+    text = message(written("stretch,stress\n0.8,1.5\n0.9,0.5\n1.0,0\n1.1,0.4\n1.2,0.8\n"))
+    assert "line 2, column 'stress': at stretch 0.8 (compression)" in text
+
+
+def test_numbers_are_read_to_the_last_digit(written):
+    path = written("stretch,stress\n1.0,0.1\n1.2345678901234567,0.30000000000000004\n")
+    data = read_experiment(path)
+    assert data.stretch[1] == 1.2345678901234567
+    assert data.stress[1] == 0.30000000000000004
+
+
+def test_a_damaged_file_is_read_or_refused_but_never_breaks_the_program(tmp_path):
+    random = np.random.default_rng(7)
+    path = tmp_path / "test.csv"
+    for name in sorted(GOOD):
+        whole = (LAB_FILES / name).read_bytes()
+        for _ in range(40):
+            damaged = bytearray(whole)
+            for position in random.integers(0, len(damaged), size=random.integers(1, 5)):
+                damaged[position] = random.choice(list(b'0,;."\t\n -#e[\x00\xff'))
+            path.write_bytes(damaged[: random.integers(1, len(damaged) + 1)])
+            try:
+                read_experiment(path, **GOOD[name][0])
+            except InputError as error:
+                assert "test.csv" in str(error)  # noqa: PT017
+
+
+def test_a_million_rows_are_read_in_seconds(tmp_path):
+    path = tmp_path / "long.csv"
+    rows = "".join(f"{1 + i * 1e-6:.6f};{i * 1e-6:.6f}\n".replace(".", ",") for i in range(1000))
+    path.write_text("stretch;stress\n" + rows * 1000)
+    start = perf_counter()
+    data = read_experiment(path)
+    assert len(data) == 1_000_000
+    assert perf_counter() - start < 15

@@ -1,0 +1,117 @@
+import subprocess
+import sys
+
+import pytest
+
+from tissuq.errors import InputError
+from tissuq.experiments.units import looks_like_unit, strain_factor, stress_unit
+
+MPA = {
+    "MPa": 1.0,
+    "kPa": 1e-3,
+    "Pa": 1e-6,
+    "GPa": 1e3,
+    "hPa": 1e-4,
+    "KPa": 1e-3,
+    "kpa": 1e-3,
+    "KPA": 1e-3,
+    "Mpa": 1.0,
+    "MPA": 1.0,
+    "mpa": 1.0,
+    " kPa ": 1e-3,
+    "N/mm2": 1.0,
+    "N/mm^2": 1.0,
+    "N/mm**2": 1.0,
+    "N/mm²": 1.0,
+    "N / mm²": 1.0,
+    "N·mm⁻²": 1.0,
+    "N.mm-2": 1.0,
+    "N mm^-2": 1.0,
+    "mN/mm2": 1e-3,
+    "µN/µm²": 1.0,
+    "kN/m2": 1e-3,
+    "kgf/cm2": 0.0980665,
+    "kgf/cm^2": 0.0980665,
+    "kp/cm2": 0.0980665,
+    "gf/mm2": 9.80665e-3,
+    "psi": 4.4482216152605 / 25.4**2,
+    "lbf/in2": 4.4482216152605 / 25.4**2,
+    "ksi": 4.4482216152605e3 / 25.4**2,
+    "dyn/cm2": 1e-7,
+    "dyne/cm^2": 1e-7,
+    "bar": 0.1,
+    "atm": 0.101325,
+    "mmHg": 1.33322387415e-4,
+    "kilopascal": 1e-3,
+    "mJ/mm3": 1.0,
+}
+
+
+@pytest.mark.parametrize(("text", "factor"), MPA.items())
+def test_a_stress_unit_is_converted_to_mpa(text, factor):
+    assert stress_unit(text).to_mpa == pytest.approx(factor, rel=1e-9)
+
+
+def test_a_stress_unit_keeps_the_spelling_of_the_user():
+    assert stress_unit("N/mm²").name == "N/mm²"
+
+
+def test_only_the_exact_millipascal_is_a_millipascal():
+    assert stress_unit("mPa").to_mpa == pytest.approx(1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("N", "'N' is a force, not a stress.*undeformed cross-section"),
+        ("mm", "'mm' is not a unit of stress"),
+        ("%", "'%' is not a unit of stress"),
+        ("MPa/s", "'MPa/s' is not a unit of stress"),
+        ("degC", "'degC' is not a unit of stress"),
+        ("g/cm2", "'g/cm2' is a mass over an area.*gf/mm2"),
+        ("kg/cm^2", "'kg/cm\\^2' is a mass over an area.*kgf/cm2"),
+        ("furlongs per fortnight", "'furlongs per fortnight' is not a unit of stress"),
+        ("nominal", "the unit 'nominal' is not known.*kPa"),
+        ("10 kPa", "the unit '10 kPa' is not known"),
+        ("", "the unit '' is not known"),
+        ("((", "is not known"),
+        ("MPa" * 100, "is not known"),
+    ],
+)
+def test_what_is_not_a_stress_is_refused(text, words):
+    with pytest.raises(InputError, match=words):
+        stress_unit(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [("", 1), ("1", 1), ("-", 1), ("mm/mm", 1), ("mm / mm", 1), ("%", 0.01), ("percent", 0.01), ("‰", 0.001)],
+)
+def test_a_strain_unit_is_converted_to_a_ratio(text, factor):
+    assert strain_factor(text) == factor
+
+
+def test_an_unknown_strain_unit_is_refused():
+    with pytest.raises(InputError, match="'mm' is not a unit of strain; write '%', or '1'"):
+        strain_factor("mm")
+
+
+@pytest.mark.parametrize(
+    "text", ["[anything]", "(kPa)", "N/mm²", "mm/min", "s", "%", "°C", "1/s", "-", "1", ""]
+)
+def test_cells_of_a_units_row_look_like_units(text):
+    assert looks_like_unit(text)
+
+
+@pytest.mark.parametrize("text", ["stress", "Time", "lambda", "A17", "n/a", "0.5", "--", "start"])
+def test_names_and_values_do_not_look_like_units(text):
+    assert not looks_like_unit(text)
+
+
+def test_common_units_need_no_units_library():
+    code = (
+        "import sys; from tissuq.experiments.units import stress_unit\n"
+        "for unit in ['MPa', 'kPa', 'Pa', 'KPa', 'N/mm2', 'N/mm²', 'psi']: stress_unit(unit)\n"
+        "sys.exit('pint' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
