@@ -7,7 +7,8 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.experiments.reading import read_experiment
 from tissuq.fitting import fit
-from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus, materials, simulate
+from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus, simulate
+from tissuq.mechanics.material import materials
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, HalfCauchy, HalfNormal, LogNormal, Normal, Prior, Uniform

@@ -96,8 +96,9 @@ class StatisticalModel:
 
     @cached_property
     def nonlinear(self) -> tuple[str, ...]:
-        """All other parameters."""
-        return tuple(p.symbol for p in self.parameters if p.symbol not in self.linear)
+        """All other parameters, those of a correlation's shape first: they cost most to vary."""
+        others = [p.symbol for p in self.parameters if p.symbol not in self.linear]
+        return tuple(sorted(others, key=lambda symbol: symbol not in self.discrepancy.shape_symbols))
 
     @cached_property
     def column_symbols(self) -> tuple[str, ...]:

@@ -271,6 +271,22 @@ def test_a_given_stress_unit_goes_before_words_that_are_no_unit(written):
     assert data.stress.tolist() == [0.0, 0.002]
 
 
+def test_words_after_the_name_of_a_stretch_are_no_unit(written):
+    assert read_experiment(written("stretch (ratio),stress\n1.0,0\n1.1,2\n")).stretch.tolist() == [1.0, 1.1]
+
+
+def test_a_length_is_refused_as_strain_unless_its_unit_is_given(written):
+    path = written("strain [mm],stress\n0,0\n0.5,2\n")
+    assert "column 'strain [mm]': 'mm' is not a unit of strain" in message(path)
+    assert read_experiment(path, strain_unit="1").stretch.tolist() == [1.0, 1.5]
+
+
+def test_a_heading_with_millipascal_is_asked_about(written):
+    path = written("stretch,stress_mPa\n1.0,0\n1.1,2\n")
+    assert "column 'stress_mPa': 'mPa' is the millipascal" in message(path)
+    assert read_experiment(path, stress_unit="MPa").stress.tolist() == [0.0, 2.0]
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

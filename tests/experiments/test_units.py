@@ -56,8 +56,10 @@ def test_a_stress_unit_keeps_the_spelling_of_the_user():
     assert stress_unit("N/mm²").name == "N/mm²"
 
 
-def test_only_the_exact_millipascal_is_a_millipascal():
-    assert stress_unit("mPa").to_mpa == pytest.approx(1e-9)
+def test_the_millipascal_must_be_written_in_full():
+    assert stress_unit("millipascal").to_mpa == pytest.approx(1e-9)
+    with pytest.raises(InputError, match="write MPa for megapascal, or millipascal in full"):
+        stress_unit("mPa")
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from tissuq.experiments.reading import read_experiment
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["copy", "load", "names", "path", "table"]
+__all__ = ["citation", "copy", "load", "names", "path", "table"]
 
 FOLDER = Path(__file__).parent / "data"
 
@@ -46,6 +46,17 @@ def path(name: str) -> Path:
         hint = f" Did you mean '{close[0]}'?" if close else ""
         raise InputError(f"there is no data set named '{name}'.{hint} Choose one of: {', '.join(names())}.")
     return FOLDER / f"{name}.csv"
+
+
+def citation(name: str) -> str:
+    """Return the publication that a data set comes from.
+
+    Raises
+    ------
+    InputError
+        When there is no data set of that name.
+    """
+    return _comments(path(name))["citation"]
 
 
 def load(name: str) -> Experiment:

@@ -36,7 +36,8 @@ STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
 STRAIN_UNITS |= {"‰": 1e-3} | dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
 
 SYMBOLS = (
-    {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "Mpa", "MPA", "mpa", "psi", "ksi", "bar", "mbar", "atm"}
+    {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
+    | {"bar", "mbar", "atm"}
     | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
     | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "s", "ms", "Hz", "K", "C", "F"}
     | {"V", "mV", "deg", "rad", "percent", "pct"}
@@ -64,12 +65,12 @@ def stress_unit(text: str) -> StressUnit:
 
     Accepted are all pressure units that pint knows, powers with or without a mark (``N/mm2``,
     ``N/mm^2``, ``N/mm²``), and pascals in any capitals: ``KPa``, ``MPA`` and ``mpa`` are kilo- and
-    megapascal. Only the exact ``mPa`` is the millipascal of the SI.
+    megapascal. Only ``mPa`` is refused: it is the millipascal of the SI, and nearly always a slip.
 
     Raises
     ------
     InputError
-        When the unit is unknown, or is not a force over an area.
+        When the unit is unknown, is not a force over an area, or is ``mPa``.
 
     Examples
     --------
@@ -80,7 +81,9 @@ def stress_unit(text: str) -> StressUnit:
     """
     name = str(text).strip()
     compact = re.sub(r"\s+|\^|\*\*", "", name).replace("²", "2")
-    if compact.lower() in PASCALS and compact != "mPa":
+    if compact == "mPa":
+        raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
+    if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
     factor = COMMON_STRESS_UNITS.get(compact)
     return StressUnit(name, _factor_from_pint(name) if factor is None else factor)

@@ -13,6 +13,8 @@ __all__ = ["resampled", "split_at_bounds"]
 FloatArray = NDArray[np.float64]
 
 RESAMPLED = 4000
+REPRESENTED = 400
+"""Components, at most, that are represented by points."""
 
 
 def split_at_bounds(components: Components, outside: FloatArray, box: Box) -> tuple[Components, Components]:
@@ -39,10 +41,11 @@ def resampled(points: Components) -> Components:
 
 
 def _points_within(components: Components, box: Box) -> Components:
-    shares, points = box.points(components.mean, components.root)
-    weights = (components.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
-    kept = weights > 1e-12 * weights.max(initial=0.0)
+    few = components.thinned(REPRESENTED)
+    shares, points = box.points(few.mean, few.root)
+    weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
+    kept = weights > 1e-12 * weights.max()
     p = points.shape[2]
-    settings = np.repeat(components.settings, points.shape[1], axis=0)[kept]
+    settings = np.repeat(few.settings, points.shape[1], axis=0)[kept]
     weights = weights[kept] * (components.weights.sum() / weights[kept].sum())
     return Components(weights, settings, points.reshape(-1, p)[kept], np.zeros((len(weights), p, p)))

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, ndtr, ndtri
 
 __all__ = ["NEGLIGIBLE", "Box"]
 
@@ -29,19 +28,27 @@ class Box:
         """Return, for N Gaussians, an upper bound on the mass outside and the log of the mass inside.
 
         The bound is the sum over parameters (Boole). Where it is negligible the log mass is taken from it; elsewhere
-        the mass inside is computed, exactly for one parameter and by Genz's sequential conditioning
-        on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
+        the mass inside is computed over the parameters that come near their bounds: exactly for one, and by
+        Genz's sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
         """
+        from scipy.special import ndtr
+
         sd = np.sqrt((root**2).sum(2))
-        outside = (ndtr((self.lower - mean) / sd) + ndtr((mean - self.upper) / sd)).sum(1)
+        low, high = (self.lower - mean) / sd, (self.upper - mean) / sd
+        by_parameter = ndtr(low) + ndtr(-high)
+        outside = by_parameter.sum(1)
         log_inside = np.log1p(-np.minimum(outside, 0.5))
-        crossed = np.flatnonzero(outside > 1e-3 * NEGLIGIBLE)
-        if len(crossed) and mean.shape[1] > 1:
-            weights, _ = self.points(mean[crossed], root[crossed])
-            log_inside[crossed] = np.log(np.maximum(weights.mean(1), SMALLEST))
-        elif len(crossed):
-            inside = _log_interval((self.lower - mean) / sd, (self.upper - mean) / sd)
-            log_inside[crossed] = inside[crossed, 0]
+        active = by_parameter > 1e-3 * NEGLIGIBLE
+        for pattern in np.unique(active[active.any(axis=1)], axis=0):
+            crossed = np.flatnonzero((active == pattern).all(axis=1))
+            kept = np.flatnonzero(pattern)
+            if len(kept) == 1:
+                log_inside[crossed] = _log_interval(low[crossed, kept[0]], high[crossed, kept[0]])
+            else:
+                part = Box(self.lower[kept], self.upper[kept])
+                covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
+                weights, _ = part.points(mean[crossed][:, kept], np.linalg.cholesky(covariance))
+                log_inside[crossed] = np.log(np.maximum(weights.mean(1), SMALLEST))
         return outside, log_inside
 
     def points(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -67,6 +74,8 @@ class Box:
 
 def _truncated_quantile(probability: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return quantiles of a standard normal between bounds, and the mass between them; right in both tails."""
+    from scipy.special import ndtr, ndtri
+
     flip = low > 0
     a, b = np.where(flip, -high, low), np.where(flip, -low, high)
     below, above = ndtr(a), ndtr(b)
@@ -79,10 +88,12 @@ def _truncated_quantile(probability: FloatArray, low: FloatArray, high: FloatArr
 
 def _log_interval(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return log(Phi(high) - Phi(low)), right in both tails."""
+    from scipy.special import log_ndtr
+
     flip = low > 0
     a, b = np.where(flip, -high, low), np.where(flip, -low, high)
     upper, lower = log_ndtr(b), log_ndtr(a)
-    return np.asarray(upper + np.log1p(-np.exp(lower - upper)))
+    return np.asarray(upper + np.log(np.maximum(-np.expm1(lower - upper), SMALLEST)))
 
 
 def _quasi_random(dimension: int) -> FloatArray:

@@ -1,7 +1,8 @@
 """Coordinates in which a bounded posterior is close to a standard normal: box, real line, whitened.
 
-A sampler meets neither bounds nor stiffness there. Every bounded coordinate is stretched to the real line, the
-modes are found on the line by damped Newton steps, and the Hessian at a mode gives the affine map that whitens.
+A sampler meets neither bounds nor stiffness there. Every bounded coordinate is stretched to the real line,
+the modes are found on the line by damped Newton steps, and the Hessian at a mode gives the affine map that
+whitens.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Derivatives = Callable[[Any], tuple[Any, Any, Any]]
 
 SEARCHES = 8
 """Starting points of the search for modes: the given one, the others scattered over the box."""
-NEGLIGIBLE_MASS = 1e-3
+NEGLIGIBLE_MASS = 1e-2
 """Modes with less than this share of the best mode's probability, by Laplace's approximation, are ignored."""
 SAME_MODE = 0.5
 """Two modes closer than this, in standard deviations, are one."""
@@ -54,10 +55,10 @@ class Box:
 
         x = u, \qquad x = l + e^u, \qquad x = h - e^u, \qquad x = l + (h - l)\, \Phi(u)
 
-    for no bound, a lower bound :math:`l`, an upper bound :math:`h`, and both. A uniform density between two bounds
-    becomes a standard normal one on the line; the more usual logistic map would give it exponential tails,
-    in which trajectories are slow. Points keep their relative accuracy towards either bound, and rounding never
-    puts a point on a bound.
+    for no bound, a lower bound :math:`l`, an upper bound :math:`h`, and both. A uniform density between two
+    bounds becomes a standard normal one on the line; the more usual logistic map would give it exponential
+    tails, in which trajectories are slow. Points keep their relative accuracy towards either bound, and
+    rounding never puts a point on a bound.
 
     Parameters
     ----------
@@ -84,7 +85,9 @@ class Box:
         object.__setattr__(self, "lower", np.atleast_1d(np.asarray(lower, dtype=np.float64)))
         object.__setattr__(self, "upper", np.atleast_1d(np.asarray(upper, dtype=np.float64)))
         if self.lower.shape != self.upper.shape or self.lower.ndim != 1:
-            raise InputError(f"the bounds need one shape (d,); found {self.lower.shape} and {self.upper.shape}.")
+            raise InputError(
+                f"the bounds need one shape (d,); found {self.lower.shape} and {self.upper.shape}."
+            )
         if not np.all(self.lower < self.upper):
             index = int(np.argmin(self.lower < self.upper))
             found = f"{self.lower[index]} is not below {self.upper[index]}"
@@ -130,11 +133,13 @@ class Box:
         if not inside.all():
             index = int(np.argmin(inside))
             bounds = f"({self.lower[index]}, {self.upper[index]})"
-            raise InputError(f"coordinate {index} of the point is {point[index]}; it must lie inside {bounds}.")
-        above_lower = np.where(self.has_lower, point - self.lower, np.inf)
-        below_upper = np.where(self.has_upper, self.upper - point, np.inf)
+            raise InputError(
+                f"coordinate {index} of the point is {point[index]}; it must lie inside {bounds}."
+            )
+        above_lower, below_upper = point - self.lower, self.upper - point
         nearer = np.minimum(above_lower, below_upper)
-        quantile = np.copysign(ndtri(np.minimum(nearer / self.width, 0.5)), above_lower - below_upper)
+        lower_quantile = ndtri(np.minimum(nearer / self.width, 0.5))
+        quantile = np.where(above_lower < below_upper, lower_quantile, -lower_quantile)
         logarithm = np.log(np.where(self.is_half_bounded, nearer, 1.0))
         return np.where(self.is_bounded, quantile, np.where(self.is_half_bounded, logarithm, point))
 
@@ -212,8 +217,8 @@ def find_modes(
 ) -> tuple[Mode, ...]:
     """Return the modes of a log density on the real line that hold its probability, the weightiest first.
 
-    Newton searches begin at the start and at points scattered over the box (over ten standard deviations where
-    the box is infinite), so that a second mode away from the start is seen.
+    Newton searches begin at the start and at points scattered over the box (over ten standard deviations
+    where the box is infinite), so that a second mode away from the start is seen.
 
     Parameters
     ----------
@@ -234,17 +239,13 @@ def find_modes(
     line = box.to_line(start)
     if not _is_finite(derivatives(line)):
         raise InputError(
-            f"the log density or its derivatives are not finite at the start {line} on the line; start elsewhere."
+            f"the log density or its derivatives are not finite at {np.asarray(start)}; start elsewhere."
         )
     first = _climb(derivatives, line)
-    spread = 10 * np.sqrt(np.diag(first.scale @ first.scale.T))
-    shape = (SEARCHES - 1, line.size)
-    # A standard normal variable on the line is a uniform one in the box.
-    scattered = np.where(
-        box.is_bounded,
-        generator.logistic(size=shape),
-        first.location + spread * generator.standard_normal(shape),
-    )
+    # A standard normal variable on the line is a uniform one between two bounds.
+    centre = np.where(box.is_bounded, 0.0, first.location)
+    spread = np.where(box.is_bounded, 1.0, 10 * np.linalg.norm(first.scale, axis=1))
+    scattered = centre + spread * generator.standard_normal((SEARCHES - 1, line.size))
     found = [first] + [_climb(derivatives, point) for point in scattered if _is_finite(derivatives(point))]
     return _distinct(sorted(found, key=lambda mode: -mode.log_mass))
 
@@ -261,15 +262,16 @@ def _distinct(modes: list[Mode]) -> tuple[Mode, ...]:
 def _climb(derivatives: Derivatives, line: Floats, max_steps: int = 500, tolerance: float = 1e-8) -> Mode:
     """Climb to a local maximum by Newton steps, damped until they rise and repelled by saddle points.
 
-    The search ends when the next undamped step promises less than the tolerance, a difference of log densities and
-    hence free of scale, or when rounding hides any rise. A search that runs out of steps returns its last point.
+    The search ends when the next undamped step promises less than the tolerance (a difference of log
+    densities, hence free of scale) or when rounding hides any rise. A search that runs out of steps returns
+    its last point.
     """
     value, gradient, hessian = derivatives(line)
     curvature, axes = np.linalg.eigh(-hessian)
     damping = 1e-3 * np.abs(curvature).max()
     for _ in range(max_steps):
-        slope, steepness = axes.T @ gradient, np.abs(curvature) + np.finfo(float).tiny
-        if 0.5 * np.sum(slope**2 / steepness) < tolerance or not np.isfinite(damping):
+        slope, steepness = axes.T @ gradient, np.maximum(np.abs(curvature), 1e-12)
+        if 0.5 * np.sum(slope**2 / steepness) < tolerance or damping > 1e16 * steepness.max():
             break
         proposal = line + axes @ (slope / (steepness + damping))
         reached = derivatives(proposal)
@@ -279,16 +281,14 @@ def _climb(derivatives: Derivatives, line: Floats, max_steps: int = 500, toleran
             damping *= 0.1
         else:
             damping = 10 * max(damping, 1e-12 * steepness.max())
-            if damping > 1e16 * steepness.max():
-                break
     scale = _inverse_root(-hessian)
     return Mode(line, scale, float(value + np.linalg.slogdet(scale)[1]))
 
 
 def _inverse_root(matrix: Floats) -> Floats:
-    """Return L with L L^T the inverse of a symmetric matrix, of which only the size of the curvatures counts.
+    """Return L with L L^T the inverse of a symmetric matrix, negative curvatures counted as positive.
 
-    Rows and columns are brought to unit diagonal first, so that coordinates of very different scales lose no accuracy.
+    Rows and columns are brought to unit diagonal first, so that very different scales cost no accuracy.
     """
     diagonal = np.diag(matrix)
     size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
@@ -297,10 +297,11 @@ def _inverse_root(matrix: Floats) -> Floats:
 
 
 def _next_inside(bound: ArrayLike, towards: float) -> Floats:
-    """Return the nearest normal number on the inner side of a bound (processors may flush smaller ones to zero)."""
+    """Return the nearest number inside a bound that XLA does not flush to zero."""
     bound = np.asarray(bound, dtype=np.float64)
     tiny = np.copysign(np.finfo(float).tiny, towards)
-    return np.where(np.abs(bound) < np.finfo(float).tiny, bound + tiny, np.nextafter(bound, towards))
+    inside = np.where(np.abs(bound) < np.finfo(float).tiny, bound + tiny, np.nextafter(bound, towards))
+    return np.asarray(inside)
 
 
 def _is_finite(derivatives: tuple[Any, Any, Any]) -> bool:

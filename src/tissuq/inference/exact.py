@@ -17,6 +17,7 @@ from tissuq.inference.marginal import (
 )
 from tissuq.inference.quadrature import MAX_DIMENSION, Quadrature, integrate
 from tissuq.inference.solution import Components, Solution
+from tissuq.inference.warp import Warp, warp_around_mode
 from tissuq.model import StatisticalModel
 
 __all__ = ["is_exact", "solve_exactly"]
@@ -34,8 +35,7 @@ def is_exact(model: StatisticalModel) -> bool:
 def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
     """Return the posterior and the evidence of a model with at most three nonlinear parameters.
 
-    The nonlinear parameters are integrated over their prior probability, so that the integral is the evidence
-    with respect to the normalised priors. Bounds of the linear parameters that cut off less than 1e-8 of the
+    Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the linear parameters that cut off less than 1e-8 of the
     posterior leave it a mixture of Gaussians; where they cut off more, it is represented by points within them.
 
     Parameters
@@ -61,13 +61,16 @@ def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
             f"{len(model.nonlinear)} ({', '.join(model.nonlinear)}). Use the sampler 'nuts'."
         )
     conditional = ConditionalGaussian(model)
-    rule = _integrate_nonlinear(model, conditional) if model.nonlinear else None
-    settings = _settings(model, rule.points) if rule else np.zeros((1, 0))
+    rule, warp = _integrate_nonlinear(model, conditional)
+    settings = warp.parameters(rule.points)[0] if rule and warp else np.zeros((1, 0))
     given = conditional(settings)
     components = Components(rule.weights if rule else np.ones(1), settings, given.mean, given.root)
     inner, cut = split_at_bounds(components, given.outside, conditional.box)
-    marginals = _nonlinear_marginals(model, rule, components) if rule else {}
-    marginals |= {symbol: _linear_marginal(inner, cut, j) for j, symbol in enumerate(model.linear)}
+    bounds = [model.priors[symbol].support for symbol in model.linear]
+    marginals = {symbol: _linear_marginal(inner, cut, j, bounds[j]) for j, symbol in enumerate(model.linear)}
+    if rule and warp:
+        for side, symbol in enumerate(model.nonlinear):
+            marginals[symbol] = marginal_of_quadrature(rule, warp, side, settings[:, side])
     components = inner.joined(resampled(cut)) if len(cut.weights) else inner
     drawn_from, draws = _draw(components, seed)
     columns = dict(zip((*model.nonlinear, *model.linear), draws, strict=True))
@@ -84,34 +87,31 @@ def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
     )
 
 
-def _integrate_nonlinear(model: StatisticalModel, conditional: ConditionalGaussian) -> Quadrature:
-    return integrate(lambda u: conditional(_settings(model, u)).log_likelihood, len(model.nonlinear))
-
-
-def _settings(model: StatisticalModel, probabilities: FloatArray) -> FloatArray:
-    """Return the nonlinear parameters at prior probabilities (N, d)."""
+def _integrate_nonlinear(
+    model: StatisticalModel, conditional: ConditionalGaussian
+) -> tuple[Quadrature, Warp] | tuple[None, None]:
+    """Integrate likelihood times prior over the nonlinear parameters, in coordinates that follow the posterior."""
+    if not model.nonlinear:
+        return None, None
     priors = [model.priors[symbol] for symbol in model.nonlinear]
-    return np.column_stack([prior.quantile(u) for prior, u in zip(priors, probabilities.T, strict=True)])
+    warp = warp_around_mode(priors, lambda h: conditional(h).log_likelihood)
+
+    def log_integrand(u: FloatArray) -> FloatArray:
+        h, log_density = warp.parameters(u)
+        log_prior = sum(prior.log_density(column) for prior, column in zip(priors, h.T, strict=True))
+        return np.asarray(conditional(h).log_likelihood + log_prior - log_density)
+
+    return integrate(log_integrand, len(priors)), warp
 
 
-def _nonlinear_marginals(model: StatisticalModel, rule: Quadrature, components: Components) -> dict[str, Marginal]:
-    return {
-        symbol: marginal_of_quadrature(
-            model.priors[symbol], rule.marginal(side), components.settings[:, side], components.weights
-        )
-        for side, symbol in enumerate(model.nonlinear)
-    }
-
-
-def _linear_marginal(inner: Components, cut: Components, place: int) -> Marginal:
+def _linear_marginal(inner: Components, cut: Components, place: int, bounds: tuple[float, float]) -> Marginal:
     parts = []
     if len(inner.weights):
-        heavy = inner.leading(1 - 1e-10)
-        sds = np.sqrt((heavy.root[:, place] ** 2).sum(axis=1))
-        parts.append((inner.weights.sum(), marginal_of_mixture(heavy.weights, heavy.mean[:, place], sds)))
+        sds = np.sqrt((inner.root[:, place] ** 2).sum(axis=1))
+        parts.append((inner.weights.sum(), marginal_of_mixture(inner.weights, inner.mean[:, place], sds)))
     if len(cut.weights):
         parts.append((cut.weights.sum(), marginal_of_points(cut.mean[:, place], cut.weights)))
-    return blended(parts)
+    return blended(parts, bounds)
 
 
 def _draw(components: Components, seed: int) -> tuple[NDArray[np.intp], FloatArray]:

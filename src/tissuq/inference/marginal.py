@@ -6,16 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr
 
-from tissuq.inference.quadrature import PiecewiseDensity
-from tissuq.priors import Prior
+from tissuq.inference.quadrature import Lines, Quadrature
+from tissuq.inference.warp import Warp
 
 __all__ = ["Marginal", "blended", "marginal_of_mixture", "marginal_of_points", "marginal_of_quadrature"]
 
 FloatArray = NDArray[np.float64]
 
 GRID = 1001
+FEW = 200
+MANY_LINES = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,21 +59,41 @@ class Marginal:
 
 def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray) -> Marginal:
     """Return the marginal of a mixture of M Gaussians with weights, means and standard deviations (M,)."""
+    from scipy.special import ndtr
+
+    weights = weights / weights.sum()
     mean = float(weights @ means)
     sd = float(np.sqrt(weights @ (sds**2 + (means - mean) ** 2)))
+    weights, means, sds = _merged(weights, means, sds)
     points = np.linspace(mean - 10 * sd, mean + 10 * sd, GRID)
     scores = (points - means[:, None]) / sds[:, None]
     density = (weights / sds) @ np.exp(-0.5 * scores**2) / np.sqrt(2 * np.pi)
     return Marginal(mean, sd, points, density, _proper(weights @ ndtr(scores)))
 
 
-def marginal_of_quadrature(prior: Prior, density: PiecewiseDensity, values: FloatArray, weights: FloatArray) -> Marginal:
-    """Return the marginal of a parameter whose prior probability was the side of a quadrature."""
-    mean = float(weights @ values)
-    sd = float(np.sqrt(weights @ (values - mean) ** 2))
-    inner = np.clip(density.points, 1e-12, 1 - 1e-12)
-    points = np.asarray(prior.quantile(inner))
-    return Marginal(mean, sd, points, density.density * np.exp(prior.log_density(points)), density.cumulative)
+def marginal_of_quadrature(rule: Quadrature, warp: Warp, side: int, values: FloatArray) -> Marginal:
+    """Return the marginal of a nonlinear parameter: the quadrature's own interpolant, other parameters integrated.
+
+    Parameters
+    ----------
+    rule : Quadrature
+        In the coordinates of the warp.
+    warp : Warp
+    side : int
+        The parameter's place among the nonlinear ones.
+    values : (M,) array
+        Its values at the points of the rule.
+    """
+    mean = float(rule.weights @ values)
+    sd = float(np.sqrt(rule.weights @ (values - mean) ** 2))
+    lines = rule.lines(side)
+    heavy = np.abs(lines.series[:, 0] * lines.width) > 1e-8
+    lines = Lines(lines.before[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
+    seen = values[rule.weights > 1e-8]
+    points = np.linspace(seen.min(), seen.max(), GRID if len(lines.start) <= MANY_LINES else GRID // 4)
+    coordinates, slope = warp.coordinate(side, points, lines.before)
+    density = np.maximum(lines.evaluate(coordinates, slope), 0.0)
+    return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))
 
 
 def marginal_of_points(points: FloatArray, weights: FloatArray) -> Marginal:
@@ -92,13 +113,29 @@ def marginal_of_points(points: FloatArray, weights: FloatArray) -> Marginal:
     return Marginal(mean, sd, points, np.interp(points, grid, kernel @ heights), _proper(cumulative))
 
 
-def blended(parts: list[tuple[float, Marginal]]) -> Marginal:
-    """Return the mixture of marginals with weights that sum to one."""
+def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Merge Gaussians that are nearly the same (means within a 300th of the range, sds within 5 %), keeping moments."""
+    if len(weights) <= FEW:
+        return weights, means, sds
+    seen = weights > 1e-12
+    weights, means, sds = weights[seen], means[seen], sds[seen]
+    place = np.floor((means - means.min()) / (np.ptp(means) / 300 + 1e-300)).astype(int)
+    size = np.floor(np.log(sds / sds.min()) / 0.05).astype(int)
+    _, group = np.unique(place * (size.max() + 1) + size, return_inverse=True)
+    total = np.bincount(group, weights)
+    mean = np.bincount(group, weights * means) / total
+    variance = np.bincount(group, weights * (sds**2 + (means - mean[group]) ** 2)) / total
+    return total, mean, np.sqrt(variance)
+
+
+def blended(parts: list[tuple[float, Marginal]], bounds: tuple[float, float]) -> Marginal:
+    """Return the mixture, within bounds, of marginals with weights that sum to one."""
     if len(parts) == 1:
         return parts[0][1]
     mean = sum(weight * part.mean for weight, part in parts)
     variance = sum(weight * (part.sd**2 + (part.mean - mean) ** 2) for weight, part in parts)
-    low, high = min(part.points[0] for _, part in parts), max(part.points[-1] for _, part in parts)
+    low = max(bounds[0], min(part.points[0] for _, part in parts))
+    high = min(bounds[1], max(part.points[-1] for _, part in parts))
     points = np.linspace(low, high, 2 * GRID)
     density = sum(weight * part.pdf(points) for weight, part in parts)
     cumulative = sum(

@@ -34,6 +34,9 @@ MAX_RHAT = 1.01
 MIN_ESS_PER_CHAIN = 100
 MAX_DIVERGENT_SHARE = 0.01
 MIN_BFMI = 0.3
+SEPARATE_RHAT = 1.2
+"""An R-hat that slow chains hardly reach, but chains in different modes do."""
+LONGER = "a longer warm-up and more draws or thinning"
 OVERDISPERSION = 1.5
 """Standard deviation of the starting points around a mode, in posterior standard deviations."""
 
@@ -81,10 +84,10 @@ class NutsDraws:
     ----------
     values : (chains, draws, d) array
         Parameter values, in the unit of each.
-    energies : (chains, draws) array
-        Energy of the simulated dynamics at each draw.
+    energies : (chains, draws * thinning) array
+        Energy of the simulated dynamics at the end of each trajectory.
     divergences : int
-        Draws whose trajectory the integrator lost.
+        Trajectories that the integrator lost.
     leapfrogs_per_draw : float
         Mean number of gradients that one draw took.
     names : tuple of str
@@ -92,8 +95,8 @@ class NutsDraws:
 
     References
     ----------
-    Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021), Bayesian Analysis 16, 667-718 (R-hat, effective sample size).
-    Betancourt (2016), arXiv:1604.00695 (BFMI).
+    Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021), Bayesian Analysis 16, 667-718 (R-hat, effective
+    sample sizes). Betancourt (2016), arXiv:1604.00695 (BFMI).
     """
 
     values: Floats
@@ -105,22 +108,22 @@ class NutsDraws:
     @cached_property
     def rhat(self) -> Floats:
         """Rank-normalised split R-hat of each parameter, the larger of bulk and tail: (d,) array."""
-        return _statistics().rhat(self.values, chain_axis=0, draw_axis=1)
+        return _diagnostic("rhat", self.values)
 
     @cached_property
     def ess_bulk(self) -> Floats:
         """Effective sample size for the centre of each marginal: (d,) array."""
-        return _statistics().ess(self.values, chain_axis=0, draw_axis=1, method="bulk")
+        return _diagnostic("ess", self.values, method="bulk")
 
     @cached_property
     def ess_tail(self) -> Floats:
         """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
-        return _statistics().ess(self.values, chain_axis=0, draw_axis=1, method="tail", prob=0.05)
+        return _diagnostic("ess", self.values, method="tail", prob=0.05)
 
     @cached_property
     def bfmi(self) -> Floats:
         """Estimated fraction of missing information of the energy: (chains,) array."""
-        return _statistics().bfmi(self.energies)
+        return _diagnostic("bfmi", self.energies)
 
     @property
     def converged(self) -> bool:
@@ -133,52 +136,37 @@ class NutsDraws:
         failures = self._failures()
         if failures:
             found, remedies = zip(*failures, strict=True)
-            return f"Not converged: {'; '.join(found)}. Try this: {'; '.join(dict.fromkeys(remedies))}."
+            return f"Not converged: {'; '.join(found)}. Try {', or '.join(dict.fromkeys(remedies))}."
         return (
             f"Converged: R-hat at most {self.rhat.max():.4f}, effective sample sizes at least "
-            f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), {self.divergences} divergences "
-            f"and BFMI at least {self.bfmi.min():.2f} in {len(self.values)} x {self.values.shape[1]} draws."
+            f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), {self.divergences} of "
+            f"{self.energies.size} trajectories divergent, BFMI at least {self.bfmi.min():.2f}."
         )
 
     def _failures(self) -> list[tuple[str, str]]:
         """Return what failed and its remedy; a diagnostic that is not a number fails."""
-        chains, draws, _ = self.values.shape
-        least = MIN_ESS_PER_CHAIN * chains
-        longer = "more warm-up and draws"
-        checks = [
-            (
-                bool((self.rhat < MAX_RHAT).all()),
-                f"R-hat is {self._worst(-self.rhat, self.rhat, '.3f')} and must be below {MAX_RHAT}",
-                f"{longer}, and if it stays high, a narrower prior: some modes or directions are not explored",
-            ),
-            (
-                bool((self.ess_bulk > least).all()),
-                f"the bulk effective sample size is {self._worst(self.ess_bulk, self.ess_bulk, '.0f')} "
-                f"and must exceed {least}",
-                longer,
-            ),
-            (
-                bool((self.ess_tail > least).all()),
-                f"the tail effective sample size is {self._worst(self.ess_tail, self.ess_tail, '.0f')} "
-                f"and must exceed {least}",
-                longer,
-            ),
-            (
-                self.divergences < MAX_DIVERGENT_SHARE * chains * draws,
-                f"{self.divergences} of {chains * draws} draws diverged",
-                "a target acceptance closer to one, such as 0.99",
-            ),
-            (
-                bool((self.bfmi > MIN_BFMI).all()),
-                f"the BFMI is {self.bfmi.min():.2f} and must exceed {MIN_BFMI}",
-                "a narrower prior on the parameters that set a scale",
-            ),
-        ]
-        return [(found, remedy) for passes, found, remedy in checks if not passes]
-
-    def _worst(self, order: Floats, shown: Floats, style: str) -> str:
-        index = int(np.argmin(order))
-        return f"{shown[index]:{style}} for {self.names[index]}"
+        least_ess = MIN_ESS_PER_CHAIN * len(self.values)
+        worst = int(np.argmax(self.rhat))
+        failures = []
+        if not self.rhat[worst] < MAX_RHAT:
+            found = f"R-hat is {self.rhat[worst]:.3f} for {self.names[worst]} and must be below {MAX_RHAT}"
+            failures.append((found, LONGER))
+            if not self.rhat[worst] < SEPARATE_RHAT:
+                failures.append(
+                    ("the chains stay in different places", "a narrower prior that leaves one mode")
+                )
+        for part, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
+            worst = int(np.argmin(sizes))
+            if not sizes[worst] > least_ess:
+                found = f"the {part} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
+                failures.append((f"{found} and must exceed {least_ess}", LONGER))
+        if not self.divergences < MAX_DIVERGENT_SHARE * self.energies.size:
+            found = f"{self.divergences} of {self.energies.size} trajectories diverged"
+            failures.append((found, "a target acceptance closer to one, such as 0.99"))
+        if not self.bfmi.min() > MIN_BFMI:
+            found = f"the BFMI is {self.bfmi.min():.2f} and must exceed {MIN_BFMI}"
+            failures.append((found, "a narrower prior on the parameters that set a scale"))
+        return failures
 
 
 def sample_nuts(
@@ -191,10 +179,10 @@ def sample_nuts(
 ) -> NutsDraws:
     """Sample a log density on a box.
 
-    The density is moved to the real line and whitened by the Hessian at its mode (`tissuq.inference.coordinates`),
-    where one step length fits all directions however stiff the posterior is. Chains start overdispersed around the
-    mode; when several modes hold probability they start around each, so that R-hat tells. Warm-up tunes one step
-    size and one dense mass matrix on the draws of all chains.
+    The density is moved to the real line and whitened by the Hessian at its mode
+    (`tissuq.inference.coordinates`), where one step length fits all directions however stiff the posterior.
+    Chains start overdispersed around the mode; when several modes hold probability they start around each,
+    so that R-hat tells. Warm-up tunes one step size and one dense mass matrix on the draws of all chains.
 
     Parameters
     ----------
@@ -244,13 +232,14 @@ def sample_nuts(
     modes = find_modes(derivatives, box, start, generator)
     states = _overdispersed(derivatives, modes, settings.chains, generator)
     values, energies, divergent, leapfrogs = _run(log_density, box, modes[0], states, settings)
-    return NutsDraws(values, energies, int(divergent.sum()), float(leapfrogs.mean()), labels)
+    gradients = float(leapfrogs.mean()) * settings.thinning
+    return NutsDraws(values, energies, int(divergent.sum()), gradients, labels)
 
 
 def _overdispersed(
     derivatives: Derivatives, modes: Sequence[Mode], chains: int, generator: np.random.Generator
 ) -> Any:
-    """Return one starting state per chain around the modes in turn, in the coordinates whitened at the first."""
+    """Return one starting state per chain, around the modes in turn, whitened at the first mode."""
     starts = [_start_around(derivatives, modes[chain % len(modes)], generator) for chain in range(chains)]
     positions, values, gradients = zip(*starts, strict=True)
     whitened = np.stack([modes[0].whiten(line) for line in positions])
@@ -260,7 +249,7 @@ def _overdispersed(
 def _start_around(
     derivatives: Derivatives, mode: Mode, generator: np.random.Generator
 ) -> tuple[Floats, Floats, Floats]:
-    """Return a point around a mode, closer at every failed attempt, with its finite log density and gradient."""
+    """Return a point around a mode, closer at every failure, with its finite log density and gradient."""
     for shrinkage in 0.8 ** np.arange(50):
         offset = OVERDISPERSION * shrinkage * generator.standard_normal(mode.location.size)
         line = mode.unwhiten(offset)
@@ -285,9 +274,10 @@ class _Tuning(NamedTuple):
 def _run(
     log_density: LogDensity, box: Box, mode: Mode, states: Any, settings: NutsSettings
 ) -> tuple[NDArray[Any], ...]:
-    """Run all chains in one compiled loop and return values, energies, divergences and leapfrogs by chain and draw.
+    """Run all chains in one compiled loop.
 
-    Warm-up and sampling share the loop body: the trajectory code, by far the costliest to compile, appears once.
+    Returns values by chain and draw; energies, divergences and leapfrogs by chain and trajectory. Warm-up and
+    sampling share the loop body: the trajectory code, by far the costliest to compile, appears once.
     """
     on_line = log_density_on_line(log_density, box)
     kernel = blackjax.nuts.build_kernel()
@@ -316,38 +306,41 @@ def _run(
 
     @jax.jit
     def run(key: Any, states: Any, schedule: Any) -> Any:
-        keys = jax.random.split(key, settings.warmup + settings.draws)
+        keys = jax.random.split(key, len(schedule[0]))
         start = (states, _untuned(mode.location.size, settings.target_acceptance))
         _, trace = jax.lax.scan(iterate, start, (keys, *schedule))
         positions, *others = (jnp.swapaxes(array[settings.warmup :], 0, 1) for array in trace)
-        to_box = jax.vmap(jax.vmap(lambda whitened: box.from_line(mode.unwhiten(whitened))))
-        return to_box(positions), *others
+        kept = slice(settings.thinning - 1, None, settings.thinning)
+        to_box: Any = jax.vmap(jax.vmap(lambda whitened: box.from_line(mode.unwhiten(whitened))))
+        return to_box(positions[:, kept]), *others
 
-    trace = run(jax.random.key(settings.seed), states, _schedule(settings))
+    key = jax.random.key(settings.seed)
+    trace = run(key, states, _schedule(settings))
     return tuple(np.asarray(array) for array in trace)
 
 
 def _schedule(settings: NutsSettings) -> tuple[NDArray[np.bool_], ...]:
-    """Return, for each iteration, whether it is warm-up, feeds the mass matrix, and ends a window (Stan's windows)."""
+    """Return by trajectory whether it is warm-up, feeds the mass matrix, and ends one of Stan's windows."""
+    sampling = settings.draws * settings.thinning
     windows = np.asarray(build_schedule(settings.warmup), dtype=bool)
-    is_slow, ends_window = np.concatenate([windows, np.zeros((settings.draws, 2), dtype=bool)]).T
-    return np.arange(settings.warmup + settings.draws) < settings.warmup, is_slow, ends_window
+    is_slow, ends_window = np.pad(windows, ((0, sampling), (0, 0))).T
+    return np.arange(settings.warmup + sampling) < settings.warmup, is_slow, ends_window
 
 
 def _untuned(dimension: int, target_acceptance: float) -> _Tuning:
     start, _, _ = dual_averaging_adaptation(target_acceptance)
     step_size = jax.tree.map(jnp.asarray, start(1.0))
-    return _Tuning(
-        step_size, jnp.eye(dimension), 0.0, jnp.zeros(dimension), jnp.zeros((dimension, dimension))
-    )
+    inverse_mass, squares = jnp.eye(dimension), jnp.zeros((dimension, dimension))
+    return _Tuning(step_size, inverse_mass, 0.0, jnp.zeros(dimension), squares)
 
 
 def _tune(
     tuning: _Tuning, positions: Any, acceptance: Any, is_slow: Any, ends_window: Any, target_acceptance: float
 ) -> _Tuning:
-    """Return the tuning after one iteration of all chains: dual averaging, and the covariance at a window's end.
+    """Return the tuning after one trajectory of all chains.
 
-    The covariance is shrunk towards a small multiple of the identity, as in Stan.
+    The step size follows dual averaging. The mass matrix is renewed at a window's end, from the covariance of
+    all chains shrunk towards a small multiple of the identity, as in Stan.
     """
     start, update, finish = dual_averaging_adaptation(target_acceptance)
     chains, dimension = positions.shape
@@ -363,8 +356,9 @@ def _tune(
     return _Tuning(*jax.tree.map(partial(jnp.where, ends_window), restarted, going_on))
 
 
-def _statistics() -> Any:
-    """Return ArviZ's array functions, imported when first needed."""
+def _diagnostic(statistic: str, draws: Floats, **options: Any) -> Floats:
+    """Return one of ArviZ's diagnostics, imported when first needed, of a (chains, draws, ...) array."""
     from arviz_stats.base import array_stats
 
-    return array_stats
+    values = getattr(array_stats, statistic)(draws, chain_axis=0, draw_axis=1, **options)
+    return np.asarray(values, dtype=np.float64)

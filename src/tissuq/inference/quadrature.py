@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 
-__all__ = ["MAX_DIMENSION", "PiecewiseDensity", "Quadrature", "integrate"]
+__all__ = ["MAX_DIMENSION", "Lines", "Quadrature", "integrate"]
 
 FloatArray = NDArray[np.float64]
 
 MAX_DIMENSION = 3
 ORDERS = {1: 10, 2: 10, 3: 7}
 """Gauss-Legendre points along each side of a cell, by dimension."""
-KNOTS = np.array([0.0, 2.0**-8, 2.0**-6, 2.0**-4, 2.0**-2, 0.5, 1.0])
-"""First cells along each side: scale parameters may be far smaller than their prior allows."""
+FIRST_CELLS = 2
+"""Cells along each side to begin with."""
 TOLERANCE = 1e-3
 MAX_CELLS = 20_000
 
@@ -46,17 +46,48 @@ class Cells:
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewiseDensity:
-    """A density on [0, 1] tabulated finely: points (k,), density and cumulative probability at them."""
+class Lines:
+    """The normalised function along one side of the cube, later sides integrated: K polynomials on intervals.
 
-    points: FloatArray
-    density: FloatArray
-    cumulative: FloatArray
+    Attributes
+    ----------
+    before : (K, j) array
+        The coordinates before side j at which each line lies.
+    start, width : (K,) arrays
+        Its interval along side j.
+    series : (K, m) array
+        Its Legendre coefficients, times its weight: all lines together integrate to one.
+    """
+
+    before: FloatArray
+    start: FloatArray
+    width: FloatArray
+    series: FloatArray
+
+    def integrate_to(self, coordinates: FloatArray) -> FloatArray:
+        """Return the sum over lines of their integrals up to the coordinates (K, k) of each: (k,)."""
+        whole = self.series[:, 0] * self.width
+        passed = coordinates >= (self.start + self.width)[:, None]
+        line, place, t = self._inside(coordinates)
+        integral = legendre.legint(self.series.T, lbnd=-1).T[line]
+        partial = 0.5 * self.width[line] * _row_values(integral, t)
+        return whole @ passed + np.bincount(place, partial, minlength=coordinates.shape[1])
+
+    def evaluate(self, coordinates: FloatArray, factor: FloatArray) -> FloatArray:
+        """Return the sum over lines of their values at the coordinates (K, k) of each, times factors (K, k)."""
+        line, place, t = self._inside(coordinates)
+        values = _row_values(self.series[line], t) * factor[line, place]
+        return np.bincount(place, values, minlength=coordinates.shape[1])
+
+    def _inside(self, coordinates: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
+        t = 2 * (coordinates - self.start[:, None]) / self.width[:, None] - 1
+        line, place = np.nonzero((t >= -1) & (t < 1))
+        return line, place, t[line, place]
 
 
 @dataclass(frozen=True, eq=False)
 class Quadrature:
-    """The integral of exp(log f), and f normalised, as weighted points and marginal densities.
+    """The integral of exp(log f), and f normalised, as weighted points and as polynomials along each side.
 
     Attributes
     ----------
@@ -75,23 +106,24 @@ class Quadrature:
     points: FloatArray
     weights: FloatArray
 
-    def marginal(self, side: int) -> PiecewiseDensity:
-        """Return the marginal density along one side: the cells' interpolants, other sides integrated."""
+    def lines(self, side: int) -> Lines:
+        """Return the function along one side, the sides after it integrated."""
         dimension = self.cells.lower.shape[1]
         order = ORDERS[dimension]
-        values = np.exp(self.cells.log_values - self.log_integral)
-        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1)
-        lines = lines.reshape(len(lines), order, -1) @ _rule(order, dimension - 1)
-        lines = lines * (np.prod(self.cells.width, axis=1) / self.cells.width[:, side])[:, None]
-        series = lines @ _to_legendre(order).T
-        start, width = self.cells.lower[:, side], self.cells.width[:, side]
-        edges = np.unique(np.concatenate([start, start + width]))
-        points = np.unique(np.concatenate([np.linspace(a, b, 13) for a, b in zip(edges, edges[1:], strict=False)]))
-        middles = 0.5 * (points[1:] + points[:-1])
-        density, at_middles = (_sum_series(series, start, width, x) for x in (points, middles))
-        steps = np.diff(points) * (density[1:] + 4 * at_middles + density[:-1]) / 6
-        cumulative = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 0.0))])
-        return PiecewiseDensity(points, np.maximum(density, 0.0), cumulative / cumulative[-1])
+        values = np.exp(self.cells.log_values - self.log_integral).reshape(-1, order**side, order, order ** (
+            dimension - side - 1
+        ))  # fmt: skip
+        others = np.prod(np.delete(self.cells.width, side, axis=1), axis=1)
+        weighted = (values @ _rule(order, dimension - side - 1)) * _rule(order, side)[:, None]
+        series = (weighted * others[:, None, None]) @ _to_legendre(order).T
+        before = _cell_points(self.cells.lower[:, :side], self.cells.width[:, :side], order)
+        repeat = before.shape[1]
+        return Lines(
+            before.reshape(len(before) * repeat, side),
+            np.repeat(self.cells.lower[:, side], repeat),
+            np.repeat(self.cells.width[:, side], repeat),
+            series.reshape(-1, order),
+        )
 
 
 def integrate(log_function: Callable[[FloatArray], FloatArray], dimension: int) -> Quadrature:
@@ -133,22 +165,20 @@ def integrate(log_function: Callable[[FloatArray], FloatArray], dimension: int) 
 
 
 def _first_cells(log_function: Callable[[FloatArray], FloatArray], dimension: int) -> Cells:
-    corners = np.meshgrid(*[KNOTS[:-1]] * dimension, indexing="ij")
-    widths = np.meshgrid(*[np.diff(KNOTS)] * dimension, indexing="ij")
-    lower, width = (np.stack([axis.ravel() for axis in grid], axis=1) for grid in (corners, widths))
-    return _evaluated(log_function, lower, width)
+    corners = np.indices([FIRST_CELLS] * dimension).reshape(dimension, -1).T / FIRST_CELLS
+    return _evaluated(log_function, corners, np.full(corners.shape, 1 / FIRST_CELLS))
 
 
 def _evaluated(log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray) -> Cells:
-    points = _cell_points(lower, width)
+    points = _cell_points(lower, width, ORDERS[lower.shape[1]])
     values = log_function(points.reshape(-1, lower.shape[1])).reshape(points.shape[:2])
     return Cells(lower, width, np.where(np.isnan(values), -np.inf, values))
 
 
-def _cell_points(lower: FloatArray, width: FloatArray) -> FloatArray:
-    dimension = lower.shape[1]
-    nodes = _gauss(ORDERS[dimension])[0]
-    grid = np.stack([axis.ravel() for axis in np.meshgrid(*[nodes] * dimension, indexing="ij")], axis=1)
+def _cell_points(lower: FloatArray, width: FloatArray, order: int) -> FloatArray:
+    """Return the Gauss points (C, order^d, d) of C cells; the last side varies fastest."""
+    nodes, dimension = _gauss(order)[0], lower.shape[1]
+    grid = nodes[np.indices([order] * dimension).reshape(dimension, order**dimension).T]
     return np.asarray(lower[:, None, :] + width[:, None, :] * grid)
 
 
@@ -190,20 +220,13 @@ def _finish(cells: Cells, top: float, integrals: FloatArray, error: float) -> Qu
     total = integrals.sum()
     weights = (masses / total).ravel()
     kept = np.flatnonzero(weights > 1e-12 * weights.max())
-    points = _cell_points(cells.lower, cells.width).reshape(-1, dimension)[kept]
+    points = _cell_points(cells.lower, cells.width, ORDERS[dimension]).reshape(-1, dimension)[kept]
     return Quadrature(cells, float(top + np.log(total)), error, points, weights[kept] / weights[kept].sum())
 
 
-def _sum_series(series: FloatArray, start: FloatArray, width: FloatArray, x: FloatArray) -> FloatArray:
-    """Sum, at every x, the Legendre series of the cells that hold it (half of each at a common edge)."""
-    total = np.zeros(len(x))
-    for coefficients, a, w in zip(series, start, width, strict=True):
-        first, last = np.searchsorted(x, [a, a + w])
-        inside = slice(first, min(last + 1, len(x)))
-        values = legendre.legval(2 * (x[inside] - a) / w - 1, coefficients)
-        at_edge = ((x[inside] == a) & (a > 0)) | ((x[inside] == a + w) & (a + w < 1))
-        total[inside] += np.where(at_edge, 0.5, 1.0) * values
-    return total
+def _row_values(series: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the value of every Legendre series (N, m) at its own argument (N,)."""
+    return np.asarray((legendre.legvander(t, series.shape[1] - 1) * series).sum(axis=1))
 
 
 @lru_cache

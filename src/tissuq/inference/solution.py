@@ -45,12 +45,20 @@ class Components:
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Components(*(np.concatenate(pair) for pair in pairs))
 
-    def leading(self, mass: float = 1 - 1e-7) -> Components:
-        """Return the heaviest components that together hold a share ``mass`` of the weight, reweighted to one."""
-        order = np.argsort(self.weights)[::-1]
-        shares = np.cumsum(self.weights[order]) / self.weights.sum()
-        heavy = self[np.sort(order[: int(np.searchsorted(shares, mass)) + 1])]
-        return Components(heavy.weights / heavy.weights.sum(), heavy.settings, heavy.mean, heavy.root)
+    def thinned(self, count: int = 1500) -> Components:
+        """Return few components that stand for all, their weights summing to one.
+
+        The lightest, together less than 1e-7, are left out; if more than ``count`` remain, systematic resampling in
+        their order, which keeps neighbours apart, picks equally weighted ones.
+        """
+        order = np.argsort(self.weights)
+        heavy = self[np.sort(order[np.cumsum(self.weights[order]) > 1e-7])]
+        total = heavy.weights.sum()
+        if len(heavy.weights) <= count:
+            return Components(heavy.weights / total, heavy.settings, heavy.mean, heavy.root)
+        targets = (np.arange(count) + 0.5) * total / count
+        picked = heavy[np.minimum(np.searchsorted(np.cumsum(heavy.weights), targets), len(heavy.weights) - 1)]
+        return Components(np.full(count, 1 / count), picked.settings, picked.mean, picked.root)
 
 
 @dataclass(frozen=True)

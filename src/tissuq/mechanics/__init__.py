@@ -1,6 +1,6 @@
 """What the material says: strain energies, and stress as their derivative along a loading mode."""
 
-from tissuq.mechanics.material import Material, material_named, materials
+from tissuq.mechanics.material import Material, material_named
 from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Yeoh
 from tissuq.mechanics.simulate import simulate
 from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, stress_basis
@@ -13,7 +13,6 @@ __all__ = [
     "engineering_stress",
     "initial_shear_modulus",
     "material_named",
-    "materials",
     "simulate",
     "stress_basis",
 ]

@@ -27,6 +27,8 @@ class Material(ABC):
     formula: ClassVar[str]
     source: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
+    caution: ClassVar[str] = ""
+    """What a reader of its parameters must know."""
 
     @abstractmethod
     def strain_energy(self, I1: Any, I2: Any, values: Sequence[Any]) -> Any:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr, ndtri
 
 from tissuq.errors import InputError
 from tissuq.inference.solution import Solution
@@ -55,7 +54,7 @@ def predict_band(
         raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    components = solution.components.leading()
+    components = solution.components.thinned()
     mean, variance = stress_moments(solution.model, components, points, discrepancy=discrepancy, noise=noise)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
     low, high = (_mixture_quantile(tail, components.weights, mean, variance) for tail in tails)
@@ -73,6 +72,8 @@ def _mixture_quantile(
     probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray
 ) -> FloatArray:
     """Return the quantile of a mixture of M Gaussians, at each of g places; safeguarded Newton iteration."""
+    from scipy.special import ndtr, ndtri
+
     centre = weights @ mean
     spread = np.sqrt(weights @ (variance + (mean - centre) ** 2))
     sd = np.sqrt(np.maximum(variance, (0.01 * spread) ** 2))

@@ -35,6 +35,7 @@ class MooneyRivlin(Material):
     name = "mooney-rivlin"
     formula = "C10 (I1 - 3) + C01 (I2 - 3)"
     source = "Mooney 1940, Rivlin 1948"
+    caution = "The initial shear modulus is 2 (C10 + C01), so do not read C10 alone as half of it."
     parameters = (C10, C01)
 
     def strain_energy(self, I1: Any, I2: Any, values: Sequence[Any]) -> Any:

@@ -1,0 +1,38 @@
+"""The commands, and how every error reaches a person."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from tissuq.cli import catalogue, fit, paper, show
+from tissuq.errors import TissuqError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="tissuq",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted.",
+)
+app.command("paper")(paper.paper)
+app.command("fit")(fit.fit)
+app.command("show")(show.show)
+app.command("materials")(catalogue.materials)
+app.command("discrepancies")(catalogue.discrepancies)
+app.command("datasets")(catalogue.datasets)
+
+
+def main() -> None:
+    """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
+    try:
+        app()
+    except TissuqError as error:
+        typer.echo(f"tissuq: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("tissuq: stopped; nothing was written.", err=True)
+        sys.exit(130)

@@ -1,0 +1,66 @@
+"""``tissuq materials``, ``tissuq discrepancies`` and ``tissuq datasets``: what there is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from tissuq.discrepancy import Discrepancy
+    from tissuq.mechanics import Material
+    from tissuq.parameters import Parameter
+
+__all__ = ["datasets", "discrepancies", "materials"]
+
+
+def materials() -> None:
+    """List the materials: formula, parameters, units and default priors."""
+    from tissuq.mechanics.material import materials as known
+
+    _print_kinds("Materials: strain-energy densities W", known().values())
+
+
+def discrepancies() -> None:
+    """List the discrepancies: formula, parameters, units and default priors."""
+    from tissuq.discrepancy import discrepancies as known
+
+    _print_kinds("Discrepancies: measured stress = material + discrepancy + noise", known().values())
+
+
+def datasets(
+    copy: Annotated[str | None, typer.Option(help="Name of a data set to copy.")] = None,
+    to: Annotated[Path, typer.Option(help="Folder to copy it to.")] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
+) -> None:
+    """List the built-in measured data sets, or copy one as a CSV file."""
+    from tissuq.experiments import datasets as known
+
+    if copy:
+        print(known.copy(copy, to, force=force))
+        return
+    for name in known.names():
+        print(f"{name}\n    {known.citation(name)}")
+
+
+def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy]]) -> None:
+    print(f"{title}\n")
+    for kind in kinds:
+        print(f"{kind.name}\n    {kind.formula}   ({kind.source})")
+        for p in kind.parameters:
+            print(f"    {p.symbol:<4} {p.unit or '-':<4} {p.description}; prior {_default(p)}")
+        if kind.caution:
+            print(fill(kind.caution, 96, initial_indent="    Note: ", subsequent_indent="    "))
+        print()
+
+
+def _default(parameter: Parameter) -> str:
+    """Return the default prior in words; the data set its scale."""
+    if parameter.relative_prior is None:
+        side = "positive, " if parameter.support[0] == 0 else ""
+        return f"uniform, {side}to 10 times beyond least squares"
+    of_what = {"stress": "the largest stress", "stretch": "the stretch range", "number": "1"}[parameter.dimension]
+    return f"{parameter.relative_prior} x {of_what}"

@@ -1,0 +1,103 @@
+"""``tissuq fit``: the user's own measurements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tissuq.cli.options import load_settings, not_converged, parse_prior, progress
+from tissuq.errors import InputError
+
+__all__ = ["fit"]
+
+
+def fit(
+    file: Annotated[
+        Path | None, typer.Argument(help="CSV file, or the name of a built-in data set (tissuq datasets).")
+    ] = None,
+    material: Annotated[str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")] = None,
+    discrepancy: Annotated[
+        list[str] | None,
+        typer.Option(help="Discrepancy; repeat for more; 'all' fits every one that applies [all]."),
+    ] = None,
+    noise_sd: Annotated[
+        str | None, typer.Option(help="Standard deviation of the noise in the file's stress unit [unknown].")
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more."),
+    ] = None,
+    mode: Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(help="ROLE=COLUMN for stretch, strain or stress, such as stretch=Strain; repeat."),
+    ] = None,
+    stress_unit: Annotated[str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")] = None,
+    stress_type: Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")] = None,
+    strain_unit: Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")] = None,
+    compression_positive: Annotated[
+        bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
+    ] = None,
+    skip_rows: Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")] = None,
+    sampler: Annotated[str | None, typer.Option(help="auto, exact or nuts [auto].")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
+    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figures, too.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
+) -> None:
+    """Identify a material's parameters from a file of stretches and stresses."""
+    from tissuq.cli.tables import print_summary
+    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.specimen import write_specimen_run
+    from tissuq.studies.specimen import SpecimenSettings, run_specimen
+
+    options: dict[str, Any] = {
+        "file": str(_resolve(file)) if file else None, "material": material, "mode": mode,
+        "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "stress_unit": stress_unit,
+        "stress_type": stress_type, "strain_unit": strain_unit, "compression_positive": compression_positive,
+        "skip_rows": skip_rows, "sampler": sampler, "seed": seed,
+    }  # fmt: skip
+    if prior:
+        options["priors"] = dict(parse_prior(text) for text in prior)
+    if column:
+        options["columns"] = dict(_role(text) for text in column)
+    if not file and not config:
+        raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
+    settings = load_settings(SpecimenSettings, config, options)
+    beside = Path() if file or config is None else config.parent
+    source = beside / settings.file
+    target = out or Path("runs") / source.stem
+    check_target(target, force=force)
+    with progress() as step:
+        study = run_specimen(settings, beside, step)
+        step("writing")
+        with run_folder(target, force=force) as folder:
+            write_specimen_run(study, source, folder, figures=figures)
+    print_summary(target)
+    not_converged(study.not_converged)
+
+
+def _resolve(file: Path) -> Path:
+    """Return the user's file, or the built-in data set of that name."""
+    from tissuq.experiments import datasets
+
+    return datasets.path(str(file)) if not file.exists() and str(file) in datasets.names() else file
+
+
+def _noise(text: str | None) -> float | str | None:
+    if text is None or text == "unknown":
+        return text
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error
+
+
+def _role(text: str) -> tuple[str, str | int]:
+    role, _, name = text.partition("=")
+    if not name:
+        raise InputError(f"--column needs ROLE=COLUMN, such as stress='Stress (kPa)', not '{text}'.")
+    return role.strip(), int(name) if name.strip().isdecimal() else name.strip()

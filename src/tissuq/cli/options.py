@@ -1,0 +1,104 @@
+"""What several commands share: configuration files, priors, progress and the closing lines."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tissuq.errors import InputError
+from tissuq.priors import Prior
+from tissuq.registry import find
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+__all__ = ["load_settings", "not_converged", "parse_prior", "progress"]
+
+Settings = TypeVar("Settings", bound="BaseModel")
+
+NOT_CONVERGED = 3
+
+
+def load_settings(kind: type[Settings], config: Path | None, options: dict[str, Any]) -> Settings:
+    """Return validated settings from a TOML file (or nothing) and the options given on the command line."""
+    from pydantic import ValidationError
+
+    given = _read_toml(config) if config else {}
+    given |= {name: value for name, value in options.items() if value is not None}
+    try:
+        return kind.model_validate(given)
+    except ValidationError as error:
+        place = f"{config}: " if config else ""
+        raise InputError(place + "; ".join(_explain(item) for item in error.errors())) from error
+
+
+def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
+    """Return the symbol and the prior of a text like ``C10=uniform(0, 5)``."""
+    match = re.fullmatch(r"\s*(\w+)\s*=\s*([\w-]+)\s*\(([^()]*)\)\s*", text)
+    if match is None:
+        raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
+    symbol, distribution, numbers = match.groups()
+    names = [field.name for field in fields(find(Prior, "prior distribution", distribution, InputError))]
+    try:
+        values = [float(number) for number in numbers.split(",")]
+    except ValueError as error:
+        raise InputError(f"prior '{text}': its arguments must be numbers with a decimal point.") from error
+    if len(values) != len(names):
+        raise InputError(f"prior '{text}': {distribution} needs {len(names)} numbers: {', '.join(names)}.")
+    return symbol, {"distribution": distribution, **dict(zip(names, values, strict=True))}
+
+
+@contextmanager
+def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
+    """Show the steps of a long run on a terminal; give the function that announces the next one."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("starting", total=total)
+        started = 0
+
+        def step(text: str) -> None:
+            nonlocal started
+            bar.update(task, description=text, completed=started)
+            started += 1
+
+        yield step
+
+
+def not_converged(names: list[str]) -> None:
+    """End with status 3 when sampling has not converged anywhere."""
+    import typer
+
+    if names:
+        typer.echo(
+            f"tissuq: sampling has NOT converged for {', '.join(names)}; do not use these results. "
+            "Try --sampler exact, narrower priors or another seed.",
+            err=True,
+        )
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(f"there is no configuration file '{path}'.") from error
+    except OSError as error:
+        raise InputError(f"configuration file '{path}' cannot be read: {error.strerror}.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"configuration file '{path}' is not TOML: {error}.") from error
+
+
+def _explain(item: Any) -> str:
+    place = ".".join(str(part) for part in item["loc"])
+    message = str(item["msg"]).removeprefix("Value error, ")
+    found = "" if item["type"] == "value_error" or isinstance(item["input"], dict) else f" (it is {item['input']!r})"
+    return f"{place}: {message}{found}" if place else f"{message}{found}"

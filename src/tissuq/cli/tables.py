@@ -1,0 +1,71 @@
+"""Tables in the terminal."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tissuq.errors import InputError
+from tissuq.report.run_folder import RECIPE
+
+__all__ = ["print_rows", "print_summary"]
+
+
+def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
+    """Print a table whose first column is text and whose others are numbers."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for place, header in enumerate(headers):
+        table.add_column(header, justify="right" if place else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+
+
+def print_summary(folder: Path) -> None:
+    """Print the summary of a run folder, and where its report lies.
+
+    Raises
+    ------
+    InputError
+        When the folder is not that of a complete run.
+    """
+    from tissuq.report.rows import readable_summary
+
+    rows, unit, title = _read_run(folder)
+    known = [row["contains_truth"] is not None for row in rows]
+    sampled = any(row["rhat"] is not None for row in rows)
+    headers = ["formulation", f"C10, {unit.name}", "sd", "HPD low", "high", "log ev.", "in band", "alone"]
+    headers += ["truth"] * any(known) + ["R-hat", "ESS"] * sampled
+    table = []
+    for row in readable_summary(rows, unit):
+        cells = [row["formulation"], row["mean"], row["sd"], row["low"], row["high"], row["log_evidence"]]
+        cells += [row["coverage"], row["coverage_model_only"]]
+        cells += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * any(known)
+        table.append(cells + [row["rhat"], row["ess"]] * sampled)
+    print_rows(title, headers, table)
+    print("HPD: 95 %. In band, alone: measurements inside the 95 % band with the discrepancy, and of the material alone.")
+    print("A good predictive check does not mean that C10 is right.")
+    print(f"Report: {folder / 'report.html'}")
+
+
+def _read_run(folder: Path) -> tuple[list[dict[str, Any]], Any, str]:
+    import tomllib
+
+    from tissuq.experiments.units import stress_unit
+
+    try:
+        rows = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        recipe = tomllib.loads((folder / RECIPE).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"'{folder}' is not the folder of a complete run: summary.json or {RECIPE} is missing or damaged."
+        ) from error
+    if "file" not in recipe:
+        return rows, stress_unit("MPa"), "The study of the paper: neo-Hookean C10 under seven formulations"
+    name, material = Path(recipe["file"]).stem, recipe["material"]
+    return rows, stress_unit(recipe["stress_unit"]), f"{name}: {material} with model uncertainty"

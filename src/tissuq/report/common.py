@@ -1,0 +1,59 @@
+"""What the run folders of all studies share: tables, posteriors, figures and the recipe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.posterior import Posterior
+from tissuq.report.run_folder import RECIPE
+from tissuq.report.tables import Row, parameter_rows, write_csv, write_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pydantic import BaseModel
+
+__all__ = ["write_data", "write_figures", "write_posteriors", "write_recipe", "write_tables"]
+
+
+def write_data(folder: Path, experiment: Experiment) -> None:
+    """Write the measurements as fitted: stretch and engineering stress in MPa, in full precision."""
+    rows = [
+        {"stretch": float(stretch), "stress": float(stress)}
+        for stretch, stress in zip(experiment.stretch, experiment.stress, strict=True)
+    ]
+    write_csv(folder / "data.csv", rows)
+
+
+def write_tables(folder: Path, summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
+    """Write summary.csv, summary.json and parameters.csv."""
+    write_csv(folder / f"summary{suffix}.csv", summary)
+    write_json(folder / f"summary{suffix}.json", summary)
+    write_csv(folder / f"parameters{suffix}.csv", parameter_rows(posteriors))
+
+
+def write_posteriors(folder: Path, posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
+    """Write one NetCDF file a formulation."""
+    (folder / "posterior").mkdir(exist_ok=True)
+    for name, posterior in posteriors.items():
+        posterior.save(folder / "posterior" / f"{name}{suffix}.nc")
+
+
+def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
+    """Write every figure as SVG and PNG."""
+    from tissuq.report.figures import save_figure
+
+    (folder / "figures").mkdir()
+    for name, figure in figures.items():
+        save_figure(figure, folder / "figures", name)
+
+
+def write_recipe(folder: Path, command: str, settings: BaseModel) -> None:
+    """Write run.toml, from which ``tissuq COMMAND --config`` repeats the run."""
+    import tomli_w
+
+    plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True)
+    header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
+    (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")

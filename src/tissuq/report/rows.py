@@ -1,0 +1,72 @@
+"""Rows as people read them: numbers rounded, in the unit of the data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import floor, log10
+from typing import Any
+
+from tissuq.experiments.units import StressUnit
+from tissuq.posterior import Posterior
+
+__all__ = ["readable_parameters", "readable_summary", "significant"]
+
+Row = dict[str, Any]
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """Return a number for people: some significant digits, no exponent where none is needed."""
+    if value is None:
+        return ""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if "e+0" in text and abs(value) < 1e6 else text
+
+
+def interval(low: float, high: float, sd: float) -> tuple[str, str]:
+    """Return the ends of an interval with the decimals that its width supports."""
+    decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
+    if decimals > 8:
+        return f"{low:.3g}", f"{high:.3g}"
+    return f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+
+
+def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
+    """Return the rows of a summary as text, C10 in the given unit."""
+    readable = []
+    for row in rows:
+        mean, sd, low, high = (row[f"C10_{key}"] / unit.to_mpa for key in ("mean", "sd", "hdi_low", "hdi_high"))
+        ends = interval(low, high, sd)
+        readable.append(
+            {
+                "formulation": row["formulation"],
+                "mean": interval(mean, mean, sd)[0],
+                "sd": significant(sd, 2),
+                "low": ends[0],
+                "high": ends[1],
+                "contains_truth": row["contains_truth"],
+                "log_evidence": "" if row["log_evidence"] is None else f"{row['log_evidence']:.2f}",
+                "coverage": f"{row['predictive_coverage']:.0%}",
+                "coverage_model_only": f"{row['predictive_coverage_model_only']:.0%}",
+                "rhat": "" if row["rhat"] is None else f"{row['rhat']:.3f}",
+                "ess": "" if row["ess"] is None else f"{row['ess']:.0f}",
+                "seconds": f"{row['seconds']:.2f}",
+            }
+        )
+    return readable
+
+
+def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -> list[list[str]]:
+    """Return rows of formulation, parameter, unit, prior, mean, sd and interval as text."""
+    rows = []
+    for formulation, posterior in posteriors.items():
+        for symbol, numbers in posterior.summary().iterrows():
+            parameter = next(p for p in posterior.model.parameters if p.symbol == symbol)
+            is_stress = parameter.dimension == "stress"
+            factor = unit.to_mpa if is_stress else 1.0
+            mean, sd, low, high = (float(numbers[key]) / factor for key in ("mean", "sd", "hdi_low", "hdi_high"))
+            ends = interval(low, high, sd)
+            prior = str(posterior.model.priors[parameter.symbol].scaled(1 / factor))
+            name = unit.name if is_stress else ""
+            row = [formulation, parameter.symbol, name, prior, interval(mean, mean, sd)[0], significant(sd, 2)]
+            rows.append([*row, f"[{ends[0]}, {ends[1]}]"])
+    return rows

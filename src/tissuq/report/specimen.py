@@ -1,0 +1,122 @@
+"""The run folder of a fit: the converted data, tables, posteriors, figures and the report."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
+from tissuq.report.page import embedded_figure, render
+from tissuq.report.rows import readable_parameters, readable_summary, significant
+from tissuq.report.run_folder import RECIPE
+from tissuq.report.tables import Row, summary_row
+from tissuq.studies.specimen import SpecimenStudy
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["specimen_summary", "write_specimen_run"]
+
+INPUT = "input"
+"""The folder of a run that holds a copy of the user's file, so that the run can be repeated."""
+
+
+def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figures: bool = True) -> None:
+    """Write everything that a fit leaves behind into an empty folder.
+
+    Parameters
+    ----------
+    study : SpecimenStudy
+    source : Path
+        The file that was read; a copy goes with the run.
+    folder : Path
+        Exists and is empty.
+    figures : bool
+        Draw them, too.
+    """
+    (folder / INPUT).mkdir()
+    shutil.copyfile(source, folder / INPUT / source.name)
+    resolved = {"file": f"{INPUT}/{source.name}", "stress_unit": study.experiment.stress_unit}
+    recipe = study.settings.model_copy(update=resolved)
+    write_recipe(folder, "fit", recipe)
+    write_data(folder, study.experiment)
+    summary = specimen_summary(study)
+    write_tables(folder, summary, study.posteriors)
+    write_posteriors(folder, study.posteriors)
+    if figures:
+        write_figures(folder, _figures(study))
+    page = render("specimen.html", **_context(study, summary, folder))
+    (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def specimen_summary(study: SpecimenStudy) -> list[Row]:
+    """Return one row a discrepancy."""
+    return [summary_row(name, each, study.seconds[name]) for name, each in study.posteriors.items()]
+
+
+def _figures(study: SpecimenStudy) -> dict[str, Figure]:
+    from tissuq.report.figures import marginal_figure, predictive_figure
+
+    return {
+        "marginals": marginal_figure(study.posteriors, "C10", study.unit),
+        "with_discrepancy": predictive_figure(study.posteriors, discrepancy=True, unit=study.unit),
+        "model_alone": predictive_figure(study.posteriors, discrepancy=False, unit=study.unit),
+    }
+
+
+def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
+    noise = study.settings.noise_sd
+    return {
+        "command": "fit",
+        "settings": study.settings,
+        "experiment": study.experiment,
+        "unit": study.unit.name,
+        "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
+        "lead": _lead(summary, study),
+        "summary": readable_summary(summary, study.unit),
+        "is_sampled": any(row["rhat"] is not None for row in summary),
+        "warnings": _warnings(study),
+        "cautions": {
+            name: each.model.discrepancy.caution
+            for name, each in study.posteriors.items()
+            if each.model.discrepancy.caution
+        },
+        "parameters": readable_parameters(study.posteriors, study.unit),
+        "noise": "unknown, a parameter" if noise == "unknown" else f"sd {noise:g} {study.unit.name}",
+        "skipped": study.skipped,
+        "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
+    }
+
+
+def _lead(summary: list[Row], study: SpecimenStudy) -> str:
+    """Return the finding in a sentence or two."""
+    scale, unit = study.unit.to_mpa, study.unit.name
+    means = [row["C10_mean"] / scale for row in summary]
+    if len(summary) == 1:
+        row = summary[0]
+        low, high = (significant(row[f"C10_hdi_{end}"] / scale) for end in ("low", "high"))
+        return (
+            f"With the discrepancy '{row['formulation']}', C10 is {significant(means[0])} {unit}, "
+            f"95 % HPD {low} to {high} {unit}."
+        )
+    low, high = (min(means), max(means))
+    overlap = max(row["C10_hdi_low"] for row in summary) <= min(row["C10_hdi_high"] for row in summary)
+    verdict = (
+        "all 95 % intervals overlap"
+        if overlap
+        else "the 95 % intervals contradict each other: the choice of discrepancy matters more than the noise"
+    )
+    return (
+        f"With {len(summary)} ways to account for model uncertainty, the mean of C10 ranges from {significant(low)} to "
+        f"{significant(high)} {unit}; {verdict}."
+    )
+
+
+def _warnings(study: SpecimenStudy) -> list[str]:
+    """Return each warning once, with the discrepancies that it concerns."""
+    concerned: dict[str, list[str]] = {}
+    for name, posterior in study.posteriors.items():
+        for text in posterior.warnings:
+            concerned.setdefault(text, []).append(name)
+    return [f"{', '.join(names)}: {text}" for text, names in concerned.items()]

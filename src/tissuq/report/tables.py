@@ -1,0 +1,69 @@
+"""The tables of a run: one row a formulation, and one row a parameter."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tissuq.posterior import Posterior
+
+__all__ = ["parameter_rows", "summary_row", "write_csv", "write_json"]
+
+Row = dict[str, Any]
+
+
+def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: float | None = None) -> Row:
+    """Return the row of one formulation; C10 in MPa, empty where a route has no such number."""
+    c10 = posterior.summary().loc["C10"]
+    low, high = float(c10["hdi_low"]), float(c10["hdi_high"])
+    return {
+        "formulation": formulation,
+        "C10_mean": float(c10["mean"]),
+        "C10_sd": float(c10["sd"]),
+        "C10_hdi_low": low,
+        "C10_hdi_high": high,
+        "contains_truth": None if truth is None else low <= truth <= high,
+        "log_evidence": posterior.log_evidence,
+        "predictive_coverage": posterior.predictive_coverage(),
+        "predictive_coverage_model_only": posterior.predictive_coverage(discrepancy=False),
+        "rhat": float(c10["rhat"]) if "rhat" in c10 else None,
+        "ess": float(c10["ess"]) if "ess" in c10 else None,
+        "seconds": seconds,
+    }
+
+
+def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
+    """Return mean, sd and 95 % HPD of every parameter of every formulation, with its unit and prior."""
+    rows = []
+    for formulation, posterior in posteriors.items():
+        table = posterior.summary()
+        for parameter in posterior.model.parameters:
+            numbers = table.loc[parameter.symbol]
+            rows.append(
+                {
+                    "formulation": formulation,
+                    "parameter": parameter.symbol,
+                    "unit": parameter.unit,
+                    "prior": str(posterior.model.priors[parameter.symbol]),
+                    **{name: float(numbers[name]) for name in ("mean", "sd", "hdi_low", "hdi_high")},
+                    "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
+                    "ess": float(numbers["ess"]) if "ess" in numbers else None,
+                }
+            )
+    return rows
+
+
+def write_csv(path: Path, rows: list[Row]) -> None:
+    """Write rows as CSV; floats in full, nothing for None."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def write_json(path: Path, rows: list[Row]) -> None:
+    """Write rows as JSON."""
+    path.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
