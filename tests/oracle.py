@@ -5,9 +5,9 @@ Nothing of the package is used. Every number is a sum, over explicit nodes, of
     prior density * dense multivariate normal density (Cholesky factor of the full n x n covariance)
 
 over ALL parameters: no Gaussian integral is done in closed form, nothing is conjugate, no data summary
-stands in for the data. Gaussian shapes are used for one thing only, to decide where the nodes go; a bad choice
-would cost accuracy (seen by refining), never correctness. Every integration range is clipped to its prior box,
-dimension by dimension, so hard bounds are ends of ranges, not jumps inside them.
+stands in for the data. Gaussian shapes are used for one thing only, to decide where the nodes go; a bad
+choice would cost accuracy (seen by refining), never correctness. Every integration range is clipped to its
+prior box, dimension by dimension, so hard bounds are ends of ranges, not jumps inside them.
 
 - none, gp: C10 on a uniform Simpson grid; c and log psi on composite Gauss-Legendre panels;
 - the others: C10 on a Simpson grid uniform in t, C10 = centre + w sinh(t), shared by all S;
@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
-from scipy.linalg import solve_triangular
 from scipy.optimize import brentq, lsq_linear
 
 Array = NDArray[np.float64]
@@ -129,7 +128,7 @@ class _Problem:
         """Return L^-1 y, L^-1 X (columns in the order of LINEAR) and the log normalising constant."""
         factor = np.linalg.cholesky(covariance(self.formulation, self.x, self.noise, h))
         columns = [self.y] + [stress_per_unit(name, self.x) for name in LINEAR[self.formulation]]
-        white = solve_triangular(factor, np.stack(columns, axis=1), lower=True)
+        white = np.linalg.solve(factor, np.stack(columns, axis=1))
         constant = -0.5 * self.x.size * np.log(2 * np.pi) - float(np.sum(np.log(np.diag(factor))))
         return white[:, 0], white[:, 1:], constant
 
@@ -348,14 +347,13 @@ def _pass(
         shape = _shape(white_x, boxes)
         # Leave out C10 values at which, for this S, a coarse look finds nothing: densities below exp(-40).
         theta, _ = _nest(c10, best, shape, boxes, reach, look, look_weights)
-        seen = constant - 0.5 * np.sum((white_y - theta @ white_x.T) ** 2, axis=2).min(axis=1)
+        seen = constant - 0.5 * _square(white_y, white_x, theta, look.size).min(axis=1)
         rows = np.flatnonzero(seen - shift > -40.0)
         for start in range(0, rows.size, step):
             part = rows[start : start + step]
             theta, volume = _nest(c10[part], best, shape, boxes, reach, u, u_weights)
-            residual = white_y - theta.reshape(-1, len(names)) @ white_x.T
-            log = constant - 0.5 * np.einsum("ij,ij->i", residual, residual)
-            density = weight * volume * np.exp(log.reshape(volume.shape) - shift)
+            log = constant - 0.5 * _square(white_y, white_x, theta, order)
+            density = weight * volume * np.exp(log - shift)
             total = density.sum(axis=1)
             joint[part] += total
             moments["S"][0][part] += total * s
@@ -364,6 +362,19 @@ def _pass(
                 moments[n][0][part] += (density * theta[..., d]).sum(axis=1)
                 moments[n][1][part] += (density * theta[..., d] ** 2).sum(axis=1)
     return t, t_weights, c10, slope, joint, moments
+
+
+def _square(white_y: Array, white_x: Array, theta: Array, last: int) -> Array:
+    """Return |L^-1 (y - X theta)|^2 at every node, the residual vector written out in full.
+
+    Runs of ``last`` nodes differ in the last parameter only, so they share the other terms. No BLAS: its
+    threads fight over a busy machine.
+    """
+    theta = theta.reshape(theta.shape[0], -1, last, theta.shape[2])
+    shared = white_y - np.einsum("ijd,nd->ijn", theta[:, :, 0, :-1], white_x[:, :-1])
+    residual = theta[..., -1, None] * white_x[:, -1]
+    np.subtract(shared[:, :, None, :], residual, out=residual)
+    return np.einsum("ijkn,ijkn->ijk", residual, residual).reshape(theta.shape[0], -1)
 
 
 def _nest(

@@ -78,7 +78,7 @@ class StatisticalModel:
         """The prior of every parameter, in MPa and stretch."""
         boxes = self._default_boxes()
         return {
-            p.symbol: self.chosen_priors.get(p.symbol) or boxes.get(p.symbol) or self._default_scale_prior(p)
+            p.symbol: self._chosen_prior(p) or boxes.get(p.symbol) or self._default_scale_prior(p)
             for p in self.parameters
         }
 
@@ -91,7 +91,9 @@ class StatisticalModel:
     def linear(self) -> tuple[str, ...]:
         """Parameters that can be integrated in closed form: stress linear in them, prior uniform or Gaussian."""
         return tuple(
-            p.symbol for p in self.parameters if p.is_linear and isinstance(self.priors[p.symbol], Uniform | Normal)
+            p.symbol
+            for p in self.parameters
+            if p.is_linear and isinstance(self.priors[p.symbol], Uniform | Normal)
         )
 
     @cached_property
@@ -135,6 +137,13 @@ class StatisticalModel:
         """Whether only the sum of noise and discrepancy variance is in the data."""
         return self.noise_sd == "unknown" and "S" in self.symbols
 
+    def _chosen_prior(self, parameter: Parameter) -> Prior | None:
+        prior = self.chosen_priors.get(parameter.symbol)
+        try:
+            return prior.within(parameter.support) if prior else None
+        except InputError as error:
+            raise InputError(f"{parameter.symbol}: {error}") from error
+
     def _default_scale_prior(self, parameter: Parameter) -> Prior:
         if parameter.relative_prior is None:
             raise ModelError(f"parameter {parameter.symbol} has no default prior: give one.")
@@ -177,17 +186,13 @@ class StatisticalModel:
             )
 
     def _check_priors(self) -> None:
-        for symbol, prior in self.chosen_priors.items():
+        for symbol in self.chosen_priors:
             if symbol not in self.symbols:
                 raise InputError(
                     f"there is a prior for '{symbol}', but the parameters of this model are {', '.join(self.symbols)}."
                 )
-            support = next(p.support for p in self.parameters if p.symbol == symbol)
-            if prior.support[0] < support[0] or prior.support[1] > support[1]:
-                raise InputError(
-                    f"the prior {prior} of {symbol} reaches beyond the values that {symbol} can take, "
-                    f"{support[0]:g} to {support[1]:g}."
-                )
+        for parameter in self.parameters:
+            self._chosen_prior(parameter)
 
     def _check_data(self) -> None:
         n, name = len(self.experiment), self.experiment.name

@@ -119,7 +119,10 @@ class Posterior:
 
         solution, experiment = self.solution, self.model.experiment
         point = {"measurement": np.arange(len(experiment))}
-        sample = {"chain": np.arange(solution.drawn_from.shape[0]), "draw": np.arange(solution.drawn_from.shape[1])}
+        sample = {
+            "chain": np.arange(solution.drawn_from.shape[0]),
+            "draw": np.arange(solution.drawn_from.shape[1]),
+        }
         parameters = {parameter.symbol: parameter for parameter in self.model.parameters}
         stress = ("chain", "draw", "measurement")
         in_mpa = {"units": "MPa"}
@@ -134,9 +137,13 @@ class Posterior:
             "posterior_predictive": xr.Dataset(
                 {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, sample | point
             ),
-            "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, sample | point),
+            "log_likelihood": xr.Dataset(
+                {"stress": (stress, pointwise_log_likelihood(solution))}, sample | point
+            ),
             "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
-            "constant_data": xr.Dataset({"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point),
+            "constant_data": xr.Dataset(
+                {"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point
+            ),
         }
         tree = xr.DataTree.from_dict(groups)
         tree.attrs.update(self._labels())

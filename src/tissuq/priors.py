@@ -7,8 +7,8 @@ whose import alone takes longer than all seven posteriors of the paper. The test
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields, replace
-from math import inf, isfinite, log, pi
+from dataclasses import MISSING, dataclass, fields, replace
+from math import erf, inf, isnan, log, pi, sqrt
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -34,8 +34,12 @@ class Prior(ABC):
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, int | float) or not isfinite(value):
-                raise InputError(f"prior {self}: {field.name} must be a finite number.")
+            if (
+                not isinstance(value, int | float)
+                or isnan(value)
+                or (abs(value) == inf and field.default is MISSING)
+            ):
+                raise InputError(f"prior {self.name}: {field.name} must be a finite number, not {value!r}.")
         self._check()
 
     def _check(self) -> None:
@@ -55,16 +59,36 @@ class Prior(ABC):
     def quantile(self, probability: Any) -> Any:
         """Return the values below which the given probabilities lie."""
 
+    def within(self, support: tuple[float, float]) -> Self:
+        """Return the prior for a parameter that can only take values in ``support``.
+
+        Raises
+        ------
+        InputError
+            When the prior reaches beyond and cannot be cut.
+        """
+        if self.support[0] < support[0] or self.support[1] > support[1]:
+            raise InputError(
+                f"the prior {self} reaches beyond the values that the parameter can take, "
+                f"{support[0]:g} to {support[1]:g}."
+            )
+        return self
+
     def scaled(self, factor: float) -> Self:
         """Return the same prior for the parameter expressed in a unit ``factor`` times smaller."""
         return replace(self, **{field: getattr(self, field) * factor for field in self.with_unit})
 
     def as_dict(self) -> dict[str, float | str]:
         """Return the plain form that configuration files hold."""
-        return {"distribution": self.name} | {f.name: float(getattr(self, f.name)) for f in fields(self)}
+        return {"distribution": self.name} | self._given()
 
     def __str__(self) -> str:
-        return f"{self.name}({', '.join(f'{getattr(self, f.name):.6g}' for f in fields(self))})"
+        return f"{self.name}({', '.join(f'{value:.6g}' for value in self._given().values())})"
+
+    def _given(self) -> dict[str, float]:
+        """Return the arguments, without infinite bounds at the end."""
+        values = {field.name: float(getattr(self, field.name)) for field in fields(self)}
+        return {name: value for name, value in values.items() if abs(value) != inf}
 
 
 @dataclass(frozen=True)
@@ -94,25 +118,45 @@ class Uniform(Prior):
 
 @dataclass(frozen=True)
 class Normal(Prior):
-    """Gaussian density with a mean and a standard deviation."""
+    """Gaussian density with a mean and a standard deviation, between bounds when they are given (and normalised)."""
 
     mean: float
     sd: float
+    low: float = -inf
+    high: float = inf
 
     name = "normal"
-    with_unit = ("mean", "sd")
+    with_unit = ("mean", "low", "high", "sd")
+
+    def _check(self) -> None:
+        super()._check()
+        if self.low >= self.high:
+            raise InputError(f"prior {self}: low must be less than high.")
 
     @property
     def support(self) -> tuple[float, float]:
-        return -inf, inf
+        return self.low, self.high
+
+    def within(self, support: tuple[float, float]) -> Self:
+        return replace(self, low=max(self.low, support[0]), high=min(self.high, support[1]))
 
     def log_density(self, value: Any) -> Any:
-        return -0.5 * ((value - self.mean) / self.sd) ** 2 - log(self.sd) - 0.5 * log(2 * pi)
+        return -0.5 * ((value - self.mean) / self.sd) ** 2 - self.log_size
+
+    @property
+    def log_size(self) -> float:
+        """Log of the integral of exp(-(x - mean)^2 / (2 sd^2)) between the bounds."""
+        start, end = self._ends()
+        return log(self.sd * sqrt(2 * pi) * (end - start))
 
     def quantile(self, probability: Any) -> Any:
         from scipy.special import ndtri
 
-        return self.mean + self.sd * ndtri(probability)
+        start, end = self._ends()
+        return self.mean + self.sd * ndtri(start + (end - start) * np.asarray(probability))
+
+    def _ends(self) -> tuple[float, float]:
+        return tuple(0.5 * (1 + erf((end - self.mean) / (self.sd * sqrt(2)))) for end in self.support)  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)
@@ -218,9 +262,12 @@ def prior_from(settings: dict[str, Any]) -> Prior:
     name = arguments.pop("distribution", "uniform")
     kind = find(Prior, "prior distribution", name, InputError)
     expected = [field.name for field in fields(kind)]
-    if sorted(arguments) != sorted(expected):
+    needed = [field.name for field in fields(kind) if field.default is MISSING]
+    if set(arguments) - set(expected) or set(needed) - set(arguments):
         given = ", ".join(arguments) or "nothing"
-        raise InputError(f"a {name} prior needs {' and '.join(expected)}; it was given {given}.")
+        may = [option for option in expected if option not in needed]
+        optional = f" (and may have {' and '.join(may)})" if may else ""
+        raise InputError(f"a {name} prior needs {' and '.join(needed)}{optional}; it was given {given}.")
     return kind(**arguments)
 
 

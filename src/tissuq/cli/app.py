@@ -11,6 +11,9 @@ from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
 
+INTERRUPTED = 130
+"""The exit status that Typer gives to Ctrl-C."""
+
 app = typer.Typer(
     name="tissuq",
     no_args_is_help=True,
@@ -33,6 +36,7 @@ def main() -> None:
     except TissuqError as error:
         typer.echo(f"tissuq: {error}", err=True)
         sys.exit(2)
-    except KeyboardInterrupt:
-        typer.echo("tissuq: stopped; nothing was written.", err=True)
-        sys.exit(130)
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            typer.echo("tissuq: stopped; no run was written.", err=True)
+        raise

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tissuq.errors import InputError
+
 if TYPE_CHECKING:
     from tissuq.discrepancy import Discrepancy
     from tissuq.mechanics import Material
@@ -33,15 +35,17 @@ def discrepancies() -> None:
 
 def datasets(
     copy: Annotated[str | None, typer.Option(help="Name of a data set to copy.")] = None,
-    to: Annotated[Path, typer.Option(help="Folder to copy it to.")] = Path(),
+    to: Annotated[Path | None, typer.Option(help="Folder to copy it to [the current one].")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
 ) -> None:
     """List the built-in measured data sets, or copy one as a CSV file."""
     from tissuq.experiments import datasets as known
 
-    if copy:
-        print(known.copy(copy, to, force=force))
+    if copy is not None:
+        print(known.copy(copy, to or Path(), force=force))
         return
+    if to is not None or force:
+        raise InputError("--to and --force go with --copy NAME: say which data set to copy.")
     for name in known.names():
         print(f"{name}\n    {known.citation(name)}")
 
@@ -62,5 +66,7 @@ def _default(parameter: Parameter) -> str:
     if parameter.relative_prior is None:
         side = "positive, " if parameter.support[0] == 0 else ""
         return f"uniform, {side}to 10 times beyond least squares"
-    of_what = {"stress": "the largest stress", "stretch": "the stretch range", "number": "1"}[parameter.dimension]
+    of_what = {"stress": "the largest stress", "stretch": "the stretch range", "number": "1"}[
+        parameter.dimension
+    ]
     return f"{parameter.relative_prior} x {of_what}"

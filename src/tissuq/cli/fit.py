@@ -17,7 +17,9 @@ def fit(
     file: Annotated[
         Path | None, typer.Argument(help="CSV file, or the name of a built-in data set (tissuq datasets).")
     ] = None,
-    material: Annotated[str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")] = None,
+    material: Annotated[
+        str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")
+    ] = None,
     discrepancy: Annotated[
         list[str] | None,
         typer.Option(help="Discrepancy; repeat for more; 'all' fits every one that applies [all]."),
@@ -34,7 +36,9 @@ def fit(
         list[str] | None,
         typer.Option(help="ROLE=COLUMN for stretch, strain or stress, such as stretch=Strain; repeat."),
     ] = None,
-    stress_unit: Annotated[str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")] = None,
+    stress_unit: Annotated[
+        str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")
+    ] = None,
     stress_type: Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")] = None,
     strain_unit: Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")] = None,
     compression_positive: Annotated[
@@ -65,7 +69,9 @@ def fit(
     if column:
         options["columns"] = dict(_role(text) for text in column)
     if not file and not config:
-        raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
+        raise InputError(
+            "give a FILE of measurements, the name of a built-in data set, or --config run.toml."
+        )
     settings = load_settings(SpecimenSettings, config, options)
     beside = Path() if file or config is None else config.parent
     source = beside / settings.file
@@ -93,7 +99,9 @@ def _noise(text: str | None) -> float | str | None:
     try:
         return float(text)
     except ValueError as error:
-        raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error
+        raise InputError(
+            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'."
+        ) from error
 
 
 def _role(text: str) -> tuple[str, str | int]:

@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -41,16 +41,20 @@ def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
     """Return the symbol and the prior of a text like ``C10=uniform(0, 5)``."""
     match = re.fullmatch(r"\s*(\w+)\s*=\s*([\w-]+)\s*\(([^()]*)\)\s*", text)
     if match is None:
-        raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
+        raise InputError(
+            f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5)."
+        )
     symbol, distribution, numbers = match.groups()
-    names = [field.name for field in fields(find(Prior, "prior distribution", distribution, InputError))]
+    known = fields(find(Prior, "prior distribution", distribution, InputError))
     try:
         values = [float(number) for number in numbers.split(",")]
     except ValueError as error:
         raise InputError(f"prior '{text}': its arguments must be numbers with a decimal point.") from error
-    if len(values) != len(names):
-        raise InputError(f"prior '{text}': {distribution} needs {len(names)} numbers: {', '.join(names)}.")
-    return symbol, {"distribution": distribution, **dict(zip(names, values, strict=True))}
+    names, needed = [field.name for field in known], sum(field.default is MISSING for field in known)
+    if not needed <= len(values) <= len(names):
+        optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
+        raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
+    return symbol, {"distribution": distribution, **dict(zip(names, values, strict=False))}
 
 
 @contextmanager
@@ -100,5 +104,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _explain(item: Any) -> str:
     place = ".".join(str(part) for part in item["loc"])
     message = str(item["msg"]).removeprefix("Value error, ")
-    found = "" if item["type"] == "value_error" or isinstance(item["input"], dict) else f" (it is {item['input']!r})"
+    found = (
+        ""
+        if item["type"] == "value_error" or isinstance(item["input"], dict)
+        else f" (it is {item['input']!r})"
+    )
     return f"{place}: {message}{found}" if place else f"{message}{found}"

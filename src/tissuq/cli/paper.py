@@ -18,7 +18,8 @@ def paper(
     points: Annotated[int | None, typer.Option(help="Number of measurements [30].")] = None,
     stretch_range: Annotated[str | None, typer.Option(help="Stretches LOW:HIGH [0.5:4.25].")] = None,
     noise_sd: Annotated[
-        float | None, typer.Option(help="Standard deviation of the noise, MPa [0.5]; 0.7071 if 0.5 is a variance.")
+        float | None,
+        typer.Option(help="Standard deviation of the noise, MPa [0.5]; 0.7071 if 0.5 is a variance."),
     ] = None,
     prior: Annotated[
         list[str] | None, typer.Option(help="A prior in MPa, such as c=uniform(0,10); repeat for more.")

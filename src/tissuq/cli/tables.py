@@ -18,7 +18,14 @@ def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
     for place, header in enumerate(headers):
         table.add_column(header, justify="right" if place else "left", no_wrap=True)
     for row in rows:
@@ -48,7 +55,9 @@ def print_summary(folder: Path) -> None:
         cells += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * any(known)
         table.append(cells + [row["rhat"], row["ess"]] * sampled)
     print_rows(title, headers, table)
-    print("HPD: 95 %. In band, alone: measurements inside the 95 % band with the discrepancy, and of the material alone.")
+    print(
+        "HPD: 95 %. In band, alone: measurements inside the 95 % band with the discrepancy, and of the material alone."
+    )
     print("A good predictive check does not mean that C10 is right.")
     print(f"Report: {folder / 'report.html'}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.box import NEGLIGIBLE, Box
+from tissuq.inference.box import NEGLIGIBLE, POINTS, Box
 from tissuq.inference.solution import Components
 
 __all__ = ["resampled", "split_at_bounds"]
@@ -15,6 +15,8 @@ FloatArray = NDArray[np.float64]
 RESAMPLED = 4000
 REPRESENTED = 400
 """Components, at most, that are represented by points."""
+ALL_POINTS = 100_000
+"""Points, at least, that represent all of them together."""
 
 
 def split_at_bounds(components: Components, outside: FloatArray, box: Box) -> tuple[Components, Components]:
@@ -42,7 +44,7 @@ def resampled(points: Components) -> Components:
 
 def _points_within(components: Components, box: Box) -> Components:
     few = components.thinned(REPRESENTED)
-    shares, points = box.points(few.mean, few.root)
+    shares, points = box.points(few.mean, few.root, max(POINTS, ALL_POINTS // len(few.weights)))
     weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
     kept = weights > 1e-12 * weights.max()
     p = points.shape[2]

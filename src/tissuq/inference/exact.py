@@ -110,7 +110,7 @@ def _linear_marginal(inner: Components, cut: Components, place: int, bounds: tup
         sds = np.sqrt((inner.root[:, place] ** 2).sum(axis=1))
         parts.append((inner.weights.sum(), marginal_of_mixture(inner.weights, inner.mean[:, place], sds)))
     if len(cut.weights):
-        parts.append((cut.weights.sum(), marginal_of_points(cut.mean[:, place], cut.weights)))
+        parts.append((cut.weights.sum(), marginal_of_points(cut.mean[:, place], cut.weights, bounds)))
     return blended(parts, bounds)
 
 
@@ -125,6 +125,8 @@ def _draw(components: Components, seed: int) -> tuple[NDArray[np.intp], FloatArr
 
 def _reason(model: StatisticalModel, is_bounded: bool) -> str:
     linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
-    nonlinear = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
+    nonlinear = (
+        f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
+    )
     bounds = "; bounds of the linear parameters cut the posterior and were honoured" if is_bounded else ""
     return f"{linear}; {nonlinear}{bounds}"

@@ -15,6 +15,7 @@ __all__ = ["Marginal", "blended", "marginal_of_mixture", "marginal_of_points", "
 FloatArray = NDArray[np.float64]
 
 GRID = 1001
+COARSE = 101
 FEW = 200
 MANY_LINES = 2000
 
@@ -47,9 +48,9 @@ class Marginal:
 
     def hdi(self, prob: float = 0.95) -> tuple[float, float]:
         """Return the shortest interval that holds ``prob`` of the posterior (95 % HPD for 0.95)."""
-        start = np.linspace(0.0, 1.0 - prob, GRID)
+        start = np.linspace(0.0, 1.0 - prob, COARSE)
         best = int((self.quantile(start + prob) - self.quantile(start)).argmin())
-        low, high = start[max(best - 1, 0)], start[min(best + 1, GRID - 1)]
+        low, high = start[max(best - 2, 0)], start[min(best + 2, COARSE - 1)]
         for _ in range(40):
             middle = 0.5 * (low + high)
             rising = self.pdf(self.quantile(middle)) < self.pdf(self.quantile(middle + prob))
@@ -96,24 +97,37 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, side: int, values: Floa
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))
 
 
-def marginal_of_points(points: FloatArray, weights: FloatArray) -> Marginal:
-    """Return the marginal of weighted points; its density is a kernel estimate (Silverman's bandwidth)."""
-    order = np.argsort(points)
-    points, weights = points[order], weights[order]
+def marginal_of_points(points: FloatArray, weights: FloatArray, bounds: tuple[float, float]) -> Marginal:
+    """Return the marginal of weighted points within bounds, by a kernel estimate that keeps their variance.
+
+    Silverman's bandwidth; points near a bound are mirrored there, and elsewhere drawn towards the mean by what the
+    kernel adds to the variance.
+    """
     weights = weights / weights.sum()
     mean = float(weights @ points)
     sd = float(np.sqrt(weights @ (points - mean) ** 2))
-    cumulative = np.cumsum(weights) - 0.5 * weights
-    effective = 1 / (weights @ weights)
-    bandwidth = 0.9 * sd * effective**-0.2
-    grid = np.linspace(points[0], points[-1], 401)
+    bandwidth = 0.9 * sd * (weights @ weights) ** 0.2
+    low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
+    is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
     heights, edges = np.histogram(points, bins=800, weights=weights)
     centres = 0.5 * (edges[1:] + edges[:-1])
-    kernel = np.exp(-0.5 * ((grid[:, None] - centres) / bandwidth) ** 2) / (bandwidth * np.sqrt(2 * np.pi))
-    return Marginal(mean, sd, points, np.interp(points, grid, kernel @ heights), _proper(cumulative))
+    if not is_cut:
+        centres = mean + (centres - mean) * np.sqrt(1 - (bandwidth / sd) ** 2)
+    grid = np.linspace(low, high, GRID)
+    images = [centres, 2 * low - centres, 2 * high - centres] if is_cut else [centres]
+    density = sum(_kernel(grid, image, bandwidth) @ heights for image in images)
+    steps = 0.5 * (density[1:] + density[:-1]) * np.diff(grid)
+    return Marginal(mean, sd, grid, density, _proper(np.concatenate([[0.0], np.cumsum(steps)])))
 
 
-def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _kernel(grid: FloatArray, centres: FloatArray, bandwidth: float) -> FloatArray:
+    scores = (grid[:, None] - centres) / bandwidth
+    return np.asarray(np.exp(-0.5 * scores**2) / (bandwidth * np.sqrt(2 * np.pi)))
+
+
+def _merged(
+    weights: FloatArray, means: FloatArray, sds: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Merge Gaussians that are nearly the same (means within a 300th of the range, sds within 5 %), keeping moments."""
     if len(weights) <= FEW:
         return weights, means, sds
@@ -139,9 +153,12 @@ def blended(parts: list[tuple[float, Marginal]], bounds: tuple[float, float]) ->
     points = np.linspace(low, high, 2 * GRID)
     density = sum(weight * part.pdf(points) for weight, part in parts)
     cumulative = sum(
-        weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0) for weight, part in parts
+        weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0)
+        for weight, part in parts
     )
-    return Marginal(mean, float(np.sqrt(variance)), points, np.asarray(density), _proper(np.asarray(cumulative)))
+    return Marginal(
+        mean, float(np.sqrt(variance)), points, np.asarray(density), _proper(np.asarray(cumulative))
+    )
 
 
 def _proper(cumulative: FloatArray) -> FloatArray:

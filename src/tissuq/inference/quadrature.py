@@ -169,7 +169,9 @@ def _first_cells(log_function: Callable[[FloatArray], FloatArray], dimension: in
     return _evaluated(log_function, corners, np.full(corners.shape, 1 / FIRST_CELLS))
 
 
-def _evaluated(log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray) -> Cells:
+def _evaluated(
+    log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray
+) -> Cells:
     points = _cell_points(lower, width, ORDERS[lower.shape[1]])
     values = log_function(points.reshape(-1, lower.shape[1])).reshape(points.shape[:2])
     return Cells(lower, width, np.where(np.isnan(values), -np.inf, values))
@@ -192,7 +194,9 @@ def _resolve(cells: Cells, top: float) -> tuple[FloatArray, FloatArray]:
     errors = np.empty(cells.lower.shape)
     across = _rule(order, dimension - 1)
     for side in range(dimension):
-        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1).reshape(len(values), order, -1)
+        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1).reshape(
+            len(values), order, -1
+        )
         coefficients = np.einsum("kj,cjo->cko", _to_legendre(order)[-2:], lines)
         errors[:, side] = volume * (np.abs(coefficients).sum(axis=1) @ across)
     return integrals, errors

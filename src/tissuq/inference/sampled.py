@@ -23,12 +23,19 @@ LARGEST_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""
 
 
-def solve_by_sampling(model: StatisticalModel, seed: int = 0) -> Solution:
+def solve_by_sampling(model: StatisticalModel, seed: int = 0, draws: int = 1000) -> Solution:
     """Return the posterior of any model from NUTS on the joint density of all its parameters.
 
     The density is the paper's (eq. 15 with eq. 20 to 26): a dense multivariate normal for correlated
     discrepancies, nothing integrated. It shares no step with the exact route but the model itself, and gives no
     evidence. A run that has not converged says so in its diagnostics and warnings.
+
+    Parameters
+    ----------
+    model : StatisticalModel
+    seed : int
+    draws : int
+        Draws in each of four chains.
 
     Raises
     ------
@@ -41,10 +48,11 @@ def solve_by_sampling(model: StatisticalModel, seed: int = 0) -> Solution:
             f"{LARGEST_CORRELATED} measurements use the sampler 'exact', or thin the data."
         )
     supports = np.array([model.priors[symbol].support for symbol in model.symbols])
-    sampled = sample_nuts(
-        joint_log_density(model), supports[:, 0], supports[:, 1], _start(model), NutsSettings(seed=seed)
+    settings = NutsSettings(
+        draws=draws, seed=seed, target_acceptance=0.95 if model.discrepancy.is_correlated else 0.9
     )
-    return _solution(model, sampled)
+    density, (lower, upper) = joint_log_density(model), supports.T
+    return _solution(model, sample_nuts(density, lower, upper, _start(model), settings, names=model.symbols))
 
 
 def joint_log_density(model: StatisticalModel) -> Any:
@@ -76,9 +84,11 @@ def joint_log_density(model: StatisticalModel) -> Any:
 def _start(model: StatisticalModel) -> FloatArray:
     """Return a point inside the support: the best of some prior points, linear parameters at their conditional mean."""
     uniforms = np.random.default_rng(0).random((256, len(model.nonlinear))) ** 2
-    settings = np.array(
-        [model.priors[s].quantile(u) for s, u in zip(model.nonlinear, uniforms.T, strict=True)]
-    ).reshape(-1, 256).T
+    settings = (
+        np.array([model.priors[s].quantile(u) for s, u in zip(model.nonlinear, uniforms.T, strict=True)])
+        .reshape(-1, 256)
+        .T
+    )
     given = ConditionalGaussian(model)(settings)
     best = int(np.argmax(given.log_likelihood))
     chosen = dict(zip((*model.nonlinear, *model.linear), [*settings[best], *given.mean[best]], strict=True))
@@ -110,7 +120,10 @@ def _solution(model: StatisticalModel, sampled: NutsDraws) -> Solution:
         route="nuts",
         reason=f"NUTS on the joint density of {', '.join(model.symbols)}",
         components=components,
-        marginals={symbol: marginal_of_points(values[symbol].ravel(), weights) for symbol in model.symbols},
+        marginals={
+            symbol: marginal_of_points(values[symbol].ravel(), weights, model.priors[symbol].support)
+            for symbol in model.symbols
+        },
         draws=values,
         drawn_from=np.arange(count).reshape(chains, draws),
         diagnostics=diagnostics,

@@ -27,7 +27,12 @@ class Band:
 
 
 def predict_band(
-    solution: Solution, stretch: ArrayLike, *, discrepancy: bool = True, noise: bool = True, prob: float = 0.95
+    solution: Solution,
+    stretch: ArrayLike,
+    *,
+    discrepancy: bool = True,
+    noise: bool = True,
+    prob: float = 0.95,
 ) -> Band:
     """Return the mean stress and the interval that holds ``prob`` of it, at each stretch.
 

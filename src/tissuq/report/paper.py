@@ -150,10 +150,17 @@ def _cells(study: PaperStudy) -> dict[str, Any]:
     ranges = list(dict.fromkeys((cell.stretch_low, cell.stretch_high) for cell in study.cells))
 
     def word(held: int) -> str:
-        return ("yes" if held else "no") if study.settings.replicates == 1 else f"{held}/{study.settings.replicates}"
+        return (
+            ("yes" if held else "no")
+            if study.settings.replicates == 1
+            else f"{held}/{study.settings.replicates}"
+        )
 
     return {
-        "headers": ["stretch range", *(name if b is None else f"{name}, c up to {b:g} MPa" for name, b in columns)],
+        "headers": [
+            "stretch range",
+            *(name if b is None else f"{name}, c up to {b:g} MPa" for name, b in columns),
+        ],
         "rows": [
             [f"{low:g} to {high:g}", *(word(found[low, high, *column].held) for column in columns)]
             for low, high in ranges

@@ -108,7 +108,9 @@ def run_specimen(
                 experiment,
                 material=settings.material,
                 discrepancy=name,
-                noise_sd=settings.noise_sd if settings.noise_sd == "unknown" else settings.noise_sd * unit.to_mpa,
+                noise_sd=settings.noise_sd
+                if settings.noise_sd == "unknown"
+                else settings.noise_sd * unit.to_mpa,
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
                 sampler=settings.sampler,
                 seed=settings.seed,

@@ -51,7 +51,15 @@ def find(posterior: Posterior, truth: float, base: Band | None = None) -> Findin
     )
     width = float(np.mean(band.high - band.low))
     return Finding(
-        low, high, low <= truth <= high, len(data), inside, inside_alone, width, float(shift), posterior.log_evidence
+        low,
+        high,
+        low <= truth <= high,
+        len(data),
+        inside,
+        inside_alone,
+        width,
+        float(shift),
+        posterior.log_evidence,
     )
 
 

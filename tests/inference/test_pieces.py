@@ -1,0 +1,102 @@
+"""Boxes, spectra and marginals against SciPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import expon, multivariate_normal, norm, truncnorm
+
+from tissuq.discrepancy import GaussianProcess
+from tissuq.inference.box import Box
+from tissuq.inference.lowrank import correlation_spectrum
+from tissuq.inference.marginal import blended, marginal_of_mixture, marginal_of_points
+
+ROOT = np.linalg.cholesky([[1.0, 0.6, 0.2], [0.6, 2.0, -0.3], [0.2, -0.3, 0.5]])
+
+
+def test_the_mass_in_a_box_is_scipys():
+    box = Box(np.array([-0.5, -1.0, -np.inf]), np.array([1.0, 2.0, 0.3]))
+    outside, log_inside = box.mass(np.zeros((1, 3)), ROOT[None])
+    truth = multivariate_normal(np.zeros(3), ROOT @ ROOT.T).cdf(
+        box.upper, lower_limit=np.array([-0.5, -1.0, -40])
+    )
+    assert np.exp(log_inside[0]) == pytest.approx(truth, rel=2e-3)
+    assert outside[0] >= 1 - truth
+
+
+def test_the_mass_far_in_the_tail_keeps_its_digits():
+    box = Box(np.array([0.0]), np.array([np.inf]))
+    for distance in (5.0, 15.0, 30.0):
+        _, log_inside = box.mass(np.array([[-distance]]), np.ones((1, 1, 1)))
+        assert log_inside[0] == pytest.approx(norm.logcdf(-distance), rel=1e-10)
+
+
+def test_parameters_far_from_their_bounds_cost_no_accuracy():
+    box = Box(np.array([-50.0, 0.0, -50.0]), np.array([50.0, 50.0, 50.0]))
+    _, log_inside = box.mass(np.array([[0.0, -1.0, 0.0]]), ROOT[None])
+    assert log_inside[0] == pytest.approx(norm.logcdf(-1 / np.sqrt(2)), rel=1e-12)
+
+
+def test_points_in_a_box_have_the_moments_of_the_bounded_gaussian():
+    box = Box(np.array([0.0, -np.inf, -np.inf]), np.array([np.inf, np.inf, np.inf]))
+    weights, points = box.points(np.zeros((1, 3)), ROOT[None], 20_000)
+    law = truncnorm(0, np.inf)
+    mean = weights[0] @ points[0] / weights[0].sum()
+    assert mean == pytest.approx(law.mean() * np.array([1.0, 0.6, 0.2]), abs=5e-3)
+    assert (points[0, :, 0] >= 0).all()
+
+
+@pytest.mark.parametrize("psi", [0.05, 0.3, 1.5, 8.0])
+@pytest.mark.parametrize("n", [1, 2, 30, 300])
+def test_the_spectrum_rebuilds_the_correlation(n, psi):
+    points = np.linspace(0.5, 4, n)
+    found = correlation_spectrum(GaussianProcess(), points, (psi,))
+    dense = np.exp(-0.5 * ((points[:, None] - points) / psi) ** 2)
+    np.testing.assert_allclose((found.vectors * found.values) @ found.vectors.T, dense, atol=1e-10)
+    np.testing.assert_allclose(found.vectors.T @ found.vectors, np.eye(len(found.values)), atol=1e-12)
+
+
+def test_a_smooth_kernel_has_a_small_rank():
+    found = correlation_spectrum(GaussianProcess(), np.linspace(0.5, 4, 300), (1.5,))
+    assert len(found.values) < 20
+
+
+def test_repeated_points_do_not_break_the_spectrum():
+    points = np.repeat([1.0, 1.5, 2.0], 3)
+    found = correlation_spectrum(GaussianProcess(), points, (0.5,))
+    assert len(found.values) == 3
+
+
+def test_the_hpd_of_a_gaussian_is_its_central_interval():
+    marginal = marginal_of_mixture(np.ones(1), np.array([2.0]), np.array([0.5]))
+    assert marginal.hdi() == pytest.approx(norm(2, 0.5).interval(0.95), abs=1e-3 * 0.5)
+    assert marginal.hdi(0.5) == pytest.approx(norm(2, 0.5).interval(0.5), abs=2e-3 * 0.5)
+
+
+def test_a_mixture_keeps_its_moments_also_when_its_gaussians_are_merged():
+    rng = np.random.default_rng(0)
+    weights = rng.random(5000)
+    weights /= weights.sum()
+    means, sds = rng.normal(size=5000), 0.1 + rng.random(5000)
+    marginal = marginal_of_mixture(weights, means, sds)
+    density = (weights / sds) @ norm.pdf((marginal.points - means[:, None]) / sds[:, None])
+    np.testing.assert_allclose(marginal.density, density, atol=2e-3 * density.max())
+
+
+def test_the_hpd_of_an_exponential_starts_at_its_bound():
+    points = expon.ppf((np.arange(100_000) + 0.5) / 100_000)
+    marginal = marginal_of_points(points, np.ones(100_000), (0.0, np.inf))
+    assert marginal.mean == pytest.approx(1, rel=1e-3)
+    assert marginal.hdi() == pytest.approx((0, expon.ppf(0.95)), abs=0.02)
+
+
+def test_a_blend_is_the_mixture_of_its_parts():
+    parts = [
+        (w, marginal_of_mixture(np.ones(1), np.array([m]), np.array([1.0])))
+        for w, m in ((0.3, 0.0), (0.7, 2.0))
+    ]
+    both = marginal_of_mixture(np.array([0.3, 0.7]), np.array([0.0, 2.0]), np.ones(2))
+    found = blended(parts, (-np.inf, np.inf))
+    assert found.mean == pytest.approx(both.mean)
+    assert found.sd == pytest.approx(both.sd)
+    assert found.hdi() == pytest.approx(both.hdi(), abs=5e-3)

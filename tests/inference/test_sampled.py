@@ -1,0 +1,85 @@
+"""NUTS on the joint density and the exact route are two independent ways to the same posterior."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+import tissuq as tq
+from tissuq.discrepancy import discrepancy_named
+from tissuq.inference.exact import solve_exactly
+from tissuq.inference.sampled import joint_log_density, solve_by_sampling
+from tissuq.mechanics import NeoHookean
+from tissuq.model import StatisticalModel
+from tissuq.studies.paper import FORMULATIONS
+
+
+def model_of(settings, formulation):
+    return StatisticalModel(
+        settings.experiment(),
+        NeoHookean(),
+        discrepancy_named(formulation),
+        settings.noise_sd,
+        settings.priors_of(formulation),
+    )
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_nuts_converges_and_agrees_with_the_exact_route(paper, formulation):
+    model = model_of(paper, formulation)
+    sampled, exact = solve_by_sampling(model, seed=1, draws=4000), solve_exactly(model)
+    found = sampled.diagnostics
+    assert found.converged
+    assert max(found.rhat.values()) < 1.01
+    # with an ESS above 4000 the ends of the HPD have a Monte Carlo error below 0.04 sd
+    assert min(found.ess_bulk["C10"], found.ess_tail["C10"]) > 4000
+    a, b = exact.marginals["C10"], sampled.marginals["C10"]
+    assert b.mean == pytest.approx(a.mean, abs=0.1 * a.sd)
+    assert b.sd == pytest.approx(a.sd, rel=0.05)
+    assert b.hdi() == pytest.approx(a.hdi(), abs=0.15 * a.sd)
+
+
+@pytest.mark.parametrize("formulation", ["quadratic", "yeoh"])
+def test_the_stiff_formulations_converge_in_four_thousand_draws(paper, formulation):
+    found = solve_by_sampling(model_of(paper, formulation), seed=2).diagnostics
+    assert max(found.rhat.values()) < 1.01
+    assert min(*found.ess_bulk.values(), *found.ess_tail.values()) > 400
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_the_joint_density_is_that_of_scipy(paper, formulation):
+    model = model_of(paper, formulation)
+    values = {"C10": 1.1, "m0": -1.0, "m1": 0.4, "m2": 0.1, "C01": 0.2, "C20": -0.05, "C30": 0.003}
+    values |= {"S": 0.6, "c": 0.8, "psi": 0.9}
+    point = np.array([values[symbol] for symbol in model.symbols])
+    covariance = 0.25 * np.eye(30)
+    if formulation == "gp":
+        x = model.experiment.stretch
+        covariance = covariance + 0.64 * np.exp(-0.5 * ((x[:, None] - x) / 0.9) ** 2)
+    elif formulation != "none":
+        covariance = covariance + 0.36 * np.eye(30)
+    mean = sum(values[s] * column for s, column in zip(model.column_symbols, model.design.T, strict=True))
+    widths = [np.ptp(model.priors[symbol].support) for symbol in model.symbols]
+    expected = multivariate_normal(mean, covariance).logpdf(model.experiment.stress) - np.log(widths).sum()
+    assert float(joint_log_density(model)(point)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_nuts_gives_no_evidence_and_says_how_it_converged(paper):
+    posterior = tq.fit(paper.experiment(), discrepancy="none", noise_sd=0.5, sampler="nuts")
+    assert posterior.log_evidence is None
+    assert {"ess", "rhat"} <= set(posterior.summary().columns)
+    assert "onverged" in posterior.solution.diagnostics.verdict
+
+
+def test_four_nonlinear_parameters_are_sampled_on_auto(paper):
+    priors = {"C10": tq.HalfNormal(2.0)}
+    posterior = tq.fit(paper.experiment(), discrepancy="gp", priors=priors)
+    assert posterior.solution.route == "nuts"
+
+
+def test_a_dense_covariance_that_is_too_large_is_refused():
+    stretch = np.linspace(0.7, 2, 1001)
+    data = tq.simulate("yeoh", {"C10": 1.2, "C20": 0.0, "C30": 0.0}, stretch, 0.1)
+    with pytest.raises(tq.ModelError, match="use the sampler 'exact'"):
+        tq.fit(data, discrepancy="gp", noise_sd=0.1, sampler="nuts")

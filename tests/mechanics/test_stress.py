@@ -1,0 +1,119 @@
+"""Stress is the derivative of the energy: closed forms, finite differences, the reference state."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial, loading_modes
+from tissuq.mechanics import (
+    MooneyRivlin,
+    NeoHookean,
+    Yeoh,
+    engineering_stress,
+    initial_shear_modulus,
+    stress_basis,
+)
+from tissuq.mechanics.material import materials
+from tissuq.mechanics.stress import path_energy
+
+STRETCH = np.concatenate([np.linspace(0.4, 0.95, 12), np.linspace(1.05, 4.25, 30)])
+
+EVERY_MATERIAL = pytest.mark.parametrize("material", [kind() for kind in materials().values()], ids=str)
+EVERY_MODE = pytest.mark.parametrize("mode", [kind() for kind in loading_modes().values()], ids=str)
+
+UNIAXIAL = {  # the paper's eq. 7, 9 and 11, as corrected
+    "C10": lambda x: 2 * (x - x**-2),
+    "C01": lambda x: 2 * (1 - x**-3),
+    "C20": lambda x: 4 * (x**3 - 3 * x + 1 + 3 * x**-2 - 2 * x**-3),
+    "C30": lambda x: 6 * (x**5 - 6 * x**3 + 3 * x**2 + 9 * x - 6 - 9 * x**-2 + 12 * x**-3 - 4 * x**-4),
+}
+
+
+@EVERY_MATERIAL
+def test_uniaxial_stress_is_the_papers_closed_form(material):
+    basis = stress_basis(material, Uniaxial(), STRETCH)
+    for column, parameter in zip(basis.T, material.parameters, strict=True):
+        closed = UNIAXIAL[parameter.symbol](STRETCH)  # loses a few digits itself where its terms cancel
+        np.testing.assert_allclose(column, closed, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("mode", "first", "second"),
+    [
+        (Equibiaxial(), lambda x: 2 * (x - x**-5), lambda x: 2 * (x**3 - x**-3)),
+        (Planar(), lambda x: 2 * (x - x**-3), lambda x: 2 * (x - x**-3)),
+    ],
+    ids=["equibiaxial", "planar"],
+)
+def test_mooney_rivlin_stress_in_other_modes_is_its_closed_form(mode, first, second):
+    basis = stress_basis(MooneyRivlin(), mode, STRETCH)
+    np.testing.assert_allclose(basis[:, 0], first(STRETCH), rtol=1e-12)
+    np.testing.assert_allclose(basis[:, 1], second(STRETCH), rtol=1e-12)
+
+
+@EVERY_MODE
+@EVERY_MATERIAL
+def test_stress_is_the_finite_difference_of_the_energy(material, mode):
+    values = np.random.default_rng(0).normal(size=len(material.parameters))
+    step = 1e-6
+    energy = [path_energy(material, mode, STRETCH + shift, values) for shift in (-step, step)]
+    slope = (energy[1] - energy[0]) / (2 * step) / mode.loaded_axes
+    stress = engineering_stress(material, mode, STRETCH, values)
+    np.testing.assert_allclose(stress, slope, rtol=1e-6, atol=1e-6 * np.abs(stress).max())
+
+
+@EVERY_MODE
+@EVERY_MATERIAL
+def test_energy_and_stress_vanish_at_the_reference(material, mode):
+    values = np.random.default_rng(1).normal(size=len(material.parameters))
+    assert path_energy(material, mode, 1.0, values) == pytest.approx(0.0, abs=1e-14)
+    assert engineering_stress(material, mode, [1.0], values) == pytest.approx(0.0, abs=1e-14)
+
+
+@EVERY_MODE
+def test_the_invariants_are_those_of_the_deformation_gradient(mode):
+    seen = {}
+
+    class Spy(NeoHookean):
+        name = None  # not a material of the library
+
+        def strain_energy(self, I1, I2, values):
+            seen["I1"], seen["I2"] = I1, I2
+            return I1
+
+    del Spy.name
+    path_energy(Spy(), mode, 1.7, [1.0])
+    F = np.diag(mode.principal_stretches(1.7))
+    C = F.T @ F
+    assert np.linalg.det(F) == pytest.approx(1.0, rel=1e-14)
+    assert seen["I1"] == pytest.approx(np.trace(C), rel=1e-14)
+    assert seen["I2"] == pytest.approx(0.5 * (np.trace(C) ** 2 - np.trace(C @ C)), rel=1e-13)
+
+
+@EVERY_MATERIAL
+def test_declared_linear_parameters_really_are_linear(material):
+    assert all(parameter.is_linear for parameter in material.parameters)
+    rng = np.random.default_rng(2)
+    first, second = rng.normal(size=(2, len(material.parameters)))
+    both = engineering_stress(material, Uniaxial(), STRETCH, 2 * first - 3 * second)
+    apart = engineering_stress(material, Uniaxial(), STRETCH, np.stack([first, second]))
+    np.testing.assert_allclose(both, 2 * apart[0] - 3 * apart[1], rtol=1e-10, atol=1e-10 * np.abs(both).max())
+
+
+@pytest.mark.parametrize(
+    ("material", "values", "modulus"),
+    [(NeoHookean(), [1.2], 2.4), (MooneyRivlin(), [1.2, 0.3], 3.0), (Yeoh(), [1.2, -0.057, 0.004], 2.4)],
+    ids=["neo-hookean", "mooney-rivlin", "yeoh"],
+)
+def test_initial_shear_modulus_is_the_sum_of_the_first_order_terms(material, values, modulus):
+    assert initial_shear_modulus(material, values) == pytest.approx(modulus, rel=1e-14)
+
+
+@EVERY_MATERIAL
+def test_initial_slope_in_tension_is_three_times_the_shear_modulus(material):
+    values = np.abs(np.random.default_rng(3).normal(size=len(material.parameters)))
+    step = 1e-5
+    below, above = engineering_stress(material, Uniaxial(), [1 - step, 1 + step], values)
+    slope = (above - below) / (2 * step)
+    assert slope == pytest.approx(3 * initial_shear_modulus(material, values), rel=1e-6)

@@ -1,0 +1,112 @@
+"""Predictions against closed forms and dense linear algebra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+import tissuq as tq
+from tissuq.inference.solution import Components
+from tissuq.prediction.moments import stress_moments
+from tissuq.prediction.replicates import pointwise_log_likelihood
+
+TRUTH = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
+STRETCH = np.linspace(0.6, 2.2, 14)
+DATA = tq.simulate("yeoh", TRUTH, STRETCH, 0.2, seed=6)
+NEW = np.array([0.7, 1.0, 1.55, 2.5])
+
+
+def x(stretch):
+    return 2 * (stretch - stretch**-2)
+
+
+def kernel(first, second, c, psi):
+    return c**2 * np.exp(-0.5 * ((first[:, None] - second) / psi) ** 2)
+
+
+@pytest.mark.parametrize("prob", [0.5, 0.95])
+@pytest.mark.parametrize("noise", [False, True])
+def test_without_discrepancy_the_band_is_the_normal_one(noise, prob):
+    posterior = tq.fit(DATA, discrepancy="none", noise_sd=0.2, priors={"C10": tq.Uniform(0, 10)})
+    centre = x(STRETCH) @ DATA.stress / (x(STRETCH) @ x(STRETCH))
+    sd = np.sqrt(0.04 / (x(STRETCH) @ x(STRETCH)) * x(NEW) ** 2 + noise * 0.04)
+    table = posterior.predict(NEW, noise=noise, prob=prob)
+    half = norm.ppf(0.5 + prob / 2) * sd
+    np.testing.assert_allclose(table["mean"], centre * x(NEW), atol=1e-9)
+    np.testing.assert_allclose(table["low"], centre * x(NEW) - half, atol=1e-6)
+    np.testing.assert_allclose(table["high"], centre * x(NEW) + half, atol=1e-6)
+
+
+@pytest.mark.parametrize("noise", [False, True])
+def test_a_conditioned_process_agrees_with_dense_linear_algebra(noise):
+    model = tq.fit(DATA, discrepancy="gp", noise_sd=0.2, priors={"C10": tq.Normal(1.0, 0.7)}).model
+    psi, c = 0.6, 0.8
+    V = kernel(STRETCH, STRETCH, c, psi) + 0.04 * np.eye(14)
+    precision = x(STRETCH) @ np.linalg.solve(V, x(STRETCH)) + 0.7**-2
+    b = (x(STRETCH) @ np.linalg.solve(V, DATA.stress) + 0.7**-2) / precision
+    components = Components(
+        np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]])
+    )
+    mean, variance = stress_moments(model, components, NEW, discrepancy=True, noise=noise)
+
+    joint = kernel(STRETCH, STRETCH, c, psi) + 0.49 * np.outer(x(STRETCH), x(STRETCH)) + 0.04 * np.eye(14)
+    cross = kernel(NEW, STRETCH, c, psi) + 0.49 * np.outer(x(NEW), x(STRETCH))
+    own = kernel(NEW, NEW, c, psi) + 0.49 * np.outer(x(NEW), x(NEW))
+    expected = x(NEW) + cross @ np.linalg.solve(joint, DATA.stress - x(STRETCH))
+    covariance = own - cross @ np.linalg.solve(joint, cross.T)
+    np.testing.assert_allclose(mean[0], expected, atol=1e-8)
+    np.testing.assert_allclose(variance[0], np.diag(covariance) + noise * 0.04, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["constant", "yeoh", "gp"])
+def test_bands_agree_with_replicated_data(name):
+    posterior = tq.fit(DATA, discrepancy=name, noise_sd=0.2)
+    replicated = posterior.data["posterior_predictive"]["stress"].values.reshape(-1, 14)
+    band = posterior.predict(STRETCH)
+    below, above = (
+        (replicated < band["low"].to_numpy()).mean(0),
+        (replicated > band["high"].to_numpy()).mean(0),
+    )
+    error = 5 * np.sqrt(0.025 * 0.975 / 4000)
+    np.testing.assert_allclose(below, 0.025, atol=error)
+    np.testing.assert_allclose(above, 0.025, atol=error)
+
+
+def test_the_model_alone_has_no_share_of_the_discrepancy():
+    posterior = tq.fit(DATA, discrepancy="yeoh", noise_sd=0.2)
+    table = posterior.predict(NEW, discrepancy=False, noise=False)
+    c10 = posterior.solution.marginals["C10"]
+    np.testing.assert_allclose(table["mean"], c10.mean * x(NEW), rtol=1e-6, atol=1e-9)
+    width = (table["high"] - table["low"]).to_numpy()
+    assert width[1] == pytest.approx(0, abs=1e-9)
+    assert width[3] > 0
+
+
+@pytest.mark.parametrize("name", ["none", "constant", "gp"])
+def test_the_pointwise_density_is_that_of_leaving_one_out(name):
+    posterior = tq.fit(DATA, discrepancy=name, noise_sd=0.2)
+    draws = {symbol: values[2, 5] for symbol, values in posterior.solution.draws.items()}
+    mean = draws["C10"] * x(STRETCH) + draws.get("m0", 0.0)
+    covariance = (0.04 + draws.get("S", 0.0) ** 2) * np.eye(14)
+    if name == "gp":
+        covariance = covariance + kernel(STRETCH, STRETCH, draws["c"], draws["psi"])
+    whole = multivariate_normal(mean, covariance).logpdf(DATA.stress)
+    found = pointwise_log_likelihood(posterior.solution)[2, 5]
+    for i in range(14):
+        rest = np.delete(np.arange(14), i)
+        others = multivariate_normal(mean[rest], covariance[np.ix_(rest, rest)]).logpdf(DATA.stress[rest])
+        assert found[i] == pytest.approx(whole - others, abs=1e-6)
+
+
+def test_coverage_counts_the_measurements_inside():
+    posterior = tq.fit(DATA, discrepancy="none", noise_sd=0.2)
+    table = posterior.predict(STRETCH)
+    inside = ((table["low"] <= DATA.stress) & (DATA.stress <= table["high"])).mean()
+    assert posterior.predictive_coverage() == inside
+
+
+@pytest.mark.parametrize(("stretch", "prob"), [([0.0], 0.95), ([-1.0], 0.95), ([np.nan], 0.95), ([1.0], 1.0)])
+def test_bad_requests_are_refused(stretch, prob):
+    with pytest.raises(tq.InputError):
+        tq.fit(DATA, discrepancy="none", noise_sd=0.2).predict(stretch, prob=prob)

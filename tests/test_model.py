@@ -1,0 +1,111 @@
+"""The model says which parameters are linear, sets default priors that fit the data, and refuses what cannot work."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.discrepancy import discrepancies, discrepancy_named
+from tissuq.mechanics import NeoHookean, Yeoh
+from tissuq.mechanics.material import materials
+from tissuq.model import StatisticalModel
+
+STRETCH = np.linspace(0.8, 1.6, 20)
+DATA = tq.simulate("yeoh", {"C10": 1.2, "C20": -0.057, "C30": 0.004}, STRETCH, 0.1, seed=1)
+
+
+def model(discrepancy="quadratic", material=None, noise_sd=0.1, **options):
+    return StatisticalModel(
+        DATA, material or NeoHookean(), discrepancy_named(discrepancy), noise_sd, **options
+    )
+
+
+def test_linear_and_nonlinear_parameters_are_told_apart_without_names():
+    assert model().linear == ("C10", "m0", "m1", "m2")
+    assert model().nonlinear == ("S",)
+    assert model("gp", noise_sd="unknown").nonlinear == ("psi", "c", "noise_sd")
+    log_normal = {"C10": tq.LogNormal(1, 1)}
+    assert model(chosen_priors=log_normal).nonlinear == ("C10", "S")
+
+
+@pytest.mark.parametrize("name", list(discrepancies()))
+@pytest.mark.parametrize("material", [kind() for kind in materials().values()], ids=lambda m: m.name)
+def test_default_boxes_hold_least_squares_with_a_margin(name, material):
+    shared = {p.symbol for p in material.parameters} & {p.symbol for p in discrepancy_named(name).parameters}
+    if shared:
+        with pytest.raises(tq.ModelError, match="no data can tell the two apart"):
+            model(name, material)
+        return
+    fitted = model(name, material)
+    best = np.linalg.lstsq(fitted.design, DATA.stress, rcond=None)[0]
+    for symbol, value in zip(fitted.column_symbols, best, strict=True):
+        low, high = fitted.priors[symbol].support
+        assert max(abs(low), high) >= 5 * abs(value)
+
+
+def test_the_default_prior_of_c10_is_the_same_for_every_discrepancy():
+    boxes = {name: model(name).priors["C10"] for name in discrepancies()}
+    assert len(set(boxes.values())) == 1
+
+
+def test_chosen_priors_replace_defaults():
+    chosen = {"m1": tq.Normal(0, 2), "S": tq.HalfNormal(0.5)}
+    assert model(chosen_priors=chosen).priors["m1"] == tq.Normal(0, 2)
+    assert model(chosen_priors=chosen).priors["S"] == tq.HalfNormal(0.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: model(noise_sd=0.0), "noise_sd must be a positive number"),
+        (lambda: model(noise_sd=-1.0), "noise_sd must be a positive number"),
+        (lambda: model(noise_sd=float("nan")), "noise_sd must be a positive number"),
+        (lambda: model(noise_sd="big"), "or 'unknown', not 'big'"),
+        (lambda: model("yeoh", Yeoh()), "adds C20, C30, which material 'yeoh' has already"),
+        (lambda: model(chosen_priors={"mu": tq.Uniform(0, 1)}), "a prior for 'mu'"),
+        (lambda: model(chosen_priors={"C10": tq.Uniform(-1, 1)}), "C10: .* reaches beyond"),
+        (lambda: model(chosen_priors={"S": tq.Uniform(-1, 1)}), "S: .* reaches beyond"),
+    ],
+)
+def test_what_cannot_work_is_refused_in_words(make, words):
+    with pytest.raises(tq.TissuqError, match=words):
+        make()
+
+
+def test_fewer_points_than_parameters_are_refused():
+    few = tq.Experiment("uniaxial", [0.9, 1.1, 1.2], [-0.3, 0.3, 0.5])
+    with pytest.raises(tq.InputError, match="3 measurements for 5 parameters"):
+        tq.fit(few, discrepancy="quadratic", noise_sd=0.1)
+
+
+def test_stretches_that_cannot_separate_the_parameters_are_refused():
+    same = tq.Experiment("uniaxial", [1.2] * 6, [0.5, 0.4, 0.6, 0.5, 0.5, 0.4])
+    with pytest.raises(tq.ModelError, match="cannot separate"):
+        tq.fit(same, discrepancy="constant", noise_sd=0.1)
+
+
+def test_data_without_any_stress_are_refused():
+    nothing = tq.Experiment("uniaxial", [0.9, 1.1, 1.2], [0.0, 0.0, 0.0])
+    with pytest.raises(tq.InputError, match="every stress is zero"):
+        tq.fit(nothing, discrepancy="none", noise_sd=0.1)
+
+
+def test_unknown_noise_beside_a_free_independent_error_is_said_to_be_confounded():
+    posterior = tq.fit(DATA, discrepancy="constant")
+    assert any("only noise_sd^2 + S^2 is in the data" in text for text in posterior.warnings)
+    assert tq.fit(DATA, discrepancy="constant", noise_sd=0.1).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"sampler": "hmc"}, "no sampler 'hmc'"),
+        ({"seed": -1}, "whole number"),
+        ({"material": "neohooke"}, "Did you mean 'neo-hookean'"),
+        ({"discrepancy": "gauss"}, "no discrepancy named 'gauss'"),
+    ],
+)
+def test_bad_arguments_of_fit_are_refused_in_words(options, words):
+    with pytest.raises(tq.TissuqError, match=words):
+        tq.fit(DATA, **({"discrepancy": "none"} | options))

@@ -1,0 +1,84 @@
+"""Every prior is a normalised density, and SciPy's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from tissuq import Exponential, HalfCauchy, HalfNormal, InputError, LogNormal, Normal, Uniform
+from tissuq.mechanics.stress import differentiator
+from tissuq.priors import Prior, prior_from
+from tissuq.registry import variants
+
+CASES = [
+    (Uniform(-2, 3), stats.uniform(-2, 5)),
+    (Normal(1.5, 0.7), stats.norm(1.5, 0.7)),
+    (Normal(1.5, 0.7, low=0.0), stats.truncnorm(-1.5 / 0.7, np.inf, 1.5, 0.7)),
+    (Normal(1.5, 0.7, low=1.0, high=2.0), stats.truncnorm(-0.5 / 0.7, 0.5 / 0.7, 1.5, 0.7)),
+    (HalfNormal(0.4), stats.halfnorm(0, 0.4)),
+    (HalfCauchy(0.3), stats.halfcauchy(0, 0.3)),
+    (Exponential(2.5), stats.expon(0, 2.5)),
+    (LogNormal(0.8, 0.6), stats.lognorm(0.6, 0, 0.8)),
+]
+EVERY = pytest.mark.parametrize(("prior", "law"), CASES, ids=[str(prior) for prior, _ in CASES])
+PROBABILITIES = np.array([0.01, 0.2, 0.5, 0.9, 0.999])
+
+
+def test_every_distribution_is_among_the_cases():
+    assert {type(prior) for prior, _ in CASES} == set(variants(Prior).values())
+
+
+@EVERY
+def test_density_and_quantiles_are_scipys(prior, law):
+    values = law.ppf(PROBABILITIES)
+    np.testing.assert_allclose(prior.quantile(PROBABILITIES), values, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(prior.log_density(values), law.logpdf(values), rtol=1e-10, atol=1e-12)
+    assert prior.support == pytest.approx(law.support())
+
+
+@EVERY
+def test_the_density_integrates_to_one(prior, law):
+    low, high = prior.support
+    total, _ = integrate.quad(lambda x: float(np.exp(prior.log_density(x))), low, high)
+    assert total == pytest.approx(1, abs=1e-6)
+
+
+@EVERY
+def test_a_change_of_unit_keeps_probabilities(prior, law):
+    scaled = prior.scaled(1000.0)
+    np.testing.assert_allclose(scaled.quantile(PROBABILITIES), 1000 * law.ppf(PROBABILITIES), rtol=1e-9)
+
+
+@EVERY
+def test_the_plain_form_gives_the_prior_back(prior, law):
+    assert prior_from(prior.as_dict()) == prior
+
+
+@EVERY
+def test_jax_sees_the_same_density(prior, law):
+    jnp = differentiator().numpy
+    value = law.ppf(0.3)
+    assert float(prior.log_density(jnp.asarray(value))) == pytest.approx(law.logpdf(value), rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Uniform(1, 1), "low must be less"),
+        (lambda: Normal(0, -1), "sd must be positive"),
+        (lambda: Normal(0, 1, low=2, high=1), "low must be less"),
+        (lambda: HalfNormal(float("nan")), "must be a finite number"),
+        (lambda: Uniform(0, float("inf")), "must be a finite number"),
+        (lambda: LogNormal(-1, 1), "must be positive"),
+        (lambda: prior_from({"distribution": "unifrom", "low": 0, "high": 1}), "Did you mean 'uniform'"),
+        (lambda: prior_from({"distribution": "uniform", "low": 0}), "needs low and high"),
+        (
+            lambda: prior_from({"distribution": "normal", "mean": 0, "sd": 1, "scale": 2}),
+            "may have low and high",
+        ),
+    ],
+)
+def test_a_bad_prior_is_refused_in_words(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
