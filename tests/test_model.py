@@ -16,9 +16,7 @@ DATA = tq.simulate("yeoh", {"C10": 1.2, "C20": -0.057, "C30": 0.004}, STRETCH, 0
 
 
 def model(discrepancy="quadratic", material=None, noise_sd=0.1, **options):
-    return StatisticalModel(
-        DATA, material or NeoHookean(), discrepancy_named(discrepancy), noise_sd, **options
-    )
+    return StatisticalModel(DATA, material or NeoHookean(), discrepancy_named(discrepancy), noise_sd, **options)
 
 
 def test_linear_and_nonlinear_parameters_are_told_apart_without_names():

@@ -44,4 +44,4 @@ def test_the_file_holds_every_group_and_arviz_reads_it(posterior, tmp_path):
 
 def test_independent_draws_have_the_effective_size_of_their_number(posterior):
     ess = arviz_stats.ess(posterior.data["posterior"].dataset)
-    assert all(3200 < float(ess[symbol]) for symbol in ("C10", "c", "psi"))
+    assert all(float(ess[symbol]) > 3200 for symbol in ("C10", "c", "psi"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["ConvergenceError", "InputError", "ModelError", "TissuqError", "TissuqWarning"]
+__all__ = ["ConvergenceError", "InputError", "ModelError", "TissuqError"]
 
 
 class TissuqError(Exception):
@@ -19,7 +19,3 @@ class ModelError(TissuqError):
 
 class ConvergenceError(TissuqError):
     """A numerical method could not reach its tolerance."""
-
-
-class TissuqWarning(UserWarning):
-    """A result that stands but needs the reader's attention."""

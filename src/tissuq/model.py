@@ -91,9 +91,7 @@ class StatisticalModel:
     def linear(self) -> tuple[str, ...]:
         """Parameters that can be integrated in closed form: stress linear in them, prior uniform or Gaussian."""
         return tuple(
-            p.symbol
-            for p in self.parameters
-            if p.is_linear and isinstance(self.priors[p.symbol], Uniform | Normal)
+            p.symbol for p in self.parameters if p.is_linear and isinstance(self.priors[p.symbol], Uniform | Normal)
         )
 
     @cached_property
@@ -115,9 +113,7 @@ class StatisticalModel:
     def basis(self, stretch: FloatArray) -> FloatArray:
         """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,)."""
         mode = self.experiment.mode
-        return np.hstack(
-            [stress_basis(self.material, mode, stretch), self.discrepancy.mean_basis(mode, stretch)]
-        )
+        return np.hstack([stress_basis(self.material, mode, stretch), self.discrepancy.mean_basis(mode, stretch)])
 
     @cached_property
     def design(self) -> FloatArray:
@@ -206,6 +202,6 @@ class StatisticalModel:
         lengths = np.linalg.norm(self.design, axis=0)
         if not lengths.all() or np.linalg.cond(self.design / lengths) > 1e10:
             raise ModelError(
-                f"the stretches of experiment '{name}' cannot separate the parameters {', '.join(self.column_symbols)}: "
-                "measure at more or other stretches, or choose a simpler material or discrepancy."
+                f"the stretches of experiment '{name}' cannot separate the parameters "
+                f"{', '.join(self.column_symbols)}: measure at more or other stretches, or choose a simpler material or discrepancy."
             )

@@ -100,9 +100,7 @@ class Posterior:
         """
         import pandas as pd
 
-        return pd.DataFrame(
-            vars(predict_band(self.solution, stretch, discrepancy=discrepancy, noise=noise, prob=prob))
-        )
+        return pd.DataFrame(vars(predict_band(self.solution, stretch, discrepancy=discrepancy, noise=noise, prob=prob)))
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""
@@ -137,13 +135,9 @@ class Posterior:
             "posterior_predictive": xr.Dataset(
                 {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, sample | point
             ),
-            "log_likelihood": xr.Dataset(
-                {"stress": (stress, pointwise_log_likelihood(solution))}, sample | point
-            ),
+            "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, sample | point),
             "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
-            "constant_data": xr.Dataset(
-                {"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point
-            ),
+            "constant_data": xr.Dataset({"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point),
         }
         tree = xr.DataTree.from_dict(groups)
         tree.attrs.update(self._labels())

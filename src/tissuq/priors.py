@@ -34,11 +34,7 @@ class Prior(ABC):
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if (
-                not isinstance(value, int | float)
-                or isnan(value)
-                or (abs(value) == inf and field.default is MISSING)
-            ):
+            if not isinstance(value, int | float) or isnan(value) or (abs(value) == inf and field.default is MISSING):
                 raise InputError(f"prior {self.name}: {field.name} must be a finite number, not {value!r}.")
         self._check()
 

@@ -31,9 +31,7 @@ EVERY = pytest.mark.parametrize("name", list(discrepancies()))
 def covariance(discrepancy, stretch, values):
     total = discrepancy.independent_variance(values) * np.eye(len(stretch))
     if discrepancy.is_correlated:
-        total = total + discrepancy.correlated_variance(values) * discrepancy.correlation(
-            stretch, stretch, values
-        )
+        total = total + discrepancy.correlated_variance(values) * discrepancy.correlation(stretch, stretch, values)
     return total
 
 

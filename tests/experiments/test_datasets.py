@@ -46,9 +46,7 @@ def test_a_table_has_the_columns_of_the_file():
 
 
 def test_simple_shear_is_refused_for_fitting_but_its_values_are_there():
-    with pytest.raises(
-        ModelError, match=r"simple shear, which cannot be fitted yet.*table\('brain-cortex-shear'\)"
-    ):
+    with pytest.raises(ModelError, match=r"simple shear, which cannot be fitted yet.*table\('brain-cortex-shear'\)"):
         datasets.load("brain-cortex-shear")
     shear = datasets.table("brain-cortex-shear")
     assert shear.shape == (17, 2)
@@ -57,9 +55,7 @@ def test_simple_shear_is_refused_for_fitting_but_its_values_are_there():
 
 @pytest.mark.parametrize("function", [datasets.load, datasets.table, datasets.path])
 def test_an_unknown_data_set_is_answered_with_those_there_are(function):
-    with pytest.raises(
-        InputError, match=r"no data set named 'brain-cortex'.*Did you mean.*rubber-treloar-uniaxial"
-    ):
+    with pytest.raises(InputError, match=r"no data set named 'brain-cortex'.*Did you mean.*rubber-treloar-uniaxial"):
         function("brain-cortex")
 
 

@@ -182,9 +182,7 @@ def test_the_heading_of_the_stress_gives_its_unit(written, heading):
     assert data.stress_unit == "kPa"
 
 
-@pytest.mark.parametrize(
-    "heading", ["stretch", "Stretch [-]", "stretch_ratio", "lambda", "λ", "Λ", "Stretch (mm/mm)"]
-)
+@pytest.mark.parametrize("heading", ["stretch", "Stretch [-]", "stretch_ratio", "lambda", "λ", "Λ", "Stretch (mm/mm)"])
 def test_the_stretch_is_recognised_by_its_name(written, heading):
     assert read_experiment(written(f"stress,{heading}\n0,1.0\n2,1.5\n")).stretch.tolist() == [1.0, 1.5]
 
@@ -367,9 +365,7 @@ def test_lines_may_end_in_any_way(tmp_path, end):
     assert "line 4, column 'stress': 'x'" in message(path)
 
 
-@pytest.mark.parametrize(
-    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1"]
-)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1"])
 def test_files_may_be_in_any_usual_encoding(tmp_path, encoding):
     path = tmp_path / "test.csv"
     path.write_bytes("stretch,stress [N/mm²]\n1.0,0.0\n1.1,2.0\n".encode(encoding))
@@ -378,17 +374,13 @@ def test_files_may_be_in_any_usual_encoding(tmp_path, encoding):
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", "   "])
 def test_cells_may_be_separated_in_any_usual_way(written, separator):
-    path = written(
-        "\n".join(separator.join(row) for row in [("stretch", "stress"), ("1.0", "0"), ("1.1", "2")])
-    )
+    path = written("\n".join(separator.join(row) for row in [("stretch", "stress"), ("1.0", "0"), ("1.1", "2")]))
     assert read_experiment(path).stretch.tolist() == [1.0, 1.1]
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " "])
 def test_decimal_commas_are_understood_with_every_separator_but_the_comma(written, separator):
-    path = written(
-        "\n".join(separator.join(row) for row in [("stretch", "stress"), ("1,0", "0"), ("1,1", "2,5e-1")])
-    )
+    path = written("\n".join(separator.join(row) for row in [("stretch", "stress"), ("1,0", "0"), ("1,1", "2,5e-1")]))
     data = read_experiment(path)
     assert data.stretch.tolist() == [1.0, 1.1]
     assert data.stress.tolist() == [0.0, 0.25]

@@ -98,9 +98,7 @@ def test_an_unknown_strain_unit_is_refused():
         strain_factor("mm")
 
 
-@pytest.mark.parametrize(
-    "text", ["[anything]", "(kPa)", "N/mm²", "mm/min", "s", "%", "°C", "1/s", "-", "1", ""]
-)
+@pytest.mark.parametrize("text", ["[anything]", "(kPa)", "N/mm²", "mm/min", "s", "%", "°C", "1/s", "-", "1", ""])
 def test_cells_of_a_units_row_look_like_units(text):
     assert looks_like_unit(text)
 

@@ -23,9 +23,7 @@ def test_a_point_returns_from_the_line(point):
 @pytest.mark.parametrize("distance", [1e-3, 1e-30, 1e-300])
 def test_a_distance_to_a_bound_at_zero_keeps_its_relative_accuracy(distance):
     box = Box([0.0, -10.0], [10.0, 0.0])
-    np.testing.assert_allclose(
-        box.from_line(box.to_line([distance, -distance])), [distance, -distance], rtol=1e-12
-    )
+    np.testing.assert_allclose(box.from_line(box.to_line([distance, -distance])), [distance, -distance], rtol=1e-12)
 
 
 @pytest.mark.parametrize("far", [-1e3, 1e3])

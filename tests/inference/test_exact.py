@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import FORMULATIONS, brute_force
 from scipy.stats import multivariate_normal, norm, truncnorm
 
 import tissuq as tq
+from oracle import FORMULATIONS, brute_force
 from tissuq.discrepancy import discrepancy_named
 from tissuq.inference.conditional import ConditionalGaussian
 from tissuq.inference.exact import solve_exactly
@@ -126,9 +126,7 @@ def test_a_bound_twenty_standard_deviations_away_is_still_right():
     posterior = tq.fit(data, discrepancy="none", noise_sd=0.02, priors={"C10": tq.Uniform(0, 10)})
     truth = truncnorm(20, np.inf, -20 * sd, sd)
     assert posterior.solution.marginals["C10"].mean == pytest.approx(truth.mean(), rel=0.02)
-    evidence = (
-        norm(0, 0.02).logpdf(data.stress + 20 * sd * x).sum() + np.log(np.sqrt(2 * np.pi) * sd) - np.log(10)
-    )
+    evidence = norm(0, 0.02).logpdf(data.stress + 20 * sd * x).sum() + np.log(np.sqrt(2 * np.pi) * sd) - np.log(10)
     assert posterior.log_evidence == pytest.approx(evidence + norm.logcdf(-20), abs=1e-6)
 
 
@@ -210,7 +208,7 @@ def test_a_prior_that_is_not_conjugate_is_integrated_numerically():
 
 def test_four_nonlinear_parameters_are_refused_with_the_reason(paper):
     priors = {"C10": tq.HalfNormal(2.0)}
-    with pytest.raises(tq.ModelError, match="at most 3 nonlinear parameters.*4 .*nuts"):
+    with pytest.raises(tq.ModelError, match=r"at most 3 nonlinear parameters.*4 .*nuts"):
         tq.fit(paper.experiment(), discrepancy="gp", priors=priors, sampler="exact")
 
 
@@ -219,9 +217,7 @@ def test_the_unit_of_stress_does_not_matter(formulation):
     stretch = np.linspace(0.7, 2.5, 20)
     first = tq.simulate("yeoh", TRUTH, stretch, 0.1, seed=3)
     other = tq.Experiment("uniaxial", stretch, 1000 * first.stress)
-    small, large = (
-        tq.fit(data, discrepancy=formulation, noise_sd=sd) for data, sd in ((first, 0.1), (other, 100.0))
-    )
+    small, large = (tq.fit(data, discrepancy=formulation, noise_sd=sd) for data, sd in ((first, 0.1), (other, 100.0)))
     assert large.log_evidence == pytest.approx(small.log_evidence - 20 * np.log(1000), abs=1e-5)
     a, b = (posterior.solution.marginals["C10"] for posterior in (small, large))
     assert b.mean == pytest.approx(1000 * a.mean, rel=1e-5)

@@ -98,9 +98,7 @@ def test_a_stiff_polynomial_with_unknown_noise_reaches_the_bar(noise):
     shape, rate = 0.5 * (count - terms - 1), 0.5 * squares
     mean_square = rate / (shape - 1)
     mean_noise = np.sqrt(rate) * np.exp(gammaln(shape - 0.5) - gammaln(shape))
-    variances = np.append(
-        mean_square * np.diag(np.linalg.inv(design.T @ design)), mean_square - mean_noise**2
-    )
+    variances = np.append(mean_square * np.diag(np.linalg.inv(design.T @ design)), mean_square - mean_noise**2)
     assert_moments(draws, np.append(coefficients, mean_noise), np.sqrt(variances))
 
 
@@ -149,9 +147,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
     short = NutsSettings(warmup=50, draws=20)
 
     def draw(seed):
-        return sample_nuts(
-            lambda x: -0.5 * x @ x, [-9.0] * 2, [9.0] * 2, [1.0] * 2, replace(short, seed=seed)
-        )
+        return sample_nuts(lambda x: -0.5 * x @ x, [-9.0] * 2, [9.0] * 2, [1.0] * 2, replace(short, seed=seed))
 
     first = draw(3).values
     assert first.shape == (4, 20, 2)
@@ -220,6 +216,4 @@ def test_names_that_do_not_fit_are_refused():
 
 def test_a_density_finite_only_at_its_start_cannot_be_sampled():
     with pytest.raises(ConvergenceError, match="not finite anywhere"):
-        sample_nuts(
-            lambda x: jnp.where(x[0] == 0.5, -((x[0] - 0.5) ** 2), jnp.nan), [-np.inf], [np.inf], [0.5]
-        )
+        sample_nuts(lambda x: jnp.where(x[0] == 0.5, -((x[0] - 0.5) ** 2), jnp.nan), [-np.inf], [np.inf], [0.5])

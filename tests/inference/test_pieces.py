@@ -17,9 +17,7 @@ ROOT = np.linalg.cholesky([[1.0, 0.6, 0.2], [0.6, 2.0, -0.3], [0.2, -0.3, 0.5]])
 def test_the_mass_in_a_box_is_scipys():
     box = Box(np.array([-0.5, -1.0, -np.inf]), np.array([1.0, 2.0, 0.3]))
     outside, log_inside = box.mass(np.zeros((1, 3)), ROOT[None])
-    truth = multivariate_normal(np.zeros(3), ROOT @ ROOT.T).cdf(
-        box.upper, lower_limit=np.array([-0.5, -1.0, -40])
-    )
+    truth = multivariate_normal(np.zeros(3), ROOT @ ROOT.T).cdf(box.upper, lower_limit=np.array([-0.5, -1.0, -40]))
     assert np.exp(log_inside[0]) == pytest.approx(truth, rel=2e-3)
     assert outside[0] >= 1 - truth
 
@@ -91,10 +89,7 @@ def test_the_hpd_of_an_exponential_starts_at_its_bound():
 
 
 def test_a_blend_is_the_mixture_of_its_parts():
-    parts = [
-        (w, marginal_of_mixture(np.ones(1), np.array([m]), np.array([1.0])))
-        for w, m in ((0.3, 0.0), (0.7, 2.0))
-    ]
+    parts = [(w, marginal_of_mixture(np.ones(1), np.array([m]), np.array([1.0]))) for w, m in ((0.3, 0.0), (0.7, 2.0))]
     both = marginal_of_mixture(np.array([0.3, 0.7]), np.array([0.0, 2.0]), np.ones(2))
     found = blended(parts, (-np.inf, np.inf))
     assert found.mean == pytest.approx(both.mean)

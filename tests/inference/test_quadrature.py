@@ -104,8 +104,7 @@ def test_the_density_of_the_warp_is_one_over_its_jacobian():
     step = 1e-6
     for point, expected in zip(u, log_density, strict=True):
         columns = [
-            (WARP.parameters(point[None] + step * e)[0] - WARP.parameters(point[None] - step * e)[0])[0]
-            / (2 * step)
+            (WARP.parameters(point[None] + step * e)[0] - WARP.parameters(point[None] - step * e)[0])[0] / (2 * step)
             for e in np.eye(3)
         ]
         jacobian = np.linalg.det(np.array(columns).T)

@@ -45,9 +45,7 @@ def test_a_conditioned_process_agrees_with_dense_linear_algebra(noise):
     V = kernel(STRETCH, STRETCH, c, psi) + 0.04 * np.eye(14)
     precision = x(STRETCH) @ np.linalg.solve(V, x(STRETCH)) + 0.7**-2
     b = (x(STRETCH) @ np.linalg.solve(V, DATA.stress) + 0.7**-2) / precision
-    components = Components(
-        np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]])
-    )
+    components = Components(np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]]))
     mean, variance = stress_moments(model, components, NEW, discrepancy=True, noise=noise)
 
     joint = kernel(STRETCH, STRETCH, c, psi) + 0.49 * np.outer(x(STRETCH), x(STRETCH)) + 0.04 * np.eye(14)

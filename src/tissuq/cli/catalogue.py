@@ -66,7 +66,5 @@ def _default(parameter: Parameter) -> str:
     if parameter.relative_prior is None:
         side = "positive, " if parameter.support[0] == 0 else ""
         return f"uniform, {side}to 10 times beyond least squares"
-    of_what = {"stress": "the largest stress", "stretch": "the stretch range", "number": "1"}[
-        parameter.dimension
-    ]
+    of_what = {"stress": "the largest stress", "stretch": "the stretch range", "number": "1"}[parameter.dimension]
     return f"{parameter.relative_prior} x {of_what}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from filecmp import cmp
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import load_settings, not_converged, parse_prior, progress
+from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
 from tissuq.errors import InputError
 
 __all__ = ["fit"]
@@ -17,9 +18,7 @@ def fit(
     file: Annotated[
         Path | None, typer.Argument(help="CSV file, or the name of a built-in data set (tissuq datasets).")
     ] = None,
-    material: Annotated[
-        str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")
-    ] = None,
+    material: Annotated[str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")] = None,
     discrepancy: Annotated[
         list[str] | None,
         typer.Option(help="Discrepancy; repeat for more; 'all' fits every one that applies [all]."),
@@ -36,9 +35,7 @@ def fit(
         list[str] | None,
         typer.Option(help="ROLE=COLUMN for stretch, strain or stress, such as stretch=Strain; repeat."),
     ] = None,
-    stress_unit: Annotated[
-        str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")
-    ] = None,
+    stress_unit: Annotated[str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")] = None,
     stress_type: Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")] = None,
     strain_unit: Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")] = None,
     compression_positive: Annotated[
@@ -59,22 +56,22 @@ def fit(
     from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
     options: dict[str, Any] = {
-        "file": str(_resolve(file)) if file else None, "material": material, "mode": mode,
+        "file": str(_resolve(file)) if file and not config else None, "material": material, "mode": mode,
         "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "stress_unit": stress_unit,
         "stress_type": stress_type, "strain_unit": strain_unit, "compression_positive": compression_positive,
         "skip_rows": skip_rows, "sampler": sampler, "seed": seed,
     }  # fmt: skip
     if prior:
-        options["priors"] = dict(parse_prior(text) for text in prior)
+        options["priors"] = once_each("--prior", map(parse_prior, prior))
     if column:
-        options["columns"] = dict(_role(text) for text in column)
+        options["columns"] = once_each("--column", map(_role, column))
     if not file and not config:
-        raise InputError(
-            "give a FILE of measurements, the name of a built-in data set, or --config run.toml."
-        )
+        raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     settings = load_settings(SpecimenSettings, config, options)
-    beside = Path() if file or config is None else config.parent
+    beside = config.parent if config else Path()
     source = beside / settings.file
+    if file and config:
+        _check_same(_resolve(file), source, config)
     target = out or Path("runs") / source.stem
     check_target(target, force=force)
     with progress() as step:
@@ -83,6 +80,8 @@ def fit(
         with run_folder(target, force=force) as folder:
             write_specimen_run(study, source, folder, figures=figures)
     print_summary(target)
+    for name, reason in study.skipped.items():
+        print(f"Not fitted: {name}: {reason}")
     not_converged(study.not_converged)
 
 
@@ -90,7 +89,21 @@ def _resolve(file: Path) -> Path:
     """Return the user's file, or the built-in data set of that name."""
     from tissuq.experiments import datasets
 
-    return datasets.path(str(file)) if not file.exists() and str(file) in datasets.names() else file
+    is_name = str(file) in datasets.names() and not file.exists()
+    return datasets.path(str(file)) if is_name else file
+
+
+def _check_same(file: Path, named: Path, config: Path) -> None:
+    """Refuse a FILE that is not what the configuration names."""
+    try:
+        same = cmp(file, named, shallow=False)
+    except OSError:
+        same = False
+    if not same:
+        raise InputError(
+            f"FILE '{file}' is not the file that '{config}' names, '{named}'. Leave FILE out to repeat that run, or "
+            "leave --config out to fit FILE."
+        )
 
 
 def _noise(text: str | None) -> float | str | None:
@@ -99,9 +112,7 @@ def _noise(text: str | None) -> float | str | None:
     try:
         return float(text)
     except ValueError as error:
-        raise InputError(
-            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'."
-        ) from error
+        raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error
 
 
 def _role(text: str) -> tuple[str, str | int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -15,9 +15,9 @@ from tissuq.priors import Prior
 from tissuq.registry import find
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
+    from pydantic import BaseModel, ValidationError
 
-__all__ = ["load_settings", "not_converged", "parse_prior", "progress"]
+__all__ = ["load_settings", "not_converged", "once_each", "parse_prior", "progress"]
 
 Settings = TypeVar("Settings", bound="BaseModel")
 
@@ -25,25 +25,36 @@ NOT_CONVERGED = 3
 
 
 def load_settings(kind: type[Settings], config: Path | None, options: dict[str, Any]) -> Settings:
-    """Return validated settings from a TOML file (or nothing) and the options given on the command line."""
+    """Return validated settings from a TOML file (or nothing) and the options of the command line, which prevail."""
     from pydantic import ValidationError
 
     given = _read_toml(config) if config else {}
-    given |= {name: value for name, value in options.items() if value is not None}
+    for name, value in options.items():
+        both = isinstance(value, dict) and isinstance(given.get(name), dict)
+        if value is not None:
+            given[name] = given[name] | value if both else value
     try:
         return kind.model_validate(given)
     except ValidationError as error:
         place = f"{config}: " if config else ""
-        raise InputError(place + "; ".join(_explain(item) for item in error.errors())) from error
+        raise InputError(place + "; ".join(_explanations(error, kind)) + ".") from error
+
+
+def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the pairs of a repeatable option as a dictionary, each name given once."""
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise InputError(f"{option} is given twice for '{name}'; give it once.")
+        found[name] = value
+    return found
 
 
 def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
     """Return the symbol and the prior of a text like ``C10=uniform(0, 5)``."""
     match = re.fullmatch(r"\s*(\w+)\s*=\s*([\w-]+)\s*\(([^()]*)\)\s*", text)
     if match is None:
-        raise InputError(
-            f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5)."
-        )
+        raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
     symbol, distribution, numbers = match.groups()
     known = fields(find(Prior, "prior distribution", distribution, InputError))
     try:
@@ -101,12 +112,25 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"configuration file '{path}' is not TOML: {error}.") from error
 
 
+def _explanations(error: ValidationError, kind: type[BaseModel]) -> list[str]:
+    """Return one sentence for each thing that is wrong; all unknown settings together are one."""
+    items = error.errors()
+    unknown = [_place(item) for item in items if item["type"] == "extra_forbidden"]
+    sentences = [_explain(item) for item in items if item["type"] != "extra_forbidden"]
+    if unknown:
+        settings = ", ".join(kind.model_fields)
+        sentences.append(f"there is no setting {', '.join(map(repr, unknown))}; the settings are {settings}")
+    return sentences
+
+
 def _explain(item: Any) -> str:
-    place = ".".join(str(part) for part in item["loc"])
-    message = str(item["msg"]).removeprefix("Value error, ")
-    found = (
-        ""
-        if item["type"] == "value_error" or isinstance(item["input"], dict)
-        else f" (it is {item['input']!r})"
-    )
+    place, message = _place(item), str(item["msg"]).removeprefix("Value error, ").rstrip(".")
+    if item["type"] == "missing":
+        return f"setting '{place}' is missing"
+    is_told = item["type"] == "value_error" or isinstance(item["input"], dict)
+    found = "" if is_told else f" (it is {item['input']!r})"
     return f"{place}: {message}{found}" if place else f"{message}{found}"
+
+
+def _place(item: Any) -> str:
+    return ".".join(str(part) for part in item["loc"])

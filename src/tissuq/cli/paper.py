@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tissuq.cli.options import load_settings, not_converged, parse_prior, progress
+from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
 
 __all__ = ["paper"]
 
@@ -26,9 +26,7 @@ def paper(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of noise and draws [2021].")] = None,
     sampler: Annotated[str | None, typer.Option(help="exact, nuts or both [exact].")] = None,
-    replicates: Annotated[
-        int | None, typer.Option(help="Data sets over which every claim is checked [1].")
-    ] = None,
+    replicates: Annotated[int | None, typer.Option(help="Data sets over which every claim is checked [1].")] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures, too.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
@@ -45,7 +43,7 @@ def paper(
         "sampler": sampler, "replicates": replicates,
     }  # fmt: skip
     if prior:
-        options["priors"] = dict(parse_prior(text) for text in prior)
+        options["priors"] = once_each("--prior", map(parse_prior, prior))
     settings = load_settings(PaperSettings, config, options)
     check_target(out, force=force)
     with progress(steps_of(settings)) as step:

@@ -26,7 +26,9 @@ class GaussianProcess(Discrepancy):
     source = "Zeraatpisheh et al. 2021, eq. 25 and 26"
     parameters = (c, psi)
     shape_symbols = ("psi",)
-    caution = "The process takes a share of the initial stiffness, and how much depends on the prior of its amplitude c."
+    caution = (
+        "The process takes a share of the initial stiffness, and how much depends on the prior of its amplitude c."
+    )
 
     def correlated_variance(self, values: Mapping[str, Any]) -> Any:
         return values["c"] ** 2

@@ -1,0 +1,1 @@
+"""What was measured: experiments, loading modes, reading of laboratory files, built-in data."""

@@ -125,9 +125,7 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
             'as in columns={"strain": "Strain"} or --column strain=Strain.'
         )
     if "stretch" in mapping and "strain" in mapping:
-        raise InputError(
-            f"{table.file}: columns are given for both stretch and strain; give only one of them."
-        )
+        raise InputError(f"{table.file}: columns are given for both stretch and strain; give only one of them.")
 
 
 def _find(table: Table, role: str, wanted: str | int) -> int:
@@ -178,9 +176,7 @@ def _stress_hint(table: Table, stress_type: str) -> str:
 
 def _ambiguous(table: Table, role: str, found: Sequence[int]) -> InputError:
     fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in found)
-    return InputError(
-        f"{table.file}: several columns may be the {role}: {fitting}. {_how_to_say(table, role)}"
-    )
+    return InputError(f"{table.file}: several columns may be the {role}: {fitting}. {_how_to_say(table, role)}")
 
 
 def _columns_there_are(table: Table) -> str:
@@ -193,8 +189,7 @@ def _columns_there_are(table: Table) -> str:
 def _how_to_say(table: Table, role: str) -> str:
     if not any(table.names):
         return (
-            'Say by number which is which: columns={"stretch": 1, "stress": 2} or '
-            "--column stretch=1 --column stress=2."
+            'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
         )
     return f'Say which it is by name or number: columns={{"{role}": "NAME"}} or --column {role}=NAME.'
 

@@ -98,8 +98,6 @@ def _column(name: str, values: Any) -> NDArray[np.float64]:
         raise InputError(f"{name} must be a one-dimensional array with values, not of shape {column.shape}.")
     bad = np.flatnonzero(~np.isfinite(column))
     if len(bad):
-        raise InputError(
-            f"{name} is {column[bad[0]]} at position {bad[0]}; every value must be a finite number."
-        )
+        raise InputError(f"{name} is {column[bad[0]]} at position {bad[0]}; every value must be a finite number.")
     column.flags.writeable = False
     return column

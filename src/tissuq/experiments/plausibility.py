@@ -34,9 +34,7 @@ def check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
     row = int(np.argmin(stretch))
     if stretch[row] <= 0:
         row = int(np.flatnonzero(stretch <= 0)[0])
-        raise InputError(
-            f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}"
-        )
+        raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
     if stretch.max() < COMPRESSED_LIMIT and not choice.is_strain:
         raise InputError(
             f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "

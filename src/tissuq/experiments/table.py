@@ -96,9 +96,7 @@ class Table:
                         f"{marks['.']}, {marks[',']}. Write all numbers in one way, "
                         "without thousands separators."
                     )
-        return InputError(
-            f"{self.file}: columns {' and '.join(map(self.label, columns))} do not hold numbers."
-        )
+        return InputError(f"{self.file}: columns {' and '.join(map(self.label, columns))} do not hold numbers.")
 
 
 def read_table(path: str | os.PathLike[str], skip_rows: int = 0) -> Table:
@@ -180,23 +178,13 @@ def _check_shape(table: Table, header: str) -> None:
     )
     for line, row in zip(table.lines, table.rows, strict=True):
         if '"' in row and row.count('"') % 2:
-            raise InputError(
-                f"{table.file}, line {line}: a quotation mark has no partner: {row.strip()[:80]}"
-            )
-        may_be_long = (
-            len(row.split()) > width if table.separator == WHITESPACE else row.count(table.separator) >= width
-        )
+            raise InputError(f"{table.file}, line {line}: a quotation mark has no partner: {row.strip()[:80]}")
+        may_be_long = len(row.split()) > width if table.separator == WHITESPACE else row.count(table.separator) >= width
         if may_be_long:
             cells = split(row, table.separator)
             if any(cells[width:]):
-                raise InputError(
-                    f"{table.file}, line {line} has {len(cells)} cells, but {header} has {width}.{hint}"
-                )
-    if (
-        table.separator == ","
-        and not any(table.names)
-        and not any("." in row or '"' in row for row in table.rows)
-    ):
+                raise InputError(f"{table.file}, line {line} has {len(cells)} cells, but {header} has {width}.{hint}")
+    if table.separator == "," and not any(table.names) and not any("." in row or '"' in row for row in table.rows):
         raise InputError(
             f"{table.file} has no column names and no decimal points, so its commas may be decimal commas or "
             f"separators (line {table.lines[0]}: {table.rows[0].strip()[:80]}). Separate the columns by "

@@ -33,9 +33,7 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     text = _decoded(path, _content(Path(path)))
     lines = text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if len(max(lines, key=len)) > LONGEST_LINE:
-        raise InputError(
-            f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form."
-        )
+        raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines
 
 

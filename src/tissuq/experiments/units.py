@@ -104,9 +104,7 @@ def strain_factor(text: str) -> float:
     """
     compact = re.sub(r"\s+", "", str(text)).lower()
     if compact not in STRAIN_UNITS:
-        raise InputError(
-            f"'{text}' is not a unit of strain; write '%', or '1' (also 'mm/mm') for a plain ratio."
-        )
+        raise InputError(f"'{text}' is not a unit of strain; write '%', or '1' (also 'mm/mm') for a plain ratio.")
     return STRAIN_UNITS[compact]
 
 
@@ -115,11 +113,7 @@ def looks_like_unit(text: str) -> bool:
     text = text.strip()
     if re.fullmatch(r"\[.*\]|\(.*\)|[%‰°1-]|", text):
         return True
-    symbols = [
-        symbol
-        for symbol in re.split(r"[\s\d·*/.^%°⁻²³-]+", text.replace("µ", "u").replace("μ", "u"))
-        if symbol
-    ]
+    symbols = [symbol for symbol in re.split(r"[\s\d·*/.^%°⁻²³-]+", text.replace("µ", "u").replace("μ", "u")) if symbol]
     return bool(symbols) and all(symbol in SYMBOLS for symbol in symbols)
 
 

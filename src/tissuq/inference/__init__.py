@@ -1,0 +1,1 @@
+"""How a posterior is found: exactly where possible, sampled where needed."""

@@ -48,13 +48,13 @@ class Box:
             else:
                 part = Box(self.lower[kept], self.upper[kept])
                 covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
-                weights, _ = part.points(mean[crossed][:, kept], np.linalg.cholesky(covariance))
+                weights, _ = part.points(
+                    mean[crossed][:, kept], np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+                )
                 log_inside[crossed] = np.log(np.maximum(weights.mean(1), SMALLEST))
         return outside, log_inside
 
-    def points(
-        self, mean: FloatArray, root: FloatArray, number: int = POINTS
-    ) -> tuple[FloatArray, FloatArray]:
+    def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
         """Return weights (N, P) and P = number points (N, P, p) inside the box, distributed as the bounded Gaussian.
 
         The mean weight is the mass inside.
@@ -75,9 +75,7 @@ class Box:
         return weights, points
 
 
-def _truncated_quantile(
-    probability: FloatArray, low: FloatArray, high: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _truncated_quantile(probability: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return quantiles of a standard normal between bounds, and the mass between them; right in both tails."""
     from scipy.special import ndtr, ndtri
 

@@ -81,9 +81,7 @@ class ConditionalGaussian:
         whitened = np.einsum("nij,nj->ni", inverse_root, pull)
         root = self._inverse @ inverse_root.swapaxes(1, 2)
         mean = self._centre + np.einsum("nij,nj->ni", root, whitened)
-        log_volume = (
-            -np.log(np.einsum("nii->ni", cholesky)).sum(1) - np.log(np.abs(np.diag(self._triangle))).sum()
-        )
+        log_volume = -np.log(np.einsum("nii->ni", cholesky)).sum(1) - np.log(np.abs(np.diag(self._triangle))).sum()
         exponent = misfit - (whitened**2).sum(1) + log_determinant
         n = len(self.model.experiment)
         log_likelihood = -0.5 * (exponent + (n - p) * log(2 * pi)) + log_volume + self._log_prior_constant

@@ -85,9 +85,7 @@ class Box:
         object.__setattr__(self, "lower", np.atleast_1d(np.asarray(lower, dtype=np.float64)))
         object.__setattr__(self, "upper", np.atleast_1d(np.asarray(upper, dtype=np.float64)))
         if self.lower.shape != self.upper.shape or self.lower.ndim != 1:
-            raise InputError(
-                f"the bounds need one shape (d,); found {self.lower.shape} and {self.upper.shape}."
-            )
+            raise InputError(f"the bounds need one shape (d,); found {self.lower.shape} and {self.upper.shape}.")
         if not np.all(self.lower < self.upper):
             index = int(np.argmin(self.lower < self.upper))
             found = f"{self.lower[index]} is not below {self.upper[index]}"
@@ -133,9 +131,7 @@ class Box:
         if not inside.all():
             index = int(np.argmin(inside))
             bounds = f"({self.lower[index]}, {self.upper[index]})"
-            raise InputError(
-                f"coordinate {index} of the point is {point[index]}; it must lie inside {bounds}."
-            )
+            raise InputError(f"coordinate {index} of the point is {point[index]}; it must lie inside {bounds}.")
         above_lower, below_upper = point - self.lower, self.upper - point
         nearer = np.minimum(above_lower, below_upper)
         lower_quantile = ndtri(np.minimum(nearer / self.width, 0.5))
@@ -238,9 +234,7 @@ def find_modes(
     """
     line = box.to_line(start)
     if not _is_finite(derivatives(line)):
-        raise InputError(
-            f"the log density or its derivatives are not finite at {np.asarray(start)}; start elsewhere."
-        )
+        raise InputError(f"the log density or its derivatives are not finite at {np.asarray(start)}; start elsewhere.")
     first = _climb(derivatives, line)
     # A standard normal variable on the line is a uniform one between two bounds.
     centre = np.where(box.is_bounded, 0.0, first.location)

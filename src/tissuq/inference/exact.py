@@ -35,8 +35,9 @@ def is_exact(model: StatisticalModel) -> bool:
 def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
     """Return the posterior and the evidence of a model with at most three nonlinear parameters.
 
-    Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the linear parameters that cut off less than 1e-8 of the
-    posterior leave it a mixture of Gaussians; where they cut off more, it is represented by points within them.
+    Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
+    linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
+    off more, it is represented by points within them. The error given with the evidence is that of the quadrature.
 
     Parameters
     ----------
@@ -125,8 +126,6 @@ def _draw(components: Components, seed: int) -> tuple[NDArray[np.intp], FloatArr
 
 def _reason(model: StatisticalModel, is_bounded: bool) -> str:
     linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
-    nonlinear = (
-        f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
-    )
+    nonlinear = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
     bounds = "; bounds of the linear parameters cut the posterior and were honoured" if is_bounded else ""
     return f"{linear}; {nonlinear}{bounds}"

@@ -60,9 +60,7 @@ def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float,
     return Spectrum(vectors, singular**2)
 
 
-def _pivoted_root(
-    correlation: Callable[[FloatArray, FloatArray], FloatArray], points: FloatArray
-) -> FloatArray:
+def _pivoted_root(correlation: Callable[[FloatArray, FloatArray], FloatArray], points: FloatArray) -> FloatArray:
     n = len(points)
     root = np.zeros((n, n if n <= 64 else 64))
     remaining = np.ones(n)

@@ -40,11 +40,11 @@ class Marginal:
 
     def pdf(self, values: ArrayLike) -> FloatArray:
         """Return the posterior density at values (zero outside the table)."""
-        return np.interp(values, self.points, self.density, left=0.0, right=0.0)
+        return np.asarray(np.interp(np.asarray(values), self.points, self.density, left=0.0, right=0.0))
 
     def quantile(self, probability: ArrayLike) -> FloatArray:
         """Return the values below which the given probabilities lie."""
-        return np.interp(probability, self.cumulative, self.points)
+        return np.asarray(np.interp(np.asarray(probability), self.cumulative, self.points))
 
     def hdi(self, prob: float = 0.95) -> tuple[float, float]:
         """Return the shortest interval that holds ``prob`` of the posterior (95 % HPD for 0.95)."""
@@ -106,7 +106,7 @@ def marginal_of_points(points: FloatArray, weights: FloatArray, bounds: tuple[fl
     weights = weights / weights.sum()
     mean = float(weights @ points)
     sd = float(np.sqrt(weights @ (points - mean) ** 2))
-    bandwidth = 0.9 * sd * (weights @ weights) ** 0.2
+    bandwidth = 0.9 * sd * float(weights @ weights) ** 0.2
     low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
     is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
     heights, edges = np.histogram(points, bins=800, weights=weights)
@@ -115,7 +115,7 @@ def marginal_of_points(points: FloatArray, weights: FloatArray, bounds: tuple[fl
         centres = mean + (centres - mean) * np.sqrt(1 - (bandwidth / sd) ** 2)
     grid = np.linspace(low, high, GRID)
     images = [centres, 2 * low - centres, 2 * high - centres] if is_cut else [centres]
-    density = sum(_kernel(grid, image, bandwidth) @ heights for image in images)
+    density = np.sum([_kernel(grid, image, bandwidth) @ heights for image in images], axis=0)
     steps = 0.5 * (density[1:] + density[:-1]) * np.diff(grid)
     return Marginal(mean, sd, grid, density, _proper(np.concatenate([[0.0], np.cumsum(steps)])))
 
@@ -125,9 +125,7 @@ def _kernel(grid: FloatArray, centres: FloatArray, bandwidth: float) -> FloatArr
     return np.asarray(np.exp(-0.5 * scores**2) / (bandwidth * np.sqrt(2 * np.pi)))
 
 
-def _merged(
-    weights: FloatArray, means: FloatArray, sds: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Merge Gaussians that are nearly the same (means within a 300th of the range, sds within 5 %), keeping moments."""
     if len(weights) <= FEW:
         return weights, means, sds
@@ -136,10 +134,10 @@ def _merged(
     place = np.floor((means - means.min()) / (np.ptp(means) / 300 + 1e-300)).astype(int)
     size = np.floor(np.log(sds / sds.min()) / 0.05).astype(int)
     _, group = np.unique(place * (size.max() + 1) + size, return_inverse=True)
-    total = np.bincount(group, weights)
+    total = np.asarray(np.bincount(group, weights), dtype=np.float64)
     mean = np.bincount(group, weights * means) / total
     variance = np.bincount(group, weights * (sds**2 + (means - mean[group]) ** 2)) / total
-    return total, mean, np.sqrt(variance)
+    return total, np.asarray(mean, dtype=np.float64), np.sqrt(variance)
 
 
 def blended(parts: list[tuple[float, Marginal]], bounds: tuple[float, float]) -> Marginal:
@@ -153,12 +151,9 @@ def blended(parts: list[tuple[float, Marginal]], bounds: tuple[float, float]) ->
     points = np.linspace(low, high, 2 * GRID)
     density = sum(weight * part.pdf(points) for weight, part in parts)
     cumulative = sum(
-        weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0)
-        for weight, part in parts
+        weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0) for weight, part in parts
     )
-    return Marginal(
-        mean, float(np.sqrt(variance)), points, np.asarray(density), _proper(np.asarray(cumulative))
-    )
+    return Marginal(mean, float(np.sqrt(variance)), points, np.asarray(density), _proper(np.asarray(cumulative)))
 
 
 def _proper(cumulative: FloatArray) -> FloatArray:

@@ -152,9 +152,7 @@ class NutsDraws:
             found = f"R-hat is {self.rhat[worst]:.3f} for {self.names[worst]} and must be below {MAX_RHAT}"
             failures.append((found, LONGER))
             if not self.rhat[worst] < SEPARATE_RHAT:
-                failures.append(
-                    ("the chains stay in different places", "a narrower prior that leaves one mode")
-                )
+                failures.append(("the chains stay in different places", "a narrower prior that leaves one mode"))
         for part, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
             worst = int(np.argmin(sizes))
             if not sizes[worst] > least_ess:
@@ -236,9 +234,7 @@ def sample_nuts(
     return NutsDraws(values, energies, int(divergent.sum()), gradients, labels)
 
 
-def _overdispersed(
-    derivatives: Derivatives, modes: Sequence[Mode], chains: int, generator: np.random.Generator
-) -> Any:
+def _overdispersed(derivatives: Derivatives, modes: Sequence[Mode], chains: int, generator: np.random.Generator) -> Any:
     """Return one starting state per chain, around the modes in turn, whitened at the first mode."""
     starts = [_start_around(derivatives, modes[chain % len(modes)], generator) for chain in range(chains)]
     positions, values, gradients = zip(*starts, strict=True)
@@ -256,9 +252,7 @@ def _start_around(
         value, gradient, _ = derivatives(line)
         if np.isfinite(value) and np.isfinite(gradient).all():
             return line, value, gradient
-    raise ConvergenceError(
-        f"the log density is not finite anywhere around its mode at {mode.location} on the line."
-    )
+    raise ConvergenceError(f"the log density is not finite anywhere around its mode at {mode.location} on the line.")
 
 
 class _Tuning(NamedTuple):
@@ -298,9 +292,7 @@ def _run(
             inverse_mass_matrix=tuning.inverse_mass,
         )
         states, info = jax.vmap(move)(keys, states)
-        tuned = _tune(
-            tuning, states.position, info.acceptance_rate, is_slow, ends_window, settings.target_acceptance
-        )
+        tuned = _tune(tuning, states.position, info.acceptance_rate, is_slow, ends_window, settings.target_acceptance)
         tuning = jax.tree.map(partial(jnp.where, is_warmup), tuned, tuning)
         return (states, tuning), (states.position, info.energy, info.is_divergent, info.num_integration_steps)
 

@@ -69,15 +69,15 @@ class Lines:
         whole = self.series[:, 0] * self.width
         passed = coordinates >= (self.start + self.width)[:, None]
         line, place, t = self._inside(coordinates)
-        integral = legendre.legint(self.series.T, lbnd=-1).T[line]
+        integral = np.asarray(legendre.legint(self.series.T, lbnd=-1).T, dtype=np.float64)[line]
         partial = 0.5 * self.width[line] * _row_values(integral, t)
-        return whole @ passed + np.bincount(place, partial, minlength=coordinates.shape[1])
+        return whole @ passed.astype(np.float64) + _summed(place, partial, coordinates.shape[1])
 
     def evaluate(self, coordinates: FloatArray, factor: FloatArray) -> FloatArray:
         """Return the sum over lines of their values at the coordinates (K, k) of each, times factors (K, k)."""
         line, place, t = self._inside(coordinates)
         values = _row_values(self.series[line], t) * factor[line, place]
-        return np.bincount(place, values, minlength=coordinates.shape[1])
+        return _summed(place, values, coordinates.shape[1])
 
     def _inside(self, coordinates: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
         t = 2 * (coordinates - self.start[:, None]) / self.width[:, None] - 1
@@ -169,9 +169,7 @@ def _first_cells(log_function: Callable[[FloatArray], FloatArray], dimension: in
     return _evaluated(log_function, corners, np.full(corners.shape, 1 / FIRST_CELLS))
 
 
-def _evaluated(
-    log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray
-) -> Cells:
+def _evaluated(log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray) -> Cells:
     points = _cell_points(lower, width, ORDERS[lower.shape[1]])
     values = log_function(points.reshape(-1, lower.shape[1])).reshape(points.shape[:2])
     return Cells(lower, width, np.where(np.isnan(values), -np.inf, values))
@@ -194,9 +192,7 @@ def _resolve(cells: Cells, top: float) -> tuple[FloatArray, FloatArray]:
     errors = np.empty(cells.lower.shape)
     across = _rule(order, dimension - 1)
     for side in range(dimension):
-        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1).reshape(
-            len(values), order, -1
-        )
+        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1).reshape(len(values), order, -1)
         coefficients = np.einsum("kj,cjo->cko", _to_legendre(order)[-2:], lines)
         errors[:, side] = volume * (np.abs(coefficients).sum(axis=1) @ across)
     return integrals, errors
@@ -226,6 +222,11 @@ def _finish(cells: Cells, top: float, integrals: FloatArray, error: float) -> Qu
     kept = np.flatnonzero(weights > 1e-12 * weights.max())
     points = _cell_points(cells.lower, cells.width, ORDERS[dimension]).reshape(-1, dimension)[kept]
     return Quadrature(cells, float(top + np.log(total)), error, points, weights[kept] / weights[kept].sum())
+
+
+def _summed(place: NDArray[np.intp], values: FloatArray, count: int) -> FloatArray:
+    """Return the sums of the values that belong to each of ``count`` places."""
+    return np.asarray(np.bincount(place, values, minlength=count), dtype=np.float64)
 
 
 def _row_values(series: FloatArray, t: FloatArray) -> FloatArray:

@@ -48,9 +48,7 @@ def solve_by_sampling(model: StatisticalModel, seed: int = 0, draws: int = 1000)
             f"{LARGEST_CORRELATED} measurements use the sampler 'exact', or thin the data."
         )
     supports = np.array([model.priors[symbol].support for symbol in model.symbols])
-    settings = NutsSettings(
-        draws=draws, seed=seed, target_acceptance=0.95 if model.discrepancy.is_correlated else 0.9
-    )
+    settings = NutsSettings(draws=draws, seed=seed, target_acceptance=0.95 if model.discrepancy.is_correlated else 0.9)
     density, (lower, upper) = joint_log_density(model), supports.T
     return _solution(model, sample_nuts(density, lower, upper, _start(model), settings, names=model.symbols))
 
@@ -110,11 +108,11 @@ def _solution(model: StatisticalModel, sampled: NutsDraws) -> Solution:
         for symbols in (model.nonlinear, model.linear)
     )
     components = Components(weights, settings, mean, np.zeros((count, mean.shape[1], mean.shape[1])))
-    by_symbol = [
+    rhat, ess_bulk, ess_tail = (
         dict(zip(model.symbols, map(float, column), strict=True))
         for column in (sampled.rhat, sampled.ess_bulk, sampled.ess_tail)
-    ]
-    diagnostics = Diagnostics(sampled.converged, sampled.verdict, *by_symbol, divergences=sampled.divergences)
+    )
+    diagnostics = Diagnostics(sampled.converged, sampled.verdict, rhat, ess_bulk, ess_tail, sampled.divergences)
     return Solution(
         model=model,
         route="nuts",

@@ -145,19 +145,17 @@ def _laplace(
         damping = max(damping / 8, 1e-8)
         if moved < STEP:
             break
-    return point, np.linalg.inv(_positive(curvature))
+    return point, np.asarray(np.linalg.inv(_positive(curvature)), dtype=np.float64)
 
 
-def _derivatives(
-    values: FloatArray, d: int, pairs: list[tuple[int, int]]
-) -> tuple[float, FloatArray, FloatArray]:
+def _derivatives(values: FloatArray, d: int, pairs: list[tuple[int, int]]) -> tuple[float, FloatArray, FloatArray]:
     """Return the value, gradient and negative Hessian from values on the stencil."""
     here, up, down, mixed = values[0], values[1 : d + 1], values[d + 1 : 2 * d + 1], values[2 * d + 1 :]
     hessian = np.diag((up - 2 * here + down) / STEP**2)
     for (i, j), both in zip(pairs, mixed, strict=True):
-        hessian[i, j] = hessian[j, i] = (
-            both - here - (up[i] - down[i] + up[j] - down[j]) / 2
-        ) / STEP**2 - 0.5 * (hessian[i, i] + hessian[j, j])
+        hessian[i, j] = hessian[j, i] = (both - here - (up[i] - down[i] + up[j] - down[j]) / 2) / STEP**2 - 0.5 * (
+            hessian[i, i] + hessian[j, j]
+        )
     return float(here), (up - down) / (2 * STEP), -hessian
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -31,7 +30,7 @@ class Material(ABC):
     """What a reader of its parameters must know."""
 
     @abstractmethod
-    def strain_energy(self, I1: Any, I2: Any, values: Sequence[Any]) -> Any:
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         """Return the strain energy per undeformed volume (MPa) for parameter values in their order."""
 
 

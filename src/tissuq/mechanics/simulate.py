@@ -70,6 +70,4 @@ def simulate(
     noise = noise_sd * np.random.default_rng(seed).standard_normal(len(exact))
     recipe = ", ".join(f"{symbol} = {value:g} MPa" for symbol, value in zip(symbols, values, strict=True))
     source = f"synthetic: {true_material.name} ({recipe}), noise sd {noise_sd:g} MPa, seed {seed}"
-    return Experiment(
-        true_mode, exact.stretch, stress + noise, name=f"synthetic {true_material.name}", source=source
-    )
+    return Experiment(true_mode, exact.stretch, stress + noise, name=f"synthetic {true_material.name}", source=source)

@@ -59,8 +59,9 @@ def stress_basis(material: Material, mode: LoadingMode, stretch: ArrayLike) -> N
 def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
     """Return 2 (dW/dI1 + dW/dI2) at the reference, in MPa."""
     jax = differentiator()
-    at_reference = jax.grad(lambda invariant: material.strain_energy(*invariant, np.asarray(values, float)))
-    return float(2 * at_reference(np.array([3.0, 3.0])).sum())
+    given = np.asarray(values, dtype=np.float64)
+    slope = jax.grad(lambda invariants: material.strain_energy(invariants[0], invariants[1], given))
+    return float(2 * slope(np.array([3.0, 3.0])).sum())
 
 
 @lru_cache(maxsize=256)
@@ -78,5 +79,5 @@ def differentiator() -> Any:
     """Return JAX in double precision, imported when it is first needed."""
     import jax
 
-    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
     return jax

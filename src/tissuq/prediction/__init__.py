@@ -1,0 +1,1 @@
+"""What a posterior predicts: bands with and without the discrepancy, and replicated data."""

@@ -73,9 +73,7 @@ def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -
     return float(np.mean((band.low <= data.stress) & (data.stress <= band.high)))
 
 
-def _mixture_quantile(
-    probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray
-) -> FloatArray:
+def _mixture_quantile(probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:
     """Return the quantile of a mixture of M Gaussians, at each of g places; safeguarded Newton iteration."""
     from scipy.special import ndtr, ndtri
 
@@ -94,4 +92,4 @@ def _mixture_quantile(
         density = weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
         step = value - excess / np.maximum(density, 1e-300)
         value = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-    return value
+    return np.asarray(value)

@@ -27,9 +27,7 @@ def write_data(folder: Path, experiment: Experiment) -> None:
     write_csv(folder / "data.csv", rows)
 
 
-def write_tables(
-    folder: Path, summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = ""
-) -> None:
+def write_tables(folder: Path, summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
     """Write summary.csv, summary.json and parameters.csv."""
     write_csv(folder / f"summary{suffix}.csv", summary)
     write_json(folder / f"summary{suffix}.json", summary)

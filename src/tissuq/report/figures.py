@@ -79,9 +79,7 @@ def predictive_figure(
                 label="mean without discrepancy",
             )
         if true_curve is not None:
-            axis.plot(
-                true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve"
-            )
+            axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
         axis.plot(experiment.stretch, experiment.stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
     limits = _common_limits(experiment.stress, [*bands.values()], unit)
     for axis in axes[: len(posteriors)]:
@@ -154,9 +152,7 @@ def _draw_marginal(
     height = marginal.pdf(values)
     holds = truth is None or low <= truth <= high
     color = BAND if holds else BASE
-    axis.fill_between(
-        values / unit.to_mpa, row, row + 0.8 * height / height.max(), color=color, alpha=0.35, lw=0
-    )
+    axis.fill_between(values / unit.to_mpa, row, row + 0.8 * height / height.max(), color=color, alpha=0.35, lw=0)
     axis.plot([low / unit.to_mpa, high / unit.to_mpa], [row, row], color=color, lw=4, solid_capstyle="butt")
     axis.plot(marginal.mean / unit.to_mpa, row, "o", color="white", mec=INK, ms=5, zorder=3)
 
@@ -177,6 +173,4 @@ def _label(figure: Figure, axes: list[Axes], count: int, unit: StressUnit) -> No
     for axis in axes[:count]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(
-        handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles), fontsize=9.5
-    )
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles), fontsize=9.5)

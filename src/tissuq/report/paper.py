@@ -71,9 +71,7 @@ def paper_figures(study: PaperStudy) -> dict[str, Figure]:
     for first, names in GROUPS.items():
         chosen = {name: posteriors[name] for name in names}
         for number, discrepancy in ((first, True), (first + 1, False)):
-            figures[f"figure{number}"] = predictive_figure(
-                chosen, discrepancy=discrepancy, unit=MPA, true_curve=curve
-            )
+            figures[f"figure{number}"] = predictive_figure(chosen, discrepancy=discrepancy, unit=MPA, true_curve=curve)
     figures["figure7"] = marginal_figure(posteriors, "C10", MPA, study.settings.truth["C10"])
     return figures
 
@@ -150,11 +148,7 @@ def _cells(study: PaperStudy) -> dict[str, Any]:
     ranges = list(dict.fromkeys((cell.stretch_low, cell.stretch_high) for cell in study.cells))
 
     def word(held: int) -> str:
-        return (
-            ("yes" if held else "no")
-            if study.settings.replicates == 1
-            else f"{held}/{study.settings.replicates}"
-        )
+        return ("yes" if held else "no") if study.settings.replicates == 1 else f"{held}/{study.settings.replicates}"
 
     return {
         "headers": [

@@ -34,9 +34,7 @@ def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
     """Return the rows of a summary as text, C10 in the given unit."""
     readable = []
     for row in rows:
-        mean, sd, low, high = (
-            row[f"C10_{key}"] / unit.to_mpa for key in ("mean", "sd", "hdi_low", "hdi_high")
-        )
+        mean, sd, low, high = (row[f"C10_{key}"] / unit.to_mpa for key in ("mean", "sd", "hdi_low", "hdi_high"))
         ends = interval(low, high, sd)
         readable.append(
             {
@@ -65,9 +63,7 @@ def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -
             parameter = next(p for p in posterior.model.parameters if p.symbol == symbol)
             is_stress = parameter.dimension == "stress"
             factor = unit.to_mpa if is_stress else 1.0
-            mean, sd, low, high = (
-                float(numbers[key]) / factor for key in ("mean", "sd", "hdi_low", "hdi_high")
-            )
+            mean, sd, low, high = (float(numbers[key]) / factor for key in ("mean", "sd", "hdi_low", "hdi_high"))
             ends = interval(low, high, sd)
             prior = str(posterior.model.priors[parameter.symbol].scaled(1 / factor))
             name = unit.name if is_stress else ""

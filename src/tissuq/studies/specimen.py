@@ -108,9 +108,7 @@ def run_specimen(
                 experiment,
                 material=settings.material,
                 discrepancy=name,
-                noise_sd=settings.noise_sd
-                if settings.noise_sd == "unknown"
-                else settings.noise_sd * unit.to_mpa,
+                noise_sd=settings.noise_sd if settings.noise_sd == "unknown" else settings.noise_sd * unit.to_mpa,
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
                 sampler=settings.sampler,
                 seed=settings.seed,
@@ -135,9 +133,7 @@ def _priors(settings: SpecimenSettings, names: list[str], unit: StressUnit) -> M
     known = {p.symbol: p for name in names for p in _parameters(settings, name)}
     unknown = sorted(set(settings.priors) - set(known))
     if unknown:
-        raise InputError(
-            f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(known)}."
-        )
+        raise InputError(f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(known)}.")
     return {
         symbol: prior_from(given).scaled(unit.to_mpa if known[symbol].dimension == "stress" else 1.0)
         for symbol, given in settings.priors.items()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from typing import Any
 
@@ -25,7 +24,7 @@ class NeoHookean(Material):
     source = "Treloar 1943"
     parameters = (C10,)
 
-    def strain_energy(self, I1: Any, I2: Any, values: Sequence[Any]) -> Any:
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         return values[0] * (I1 - 3)
 
 
@@ -38,7 +37,7 @@ class MooneyRivlin(Material):
     caution = "The initial shear modulus is 2 (C10 + C01), so do not read C10 alone as half of it."
     parameters = (C10, C01)
 
-    def strain_energy(self, I1: Any, I2: Any, values: Sequence[Any]) -> Any:
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         return values[0] * (I1 - 3) + values[1] * (I2 - 3)
 
 
@@ -50,6 +49,6 @@ class Yeoh(Material):
     source = "Yeoh 1993"
     parameters = (C10, C20, C30)
 
-    def strain_energy(self, I1: Any, I2: Any, values: Sequence[Any]) -> Any:
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         x = I1 - 3
         return x * (values[0] + x * (values[1] + x * values[2]))

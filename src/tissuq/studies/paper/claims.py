@@ -69,9 +69,7 @@ def _alone(name: str) -> Claim:
     return Claim(
         f"The model alone, without the discrepancy's share (eq. 28), does not describe the data: {name}.",
         lambda findings: not findings[name].passes_model_only,
-        lambda findings: (
-            f"{_count(findings[name].inside_model_only, findings[name])} inside the model's own band"
-        ),
+        lambda findings: f"{_count(findings[name].inside_model_only, findings[name])} inside the model's own band",
     )
 
 

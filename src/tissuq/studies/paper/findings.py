@@ -46,9 +46,7 @@ def find(posterior: Posterior, truth: float, base: Band | None = None) -> Findin
     band = predict_band(posterior.solution, data.stretch)
     alone = predict_band(posterior.solution, data.stretch, discrepancy=False)
     shift = np.abs(band.mean - base.mean).max() / np.abs(data.stress).max() if base else 0.0
-    inside, inside_alone = (
-        float(np.mean((b.low <= data.stress) & (data.stress <= b.high))) for b in (band, alone)
-    )
+    inside, inside_alone = (float(np.mean((b.low <= data.stress) & (data.stress <= b.high))) for b in (band, alone))
     width = float(np.mean(band.high - band.low))
     return Finding(
         low,
@@ -66,7 +64,5 @@ def find(posterior: Posterior, truth: float, base: Band | None = None) -> Findin
 def passes(share: float, measurements: int, prob: float = 0.95) -> bool:
     """Return whether a share inside a 95 % band is what chance allows: not in the lowest 2.5 % of a binomial law."""
     inside = round(share * measurements)
-    at_most = sum(
-        comb(measurements, k) * prob**k * (1 - prob) ** (measurements - k) for k in range(inside + 1)
-    )
+    at_most = sum(comb(measurements, k) * prob**k * (1 - prob) ** (measurements - k) for k in range(inside + 1))
     return at_most > 0.025

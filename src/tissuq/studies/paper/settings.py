@@ -42,16 +42,12 @@ class PaperSettings(BaseModel):
     points: int = Field(30, ge=6, le=10_000, description="number of measurements")
     stretch_low: float = Field(0.5, gt=0, description="smallest stretch")
     stretch_high: float = Field(4.25, gt=0, description="largest stretch")
-    noise_sd: float = Field(
-        0.5, gt=0, allow_inf_nan=False, description="standard deviation of the noise, MPa"
-    )
+    noise_sd: float = Field(0.5, gt=0, allow_inf_nan=False, description="standard deviation of the noise, MPa")
     seed: int = Field(2021, ge=0, description="seed of noise and draws")
     replicates: int = Field(1, ge=1, le=10_000, description="data sets over which the claims are checked")
     sampler: Literal["exact", "nuts", "both"] = "exact"
     truth: dict[str, float] = Field(default_factory=lambda: dict(TRUTH))
-    priors: dict[str, dict[str, Any]] = Field(
-        default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()}
-    )
+    priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
 
     @field_validator("priors")
     @classmethod
@@ -68,9 +64,7 @@ class PaperSettings(BaseModel):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.stretch_low >= self.stretch_high:
-            raise ValueError(
-                f"stretch_low {self.stretch_low:g} must be less than stretch_high {self.stretch_high:g}"
-            )
+            raise ValueError(f"stretch_low {self.stretch_low:g} must be less than stretch_high {self.stretch_high:g}")
         if sorted(self.truth) != sorted(TRUTH):
             raise ValueError(f"truth needs exactly {', '.join(TRUTH)}")
         return self
