@@ -203,5 +203,6 @@ class StatisticalModel:
         if not lengths.all() or np.linalg.cond(self.design / lengths) > 1e10:
             raise ModelError(
                 f"the stretches of experiment '{name}' cannot separate the parameters "
-                f"{', '.join(self.column_symbols)}: measure at more or other stretches, or choose a simpler material or discrepancy."
+                f"{', '.join(self.column_symbols)}: measure at more or other stretches, or choose a simpler "
+                "material or discrepancy."
             )

@@ -35,6 +35,7 @@ class Posterior:
     def __init__(self, solution: Solution, seed: int) -> None:
         self.solution = solution
         self.seed = seed
+        self._coverage: dict[tuple[bool, float], float] = {}
 
     @property
     def model(self) -> StatisticalModel:
@@ -104,7 +105,10 @@ class Posterior:
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""
-        return share_inside(self.solution, discrepancy=discrepancy, prob=prob)
+        asked = (discrepancy, prob)
+        if asked not in self._coverage:
+            self._coverage[asked] = share_inside(self.solution, discrepancy=discrepancy, prob=prob)
+        return self._coverage[asked]
 
     @cached_property
     def data(self) -> xr.DataTree:
@@ -145,7 +149,9 @@ class Posterior:
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
-        self.data.to_netcdf(path, engine="h5netcdf")
+        # The HDF5 library must not meet a full disk itself: it then fails at a place where no one can catch it.
+        content = self.data.to_netcdf(engine="h5netcdf")
+        Path(path).write_bytes(content)
 
     def _labels(self) -> dict[str, str | float]:
         model, solution = self.model, self.solution

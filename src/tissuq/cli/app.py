@@ -36,6 +36,9 @@ def main() -> None:
     except TissuqError as error:
         typer.echo(f"tissuq: {error}", err=True)
         sys.exit(2)
+    except OSError as error:
+        typer.echo(f"tissuq: {error}. Check the path, its permissions and the space on the disk.", err=True)
+        sys.exit(2)
     except SystemExit as end:
         if end.code == INTERRUPTED:
             typer.echo("tissuq: stopped; no run was written.", err=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -38,7 +38,7 @@ def paper(
     from tissuq.studies.paper.study import steps_of
 
     low, high = _range(stretch_range)
-    options = {
+    options: dict[str, Any] = {
         "points": points, "stretch_low": low, "stretch_high": high, "noise_sd": noise_sd, "seed": seed,
         "sampler": sampler, "replicates": replicates,
     }  # fmt: skip

@@ -30,7 +30,9 @@ def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
         table.add_column(header, justify="right" if place else "left", no_wrap=True)
     for row in rows:
         table.add_row(*row)
-    Console().print(table)
+    console = Console()
+    console.width = max(console.width, console.measure(table).minimum)  # a number cut short is no number
+    console.print(table)
 
 
 def print_summary(folder: Path) -> None:
@@ -41,15 +43,13 @@ def print_summary(folder: Path) -> None:
     InputError
         When the folder is not that of a complete run.
     """
-    from tissuq.report.rows import readable_summary
-
-    rows, unit, title = _read_run(folder)
+    rows, readable, unit, title = _read_run(folder)
     known = [row["contains_truth"] is not None for row in rows]
     sampled = any(row["rhat"] is not None for row in rows)
-    headers = ["formulation", f"C10, {unit.name}", "sd", "HPD low", "high", "log ev.", "in band", "alone"]
+    headers = ["formulation", f"C10, {unit}", "sd", "HPD low", "high", "log ev.", "in band", "alone"]
     headers += ["truth"] * any(known) + ["R-hat", "ESS"] * sampled
     table = []
-    for row in readable_summary(rows, unit):
+    for row in readable:
         cells = [row["formulation"], row["mean"], row["sd"], row["low"], row["high"], row["log_evidence"]]
         cells += [row["coverage"], row["coverage_model_only"]]
         cells += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * any(known)
@@ -62,19 +62,25 @@ def print_summary(folder: Path) -> None:
     print(f"Report: {folder / 'report.html'}")
 
 
-def _read_run(folder: Path) -> tuple[list[dict[str, Any]], Any, str]:
+def _read_run(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]], str, str]:
+    """Return the rows of the summary, the same for people, the unit of stress and a title."""
     import tomllib
 
     from tissuq.experiments.units import stress_unit
+    from tissuq.report.rows import readable_summary
+    from tissuq.studies.specimen import SpecimenSettings
 
+    unit, title = stress_unit("MPa"), "The study of the paper: neo-Hookean C10 under seven formulations"
     try:
-        rows = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         recipe = tomllib.loads((folder / RECIPE).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        rows = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        if "file" in recipe:
+            settings = SpecimenSettings.model_validate(recipe)
+            experiment = settings.experiment(folder)
+            unit = stress_unit(experiment.stress_unit)
+            title = f"{experiment.name}: {settings.material} with model uncertainty"
+        return rows, readable_summary(rows, unit), unit.name, title
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"'{folder}' is not the folder of a complete run: summary.json or {RECIPE} is missing or damaged."
         ) from error
-    if "file" not in recipe:
-        return rows, stress_unit("MPa"), "The study of the paper: neo-Hookean C10 under seven formulations"
-    name, material = Path(recipe["file"]).stem, recipe["material"]
-    return rows, stress_unit(recipe["stress_unit"]), f"{name}: {material} with model uncertainty"

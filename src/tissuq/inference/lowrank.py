@@ -31,9 +31,9 @@ class Spectrum:
 def correlation_spectrum(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
     """Return the spectrum of a discrepancy's correlation on points (n,), at a cost of n r^2 for numerical rank r.
 
-    Pivoted Cholesky finds a root of the matrix without forming it; its singular values give the rest. Smooth
+    Few points are decomposed directly, and remembered, because many data sets share their stretches. For many,
+    pivoted Cholesky finds a root of the matrix without forming it, and its singular values give the rest. Smooth
     kernels have a small numerical rank: about ten for a squared exponential as wide as half the data's range.
-    Spectra on few points are remembered, because many data sets share their stretches.
 
     Parameters
     ----------
@@ -55,6 +55,10 @@ def _remembered(discrepancy: Discrepancy, points: bytes, shape: tuple[float, ...
 
 def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
     values = dict(zip(discrepancy.shape_symbols, shape, strict=True))
+    if len(points) <= FEW_POINTS:
+        spectrum, vectors = np.linalg.eigh(discrepancy.correlation(points, points, values))
+        kept = spectrum > TOLERANCE * len(points)
+        return Spectrum(vectors[:, kept], spectrum[kept])
     root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points)
     vectors, singular, _ = np.linalg.svd(root, full_matrices=False)
     return Spectrum(vectors, singular**2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ __all__ = ["marginal_figure", "predictive_figure", "save_figure"]
 FloatArray = NDArray[np.float64]
 
 INK, BAND, BASE, TRUTH = "#222222", "#0072B2", "#8a8a8a", "#D55E00"
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -57,34 +57,37 @@ def predictive_figure(
     true_curve : (stretch, stress) arrays, MPa
         Drawn where it is known.
     """
-    figure, axes = _panels(len(posteriors))
-    experiment = next(iter(posteriors.values())).model.experiment
-    stretch = np.linspace(experiment.stretch.min(), experiment.stretch.max(), 161)
-    bands = {
-        name: predict_band(posterior.solution, stretch, discrepancy=discrepancy)
-        for name, posterior in posteriors.items()
-    }
-    for axis, (name, posterior) in zip(axes, posteriors.items(), strict=False):
-        share = share_inside(posterior.solution, discrepancy=discrepancy)
-        inside = f"{round(share * len(experiment))} of {len(experiment)} inside"
-        axis.set_title(f"{name}:  {inside}")
-        _draw_band(axis, bands[name], unit)
-        if name != "none" and "none" in bands:
-            axis.plot(
-                stretch,
-                bands["none"].mean / unit.to_mpa,
-                ":",
-                color=BASE,
-                lw=1.4,
-                label="mean without discrepancy",
-            )
-        if true_curve is not None:
-            axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
-        axis.plot(experiment.stretch, experiment.stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
-    limits = _common_limits(experiment.stress, [*bands.values()], unit)
-    for axis in axes[: len(posteriors)]:
-        axis.set_ylim(limits)
-    _label(figure, axes, len(posteriors), unit)
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):
+        figure, axes = _panels(len(posteriors))
+        experiment = next(iter(posteriors.values())).model.experiment
+        stretch = np.linspace(experiment.stretch.min(), experiment.stretch.max(), 161)
+        bands = {
+            name: predict_band(posterior.solution, stretch, discrepancy=discrepancy)
+            for name, posterior in posteriors.items()
+        }
+        for axis, (name, posterior) in zip(axes, posteriors.items(), strict=False):
+            share = share_inside(posterior.solution, discrepancy=discrepancy)
+            inside = f"{round(share * len(experiment))} of {len(experiment)} inside"
+            axis.set_title(f"{name}:  {inside}")
+            _draw_band(axis, bands[name], unit)
+            if name != "none" and "none" in bands:
+                axis.plot(
+                    stretch,
+                    bands["none"].mean / unit.to_mpa,
+                    ":",
+                    color=BASE,
+                    lw=1.4,
+                    label="mean without discrepancy",
+                )
+            if true_curve is not None:
+                axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
+            axis.plot(experiment.stretch, experiment.stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
+        limits = _common_limits(experiment.stress, [*bands.values()], unit)
+        for axis in axes[: len(posteriors)]:
+            axis.set_ylim(limits)
+        _label(figure, axes, len(posteriors), unit)
     return figure
 
 
@@ -104,7 +107,7 @@ def marginal_figure(
             axis.axvline(truth / unit.to_mpa, color=TRUTH, ls="--", lw=1.3, zorder=0)
             axis.text(
                 truth / unit.to_mpa, len(posteriors) - 0.12, f"true value {truth / unit.to_mpa:g}",
-                color=TRUTH, ha="center", va="bottom", fontsize=9,
+                color=TRUTH, ha="center", va="bottom", fontsize=9, bbox={"color": "white", "pad": 1.5},
             )  # fmt: skip
         axis.set_yticks(range(len(posteriors)), list(reversed(list(posteriors))))
         axis.tick_params(axis="y", length=0)
@@ -124,16 +127,18 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
 
 
 def _panels(count: int) -> tuple[Figure, list[Axes]]:
-    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    columns = 1 if count == 1 else 3 if count in (3, 5, 6, 7, 8, 9) else 2
+    columns = _columns(count)
     rows = ceil(count / columns)
-    with rc_context(STYLE):
-        width = {1: 6.0, 2: 9.2, 3: 11.5}[columns]
-        figure = Figure(figsize=(width, 3.3 * rows + 0.5))
-        axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    width = {1: 6.0, 2: 9.2, 3: 11.5}[columns]
+    figure = Figure(figsize=(width, 3.3 * rows + 0.5))
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
     return figure, list(axes.ravel())
+
+
+def _columns(count: int) -> int:
+    return 1 if count == 1 else 3 if count in (3, 5, 6, 7, 8, 9) else 2
 
 
 def _draw_band(axis: Axes, band: Band, unit: StressUnit) -> None:
@@ -165,12 +170,13 @@ def _common_limits(stress: FloatArray, bands: Sequence[Band], unit: StressUnit) 
 
 
 def _label(figure: Figure, axes: list[Axes], count: int, unit: StressUnit) -> None:
-    for spare in axes[count:]:
+    for spare, above in zip(axes[count:], axes[count - _columns(count) :], strict=False):
         spare.set_visible(False)
+        above.tick_params(labelbottom=True)
     figure.supxlabel("stretch", fontsize=10.5)
     figure.supylabel(f"engineering stress [{unit.name}]", fontsize=10.5)
-    handles: dict[str, object] = {}
+    handles: dict[str, Any] = {}
     for axis in axes[:count]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles), fontsize=9.5)
+    figure.legend(list(handles.values()), list(handles), loc="outside upper center", ncols=len(handles), fontsize=9.5)

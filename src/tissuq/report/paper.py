@@ -42,7 +42,8 @@ def write_paper_run(study: PaperStudy, folder: Path, *, figures: bool = True) ->
     figures : bool
         Without them the run is a matter of seconds.
     """
-    write_recipe(folder, "paper", study.settings)
+    command = "paper" if figures else "paper --no-figures"
+    write_recipe(folder, command, study.settings)
     write_data(folder, study.experiment)
     summary = _summary(study, study.main)
     write_tables(folder, summary, _posteriors(study.main))
@@ -55,7 +56,7 @@ def write_paper_run(study: PaperStudy, folder: Path, *, figures: bool = True) ->
     write_csv(folder / "claims.csv", _claims(study))
     if figures:
         write_figures(folder, paper_figures(study))
-    page = render("paper.html", **_context(study, summary, folder))
+    page = render("paper.html", **_context(study, summary, folder), command=command)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -124,7 +125,6 @@ def _context(study: PaperStudy, summary: list[Row], folder: Path) -> dict[str, A
     drawn = folder / "figures"
     every = [*study.main.values(), *study.sampled.values()]
     return {
-        "command": "paper",
         "settings": study.settings,
         "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
         "summary": readable_summary(summary, MPA),

@@ -40,7 +40,7 @@ def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
             {
                 "formulation": row["formulation"],
                 "mean": interval(mean, mean, sd)[0],
-                "sd": significant(sd, 2),
+                "sd": interval(sd, sd, sd)[0],
                 "low": ends[0],
                 "high": ends[1],
                 "contains_truth": row["contains_truth"],
@@ -73,7 +73,7 @@ def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -
                 name,
                 prior,
                 interval(mean, mean, sd)[0],
-                significant(sd, 2),
+                interval(sd, sd, sd)[0],
             ]
             rows.append([*row, f"[{ends[0]}, {ends[1]}]"])
     return rows

@@ -37,16 +37,15 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
     """
     (folder / INPUT).mkdir()
     shutil.copyfile(source, folder / INPUT / source.name)
-    resolved = {"file": f"{INPUT}/{source.name}", "stress_unit": study.experiment.stress_unit}
-    recipe = study.settings.model_copy(update=resolved)
-    write_recipe(folder, "fit", recipe)
+    command = "fit" if figures else "fit --no-figures"
+    write_recipe(folder, command, study.settings.model_copy(update={"file": f"{INPUT}/{source.name}"}))
     write_data(folder, study.experiment)
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
     write_posteriors(folder, study.posteriors)
     if figures:
         write_figures(folder, _figures(study))
-    page = render("specimen.html", **_context(study, summary, folder))
+    page = render("specimen.html", **_context(study, summary, folder), command=command)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -68,7 +67,6 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
 def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
     noise = study.settings.noise_sd
     return {
-        "command": "fit",
         "settings": study.settings,
         "experiment": study.experiment,
         "unit": study.unit.name,

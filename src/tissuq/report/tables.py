@@ -17,7 +17,7 @@ Row = dict[str, Any]
 
 def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: float | None = None) -> Row:
     """Return the row of one formulation; C10 in MPa, empty where a route has no such number."""
-    c10 = posterior.summary().loc["C10"]
+    c10 = posterior.summary().to_dict("index")["C10"]
     low, high = float(c10["hdi_low"]), float(c10["hdi_high"])
     return {
         "formulation": formulation,
@@ -39,9 +39,9 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
     """Return mean, sd and 95 % HPD of every parameter of every formulation, with its unit and prior."""
     rows = []
     for formulation, posterior in posteriors.items():
-        table = posterior.summary()
+        table = posterior.summary().to_dict("index")
         for parameter in posterior.model.parameters:
-            numbers = table.loc[parameter.symbol]
+            numbers = table[parameter.symbol]
             rows.append(
                 {
                     "formulation": formulation,
@@ -65,5 +65,6 @@ def write_csv(path: Path, rows: list[Row]) -> None:
 
 
 def write_json(path: Path, rows: list[Row]) -> None:
-    """Write rows as JSON."""
-    path.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+    """Write rows as JSON, which knows no nan: null stands for it."""
+    plain = [{name: None if value != value else value for name, value in row.items()} for row in rows]
+    path.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", encoding="utf-8")

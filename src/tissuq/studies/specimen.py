@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from tissuq.discrepancy import discrepancies, discrepancy_named
-from tissuq.errors import InputError, ModelError
+from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import read_experiment
 from tissuq.experiments.units import StressUnit, stress_unit
@@ -44,9 +45,27 @@ class SpecimenSettings(BaseModel):
     material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((ALL,), min_length=1)
     noise_sd: float | Literal["unknown"] = "unknown"
-    priors: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
     sampler: Sampler = "auto"
     seed: int = Field(0, ge=0)
+
+    @field_validator("discrepancies")
+    @classmethod
+    def _all_or_named(cls, given: tuple[str, ...]) -> tuple[str, ...]:
+        if ALL in given and given != (ALL,):
+            raise ValueError(f"'{ALL}' stands alone; leave it out, or leave out the names beside it")
+        return given
+
+    @field_validator("noise_sd", mode="before")
+    @classmethod
+    def _positive_or_unknown(cls, given: Any) -> Any:
+        is_number = isinstance(given, int | float) and not isinstance(given, bool)
+        if given != "unknown" and not (is_number and 0 < given < inf):
+            raise ValueError(
+                f"must be a positive number in the file's stress unit, or 'unknown', not {given!r}; noise of zero "
+                "would make every measurement exact"
+            )
+        return given
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements; a relative file lies in ``folder``."""
@@ -90,19 +109,23 @@ def run_specimen(
 
     Raises
     ------
-    InputError, ModelError
-        When file or settings cannot be used. A discrepancy that does not apply is an error when it was named, and is
-        skipped with the reason when all were asked for.
+    InputError, ModelError, ConvergenceError
+        When file or settings cannot be used. A discrepancy that cannot be fitted is an error when it was named, and
+        is skipped with the reason when all were asked for.
     """
     experiment = settings.experiment(folder)
     unit = stress_unit(experiment.stress_unit)
-    names = list(discrepancies()) if settings.discrepancies == (ALL,) else list(settings.discrepancies)
+    is_all = settings.discrepancies == (ALL,)
+    names = list(discrepancies()) if is_all else list(dict.fromkeys(settings.discrepancies))
     priors = _priors(settings, names, unit)
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
         start = perf_counter()
         own = {p.symbol for p in _parameters(settings, name)}
+        if is_all and len(experiment) < len(own):
+            skipped[name] = f"{len(experiment)} measurements are too few for its parameters {', '.join(sorted(own))}."
+            continue
         try:
             posteriors[name] = fit(
                 experiment,
@@ -114,12 +137,13 @@ def run_specimen(
                 seed=settings.seed,
             )
             seconds[name] = perf_counter() - start
-        except ModelError as error:
-            if settings.discrepancies != (ALL,):
+        except (ConvergenceError, ModelError) as error:
+            if not is_all:
                 raise
             skipped[name] = str(error)
     if not posteriors:
-        raise ModelError("no discrepancy applies: " + " ".join(skipped.values()))
+        simplest, reason = next(iter(skipped.items()))
+        raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
     return SpecimenStudy(settings, experiment, posteriors, seconds, skipped)
 
 

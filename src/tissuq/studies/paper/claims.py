@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from tissuq.studies.paper.findings import Finding
+from tissuq.studies.paper.findings import Finding, Findings
 
 __all__ = ["CLAIMS", "Claim", "Verdict", "judge"]
-
-Findings = Mapping[str, Finding]
 
 INFLATED = ("constant", "linear", "mooney-rivlin")
 

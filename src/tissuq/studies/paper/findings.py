@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import comb
 
@@ -10,7 +11,7 @@ import numpy as np
 from tissuq.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 
-__all__ = ["Finding", "find", "passes"]
+__all__ = ["Finding", "Findings", "find", "passes"]
 
 
 @dataclass(frozen=True)
@@ -39,25 +40,26 @@ class Finding:
         return passes(self.inside_model_only, self.measurements)
 
 
+Findings = Mapping[str, Finding]
+"""What one data set says about every formulation."""
+
+
 def find(posterior: Posterior, truth: float, base: Band | None = None) -> Finding:
     """Return the finding of a posterior; ``base`` is the predictive band without discrepancy."""
     data = posterior.model.experiment
     low, high = posterior.solution.marginals["C10"].hdi()
     band = predict_band(posterior.solution, data.stretch)
-    alone = predict_band(posterior.solution, data.stretch, discrepancy=False)
     shift = np.abs(band.mean - base.mean).max() / np.abs(data.stress).max() if base else 0.0
-    inside, inside_alone = (float(np.mean((b.low <= data.stress) & (data.stress <= b.high))) for b in (band, alone))
-    width = float(np.mean(band.high - band.low))
     return Finding(
-        low,
-        high,
-        low <= truth <= high,
-        len(data),
-        inside,
-        inside_alone,
-        width,
-        float(shift),
-        posterior.log_evidence,
+        low=low,
+        high=high,
+        holds_truth=low <= truth <= high,
+        measurements=len(data),
+        inside=posterior.predictive_coverage(),
+        inside_model_only=posterior.predictive_coverage(discrepancy=False),
+        band_width=float(np.mean(band.high - band.low)),
+        mean_shift=float(shift),
+        log_evidence=posterior.log_evidence,
     )
 
 

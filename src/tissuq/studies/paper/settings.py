@@ -40,8 +40,8 @@ class PaperSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     points: int = Field(30, ge=6, le=10_000, description="number of measurements")
-    stretch_low: float = Field(0.5, gt=0, description="smallest stretch")
-    stretch_high: float = Field(4.25, gt=0, description="largest stretch")
+    stretch_low: float = Field(0.5, gt=0, allow_inf_nan=False, description="smallest stretch")
+    stretch_high: float = Field(4.25, gt=0, allow_inf_nan=False, description="largest stretch")
     noise_sd: float = Field(0.5, gt=0, allow_inf_nan=False, description="standard deviation of the noise, MPa")
     seed: int = Field(2021, ge=0, description="seed of noise and draws")
     replicates: int = Field(1, ge=1, le=10_000, description="data sets over which the claims are checked")

@@ -11,8 +11,8 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.fitting import fit
 from tissuq.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
-from tissuq.studies.paper.claims import Findings, Verdict, judge
-from tissuq.studies.paper.findings import Finding, find
+from tissuq.studies.paper.claims import Verdict, judge
+from tissuq.studies.paper.findings import Finding, Findings, find
 from tissuq.studies.paper.sensitivity import Cell, sensitivity
 from tissuq.studies.paper.settings import FORMULATIONS, PaperSettings
 
@@ -70,7 +70,7 @@ def run_paper(settings: PaperSettings, step: Callable[[str], None] = lambda text
         step(f"replicate {replicate + 1} of {settings.replicates}")
         again = _fit_all(settings, settings.experiment(replicate), "exact", lambda text: None)
         data_sets.append({name: fitted.finding for name, fitted in again.items()})
-    return PaperStudy(settings, experiment, main, sampled, judge(data_sets), sensitivity(settings, step))
+    return PaperStudy(settings, experiment, main, sampled, judge(data_sets), sensitivity(settings, data_sets, step))
 
 
 def _fit_all(

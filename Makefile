@@ -1,0 +1,52 @@
+# tissuq: `make demo` shows what it does, `make test` runs every test. Both make their own environment in .venv.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUNS ?= runs
+
+.PHONY: demo test lint types check lock bench clean help
+
+help:  ## List the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain tissue; say where the reports lie
+	$(BIN)/tissuq paper --replicates 20 --out $(RUNS)/paper --force
+	$(BIN)/tissuq fit brain-cortex-uniaxial --material neo-hookean --discrepancy all --out $(RUNS)/brain --force
+	@echo
+	@echo "Reports, to open in a browser:"
+	@echo "  the paper's study:  $(abspath $(RUNS))/paper/report.html"
+	@echo "  human brain cortex: $(abspath $(RUNS))/brain/report.html"
+
+test: $(VENV)/.installed-dev  ## Run all tests, with coverage
+	$(BIN)/python -m pytest --cov=src/tissuq --cov-report=term:skip-covered
+
+lint: $(VENV)/.installed-dev  ## Check style and format
+	$(BIN)/ruff check src tests benchmarks
+	$(BIN)/ruff format --check src tests benchmarks
+
+types: $(VENV)/.installed-dev  ## Check types
+	$(BIN)/mypy
+
+check: lint types test  ## Everything that CI checks
+
+bench: $(VENV)/.installed  ## Time the exact route as whole processes
+	$(BIN)/python benchmarks/cold_start.py
+
+lock: $(VENV)/.installed-dev  ## Write the installed versions to constraints.txt
+	{ sed -n 1p constraints.txt; $(BIN)/python -m pip list --format=freeze --exclude tissuq --exclude pip --exclude setuptools; } > constraints.new
+	mv constraints.new constraints.txt
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
+	  { echo "tissuq needs Python 3.11 to 3.13, but '$(PYTHON)' is $$($(PYTHON) -V 2>&1). Try: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+clean:  ## Remove the environment and caches
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .coverage build dist

@@ -1,0 +1,112 @@
+"""The command line as a person meets it: arguments in; exit status, output and files out."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tissuq.cli import main
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command left: its exit status and what it said."""
+
+    status: int
+    out: str
+    err: str
+
+
+Cli = Callable[..., Outcome]
+
+STRETCH = [0.8, 0.9, 1.1, 1.2, 1.3, 1.4]
+STRESS_KPA = [-75.25, -33.06, 27.86, 49.31, 70.83, 88.48]
+"""100 (l - l^-2) kPa, C10 = 50 kPa, with errors of +1, 0, 0.5, -1.25, 0 and -0.5 kPa rounded to 0.01."""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty current folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def cli(here, monkeypatch, capsys) -> Cli:
+    """Run ``tissuq ARGUMENTS`` in this process, through `main`, in the folder `here`."""
+
+    def run(*arguments: object) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["tissuq", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = capsys.readouterr()
+        return Outcome(int(end.value.code or 0), said.out, said.err)
+
+    return run
+
+
+@pytest.fixture
+def specimen(here):
+    """A file of six measurements in kPa."""
+    return write_specimen(here / "specimen.csv")
+
+
+def write_specimen(path: Path) -> Path:
+    rows = [f"{stretch},{stress}\n" for stretch, stress in zip(STRETCH, STRESS_KPA, strict=True)]
+    path.write_text("stretch,stress_kPa\n" + "".join(rows), encoding="utf-8")
+    return path
+
+
+def command(*arguments: object, folder: Path) -> Outcome:
+    """Run ``tissuq ARGUMENTS`` in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", "from tissuq.cli import main; main()", *map(str, arguments)],
+        cwd=folder, capture_output=True, text=True, env={**os.environ, "COLUMNS": "80"}, check=False,
+    )  # fmt: skip
+    return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def tree(folder: Path) -> dict[str, bytes | None]:
+    """Return every file and folder in a folder, hidden ones too, with the bytes of the files."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() if path.is_file() else None for path in folder.rglob("*")
+    }
+
+
+@pytest.fixture(scope="session")
+def paper_run(tmp_path_factory):
+    """A small run of the paper's study with figures, in a process of its own: its folder and what was said."""
+    folder = tmp_path_factory.mktemp("paper")
+    options = ["--points", 12, "--noise-sd", 0.4, "--seed", 7, "--prior", "c=uniform(0,2)"]
+    said = command("paper", *options, "--out", "run", folder=folder)
+    assert said.status == 0, said.err
+    return folder / "run", said
+
+
+@pytest.fixture(scope="session")
+def fit_run(tmp_path_factory):
+    """A fit with figures of three discrepancies, in a process of its own: its folder and what was said."""
+    folder = tmp_path_factory.mktemp("fit")
+    write_specimen(folder / "specimen.csv")
+    chosen = [word for name in ("none", "constant", "gp") for word in ("--discrepancy", name)]
+    said = command("fit", "specimen.csv", *chosen, "--noise-sd", 1, "--seed", 3, folder=folder)
+    assert said.status == 0, said.err
+    return folder / "runs" / "specimen", said
+
+
+def without_wall_times(folder: Path) -> dict[str, bytes | None]:
+    """Return a run's files with the wall times in its summaries and its report struck out."""
+    files = tree(folder)
+    for name in [name for name in files if name.startswith("summary")]:
+        number = rb'(?<="seconds": )[\d.e-]+' if name.endswith(".json") else rb"(?<=,)[\d.e-]+(?=\n)"
+        files[name] = re.sub(number, b"", files[name] or b"")
+    files["report.html"] = re.sub(rb"<td>\d+\.\d\d</td></tr>", b"", files["report.html"] or b"")
+    return files

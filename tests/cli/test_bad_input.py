@@ -1,0 +1,144 @@
+"""Bad input: exit status 2, one message that names what is wrong, and the folder as it was."""
+
+from pathlib import Path
+
+import pytest
+
+from .conftest import tree
+
+BAD_FILES = sorted((Path(__file__).parents[1] / "experiments" / "bad_files").iterdir())
+
+FIT = [
+    (["nowhere.csv"], ["nowhere.csv", "no such file"]),
+    (["."], ["is a folder"]),
+    (["a" * 300 + ".csv"], ["aaa.csv", "too long"]),
+    ([], ["FILE", "--config"]),
+    (["SPECIMEN", "--column", "stress=Load"], ["no column 'Load'", "'stretch', 'stress_kPa'"]),
+    (["SPECIMEN", "--column", "force=Load"], ["'force'", "stretch or strain, and stress"]),
+    (["SPECIMEN", "--column", "stress"], ["--column", "ROLE=COLUMN"]),
+    (["SPECIMEN", "--column", "stress="], ["--column", "ROLE=COLUMN"]),
+    (["SPECIMEN", "--column", "stress=1", "--column", "stress=2"], ["--column", "twice", "'stress'"]),
+    (["SPECIMEN", "--column", "stretch=1", "--column", "strain=1"], ["both stretch and strain"]),
+    (["SPECIMEN", "--column", "stretch=stretch", "--strain-unit", "percent"], ["--strain-unit", "read as stretch"]),
+    (["SPECIMEN", "--strain-unit", "percent"], ["--strain-unit", "column 'stretch'"]),
+    (["SPECIMEN", "--stress-unit", "furlong"], ["'furlong'", "unit of stress"]),
+    (["SPECIMEN", "--stress-unit", "MPa"], ["--stress-unit", "the file says 'kPa'"]),
+    (["SPECIMEN", "--stress-type", "kirchhoff"], ["stress_type", "engineering, cauchy", "'kirchhoff'"]),
+    (["SPECIMEN", "--compression-positive"], ["specimen.csv", "compression_positive"]),
+    (["SPECIMEN", "--skip-rows", "-1"], ["skip_rows", "-1"]),
+    (["SPECIMEN", "--mode", "torsion"], ["'torsion'", "uniaxial"]),
+    (["SPECIMEN", "--noise-sd", "-1"], ["noise_sd", "positive", "-1", "stress unit"]),
+    (["SPECIMEN", "--noise-sd", "0"], ["noise_sd", "positive", "0"]),
+    (["SPECIMEN", "--noise-sd", "nan"], ["noise_sd", "positive", "nan"]),
+    (["SPECIMEN", "--noise-sd", "inf"], ["noise_sd", "positive", "inf"]),
+    (["SPECIMEN", "--noise-sd", "small"], ["--noise-sd", "'small'", "'unknown'"]),
+    (["SPECIMEN", "--material", "neo-hooke"], ["'neo-hooke'", "Did you mean 'neo-hookean'?"]),
+    (["SPECIMEN", "--discrepancy", "cubic"], ["'cubic'", "quadratic"]),
+    (["SPECIMEN", "--discrepancy", "none", "--discrepancy", "cubic"], ["'cubic'", "quadratic"]),
+    (["SPECIMEN", "--discrepancy", "none", "--discrepancy", "all"], ["discrepancies", "'all' stands alone"]),
+    (["SPECIMEN", "--material", "yeoh", "--discrepancy", "yeoh"], ["C20, C30", "'yeoh'", "Choose another"]),
+    (["SPECIMEN", "--sampler", "gibbs"], ["sampler", "'gibbs'", "'nuts'"]),
+    (["SPECIMEN", "--seed", "-1"], ["seed", "-1"]),
+    (["SPECIMEN", "--prior", "C10"], ["'C10' is not a prior", "C10=uniform(0, 5)"]),
+    (["SPECIMEN", "--prior", "C10=uniform(0;5)"], ["numbers", "0;5"]),
+    (["SPECIMEN", "--prior", "C10=uniform(5)"], ["uniform", "low, high"]),
+    (["SPECIMEN", "--prior", "C10=uniform(5,0)"], ["uniform", "low must be less than high"]),
+    (["SPECIMEN", "--prior", "C10=uniform(0,nan)"], ["uniform", "high", "nan"]),
+    (["SPECIMEN", "--prior", "C10=unifrom(0,5)"], ["'unifrom'", "Did you mean 'uniform'?"]),
+    (["SPECIMEN", "--prior", "C10=normal(5,-1)"], ["normal", "sd must be positive"]),
+    (["SPECIMEN", "--prior", "C10=uniform(-5,5)"], ["C10", "beyond", "0 to inf"]),
+    (["SPECIMEN", "--prior", "D1=uniform(0,5)"], ["'D1'", "C10"]),
+    (["SPECIMEN", "--discrepancy", "none", "--prior", "c=uniform(0,5)"], ["'c'", "C10"]),
+    (["SPECIMEN", "--prior", "C10=uniform(0,5)", "--prior", "C10=uniform(0,9)"], ["--prior", "twice", "'C10'"]),
+    (["TWO", "--discrepancy", "constant"], ["'two'", "2 measurements for 4 parameters (C10, m0, S, noise_sd)"]),
+    (["TWO", "--material", "yeoh"], ["no discrepancy can be fitted", "2 measurements", "C10, C20, C30, noise_sd"]),
+    (["SPECIMEN", "--config", "broken.toml"], ["broken.toml", "not TOML", "line 2"]),
+    (["--config", "nowhere.toml"], ["no configuration file 'nowhere.toml'"]),
+    (["--config", "."], ["configuration file '.'", "directory"]),
+    (["--config", "SPECIMEN"], ["specimen.csv", "not TOML"]),
+    (["--config", "unknown_key.toml"], ["unknown_key.toml", "no setting 'materail'", "material"]),
+    (["--config", "wrong_type.toml"], ["wrong_type.toml", "seed", "'two'"]),
+    (["--config", "wrong_table.toml"], ["wrong_table.toml", "priors", "5"]),
+    (["--config", "wrong_prior.toml"], ["uniform", "low", "'zero'"]),
+    (["--config", "no_file.toml"], ["no_file.toml", "'file' is missing"]),
+    (["--config", "lost_file.toml"], ["lost.csv", "no such file"]),
+    (["TWO", "--config", "good.toml"], ["two.csv", "good.toml", "specimen.csv", "Leave FILE out"]),
+]  # fmt: skip
+
+CONFIGS = {
+    "good": 'file = "specimen.csv"\n',
+    "broken": 'file = "specimen.csv"\nseed = = 2\n',
+    "unknown_key": 'file = "specimen.csv"\nmaterail = "yeoh"\n',
+    "wrong_type": 'file = "specimen.csv"\nseed = "two"\n',
+    "wrong_table": 'file = "specimen.csv"\npriors = 5\n',
+    "wrong_prior": 'file = "specimen.csv"\n[priors.C10]\ndistribution = "uniform"\nlow = "zero"\nhigh = 5\n',
+    "no_file": "seed = 2\n",
+    "lost_file": 'file = "lost.csv"\n',
+}
+
+PAPER = [
+    (["--points", "5"], ["points", "6", "5"]),
+    (["--points", "12.5"], ["--points", "integer"]),
+    (["--stretch-range", "0.5"], ["--stretch-range", "LOW:HIGH", "'0.5'"]),
+    (["--stretch-range", "low:high"], ["--stretch-range", "LOW:HIGH"]),
+    (["--stretch-range", "2:1"], ["stretch_low 2", "stretch_high 1"]),
+    (["--stretch-range", "0:2"], ["stretch_low", "greater than 0"]),
+    (["--stretch-range", "nan:2"], ["stretch_low", "nan"]),
+    (["--stretch-range", "0.5:inf"], ["stretch_high", "finite", "inf"]),
+    (["--noise-sd", "0"], ["noise_sd", "greater than 0"]),
+    (["--noise-sd", "-0.5"], ["noise_sd", "-0.5"]),
+    (["--noise-sd", "nan"], ["noise_sd", "nan"]),
+    (["--noise-sd", "little"], ["--noise-sd", "number"]),
+    (["--seed", "-1"], ["seed", "-1"]),
+    (["--replicates", "0"], ["replicates", "0"]),
+    (["--sampler", "auto"], ["sampler", "'exact', 'nuts' or 'both'", "'auto'"]),
+    (["--prior", "mu=uniform(0,5)"], ["no parameter is named mu", "C10"]),
+    (["--prior", "c=uniform(5,0)"], ["low must be less than high"]),
+    (["--prior", "c=uniform(0,1)", "--prior", "c=uniform(0,9)"], ["--prior", "twice", "'c'"]),
+    (["--config", "good.toml"], ["good.toml", "no setting 'file'", "points"]),
+    (["--config", "broken.toml"], ["broken.toml", "not TOML"]),
+]
+
+
+@pytest.fixture
+def files(here, specimen):
+    (here / "two.csv").write_text("stretch,stress_kPa\n0.9,-33\n1.1,28\n")
+    for name, text in CONFIGS.items():
+        (here / f"{name}.toml").write_text(text)
+    return {"SPECIMEN": "specimen.csv", "TWO": "two.csv"}
+
+
+def assert_refused(said, words):
+    assert said.status == 2
+    assert said.out == ""
+    assert "Traceback" not in said.err
+    for word in words:
+        assert word in " ".join(said.err.split())
+
+
+@pytest.mark.parametrize("file", BAD_FILES, ids=lambda file: file.name)
+def test_a_bad_file_is_named_and_no_run_is_left(cli, here, file):
+    assert_refused(cli("fit", file, "--discrepancy", "none", "--no-figures"), [file.name])
+    assert not list(here.iterdir())
+
+
+@pytest.mark.parametrize(("arguments", "words"), FIT, ids=lambda case: " ".join(case)[:60])
+def test_fit_refuses_bad_options_and_leaves_the_folder_as_it_was(cli, here, files, arguments, words):
+    before = tree(here)
+    assert_refused(cli("fit", *(files.get(word, word) for word in arguments), "--no-figures"), words)
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize(("arguments", "words"), PAPER, ids=lambda case: " ".join(case)[:60])
+def test_paper_refuses_bad_options_and_leaves_the_folder_as_it_was(cli, here, files, arguments, words):
+    before = tree(here)
+    assert_refused(cli("paper", *arguments, "--no-figures"), words)
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize("arguments", [["fit", "binary.csv"], ["paper", "--points", "2"]])
+def test_an_error_is_one_line_on_standard_error(cli, arguments):
+    bad = [str(file) for file in BAD_FILES if file.name == arguments[-1]] or arguments[-1:]
+    said = cli(*arguments[:-1], *bad)
+    assert said.err.startswith("tissuq: ")
+    assert said.err.count("\n") == 1

@@ -1,0 +1,54 @@
+import pytest
+
+from tissuq import datasets, discrepancies, materials
+
+
+@pytest.mark.parametrize(("command", "kinds"), [("materials", materials), ("discrepancies", discrepancies)])
+def test_every_variant_is_listed_with_its_formula_and_parameters(cli, command, kinds):
+    said = cli(command)
+    assert (said.status, said.err) == (0, "")
+    for kind in kinds().values():
+        assert f"{kind.name}\n    {kind.formula}" in said.out
+        assert all(parameter.description in said.out for parameter in kind.parameters)
+
+
+def test_the_data_sets_are_listed_with_their_citations(cli):
+    said = cli("datasets")
+    assert said.status == 0
+    assert "rubber-treloar-uniaxial\n    Treloar 1944" in said.out
+
+
+def test_a_data_set_is_copied_into_a_new_folder(cli, here):
+    said = cli("datasets", "--copy", "rubber-treloar-uniaxial", "--to", "data/new")
+    assert said.status == 0
+    copied = here / "data" / "new" / "rubber-treloar-uniaxial.csv"
+    assert copied.read_bytes() == datasets.path("rubber-treloar-uniaxial").read_bytes()
+
+
+def test_a_copied_data_set_is_overwritten_with_force_alone(cli, here):
+    there = here / "rubber-treloar-uniaxial.csv"
+    there.write_text("mine")
+    said = cli("datasets", "--copy", "rubber-treloar-uniaxial")
+    assert said.status == 2
+    assert "--force" in said.err
+    assert there.read_text() == "mine"
+    assert cli("datasets", "--copy", "rubber-treloar-uniaxial", "--force").status == 0
+    assert there.read_text() != "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--copy", "rubber-treloar"], ["'rubber-treloar'", "Did you mean 'rubber-treloar-uniaxial'?"]),
+        (["--copy", ""], ["no data set named ''"]),
+        (["--to", "folder"], ["--to", "--copy NAME"]),
+        (["--force"], ["--force", "--copy NAME"]),
+        (["--copy", "rubber-treloar-uniaxial", "--to", "a-file"], ["a-file"]),
+    ],
+)
+def test_a_copy_that_cannot_be_made_is_refused(cli, here, arguments, words):
+    (here / "a-file").write_text("mine")
+    said = cli("datasets", *arguments)
+    assert said.status == 2
+    assert all(word in said.err for word in words)
+    assert [path.name for path in here.iterdir()] == ["a-file"]

@@ -1,0 +1,223 @@
+import csv
+
+import numpy as np
+import pytest
+import tomllib
+
+from .conftest import STRESS_KPA, STRETCH, command, without_wall_times
+
+stretch, stress = np.array(STRETCH), np.array(STRESS_KPA)
+unit_stress = 2 * (stretch - stretch**-2)
+ALONE = ["--discrepancy", "none", "--no-figures"]
+
+
+def summary_of(folder):
+    with (folder / "summary.csv").open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def written(file, **columns):
+    names = list(columns)
+    rows = zip(*columns.values(), strict=True)
+    file.write_text("\n".join([",".join(names), *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n")
+    return file
+
+
+def assert_closed_form(row, noise_kpa=1.0, width_kpa=None):
+    """Compare with the posterior of C10 alone under a flat prior: normal, by hand."""
+    size = unit_stress @ unit_stress
+    mean, sd = unit_stress @ stress / size, noise_kpa / np.sqrt(size)
+    assert float(row["C10_mean"]) == pytest.approx(mean * 1e-3, rel=1e-6)
+    assert float(row["C10_sd"]) == pytest.approx(sd * 1e-3, rel=1e-6)
+    assert float(row["C10_hdi_low"]) == pytest.approx((mean - 1.959964 * sd) * 1e-3, rel=1e-5)
+    assert float(row["C10_hdi_high"]) == pytest.approx((mean + 1.959964 * sd) * 1e-3, rel=1e-5)
+    if width_kpa:
+        residual, noise = (stress - mean * unit_stress) * 1e-3, noise_kpa * 1e-3
+        log_likelihood = -3 * np.log(2 * np.pi * noise**2) - residual @ residual / (2 * noise**2)
+        expected = log_likelihood + np.log(np.sqrt(2 * np.pi) * sd / width_kpa)
+        assert float(row["log_evidence"]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_run_leaves_the_promised_files_and_a_copy_of_the_users(fit_run):
+    folder, said = fit_run
+    found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    figures = {f"figures/{name}.{kind}" for name in ("marginals", "with_discrepancy", "model_alone")
+               for kind in ("svg", "png")}  # fmt: skip
+    posteriors = {f"posterior/{name}.nc" for name in ("none", "constant", "gp")}
+    tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv"}
+    assert found == figures | posteriors | tables | {
+        "report.html", "run.toml", "contents.txt", "input/specimen.csv"
+    }  # fmt: skip
+    users = folder.parents[1] / "specimen.csv"
+    assert (folder / "input" / "specimen.csv").read_bytes() == users.read_bytes()
+    assert said.err == ""
+    assert "specimen: neo-hookean with model uncertainty" in said.out
+    assert "C10, kPa" in said.out
+
+
+def test_the_data_are_written_in_mpa(fit_run):
+    folder, _ = fit_run
+    lines = (folder / "data.csv").read_text().splitlines()
+    assert lines[0] == "stretch,stress"
+    np.testing.assert_allclose(np.array([line.split(",") for line in lines[1:]], float).T, [stretch, stress * 1e-3])
+
+
+def test_a_run_is_repeated_byte_for_byte_from_its_run_toml_after_the_users_file_is_gone(fit_run, tmp_path):
+    folder, _ = fit_run
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    for path in folder.rglob("*"):
+        target = moved / path.relative_to(folder)
+        target.mkdir() if path.is_dir() else target.write_bytes(path.read_bytes())
+    said = command("fit", "--config", moved / "run.toml", "--out", "again", folder=tmp_path)
+    assert (said.status, said.err) == (0, "")
+    first, second = without_wall_times(folder), without_wall_times(tmp_path / "again")
+    assert [name for name in first if first[name] != second.get(name)] == []
+    assert first.keys() == second.keys()
+
+
+@pytest.mark.parametrize("noise_kpa", [1.0, 2.5])
+def test_noise_and_priors_are_in_the_stress_unit_of_the_file(cli, here, specimen, noise_kpa):
+    options = ["--noise-sd", noise_kpa, "--prior", "C10=uniform(10,110)"]
+    assert cli("fit", specimen, *options, *ALONE).status == 0
+    assert_closed_form(summary_of(here / "runs" / "specimen")[0], noise_kpa, width_kpa=100)
+
+
+def test_the_table_in_the_terminal_is_in_the_stress_unit_of_the_file(cli, here, specimen):
+    said = cli("fit", specimen, "--noise-sd", 1, *ALONE)
+    line = next(line for line in said.out.splitlines() if line.strip().startswith("none"))
+    size = unit_stress @ unit_stress
+    mean, sd = unit_stress @ stress / size, 1 / np.sqrt(size)
+    ends = mean - 1.959964 * sd, mean + 1.959964 * sd
+    assert line.split()[1:5] == [f"{mean:.2f}", f"{sd:.2f}", f"{ends[0]:.2f}", f"{ends[1]:.2f}"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "options"),
+    [
+        ({"Strain": stretch - 1, "Load": stress}, ["--column", "strain=Strain", "--column", "stress=Load"]),
+        ({"a": stress, "b": stretch}, ["--column", "stretch=2", "--column", "stress=1"]),
+        ({"strain": 100 * (stretch - 1), "stress": stress}, ["--strain-unit", "percent"]),
+        ({"stretch": stretch, "stress": stress * stretch}, ["--stress-type", "cauchy"]),
+        ({"stretch": stretch, "stress": np.where(stretch < 1, -stress, stress)}, ["--compression-positive"]),
+        ({"lambda": stretch, "stress": stress}, []),
+    ],
+    ids=["named columns", "numbered columns", "percent", "cauchy", "compression positive", "plain"],
+)
+def test_every_way_to_give_the_same_measurements_gives_the_same_posterior(cli, here, columns, options):
+    file = written(here / "test.csv", **columns)
+    said = cli("fit", file, *options, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)
+    assert said.status == 0, said.err
+    assert_closed_form(summary_of(here / "runs" / "test")[0])
+
+
+@pytest.mark.parametrize(("unit", "kpa"), [("Pa", 1e-3), ("MPa", 1e3), ("N/cm2", 10), ("psi", 6.894757293168361)])
+def test_any_unit_of_stress_is_converted(cli, here, unit, kpa):
+    file = written(here / "test.csv", stretch=stretch, stress=stress / kpa)
+    said = cli("fit", file, "--stress-unit", unit, "--noise-sd", 1 / kpa, *ALONE)
+    assert said.status == 0, said.err
+    assert_closed_form(summary_of(here / "runs" / "test")[0])
+    assert f"C10, {unit}" in said.out
+
+
+def test_unknown_noise_is_a_parameter(cli, here, specimen):
+    assert cli("fit", specimen, "--noise-sd", "unknown", *ALONE).status == 0
+    lines = (here / "runs" / "specimen" / "parameters.csv").read_text().splitlines()
+    assert [line.split(",")[1] for line in lines[1:]] == ["C10", "noise_sd"]
+
+
+def test_the_material_and_the_discrepancy_can_be_chosen(cli, here, specimen):
+    said = cli("fit", specimen, "--material", "yeoh", "--discrepancy", "none", "--discrepancy", "constant",
+               "--noise-sd", 1, "--no-figures")  # fmt: skip
+    assert said.status == 0, said.err
+    assert [row["formulation"] for row in summary_of(here / "runs" / "specimen")] == ["none", "constant"]
+    assert "specimen: yeoh" in said.out
+
+
+def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(cli, here, specimen):
+    said = cli("fit", specimen, "--material", "yeoh", "--noise-sd", 1, "--no-figures")
+    assert said.status == 0, said.err
+    fitted = [row["formulation"] for row in summary_of(here / "runs" / "specimen")]
+    assert "yeoh" not in fitted
+    assert "none" in fitted
+    assert "Not fitted: yeoh: discrepancy 'yeoh' adds C20, C30" in said.out
+    assert "Not fitted: quadratic: 6 measurements are too few" in said.out
+
+
+def test_a_built_in_data_set_is_fitted_by_its_name(cli, here):
+    assert cli("fit", "rubber-treloar-uniaxial", *ALONE).status == 0
+    assert (here / "runs" / "rubber-treloar-uniaxial" / "input" / "rubber-treloar-uniaxial.csv").exists()
+
+
+def test_a_file_beside_a_config_that_names_the_same_measurements_is_accepted(cli, here, specimen):
+    assert cli("fit", specimen, "--noise-sd", 1, *ALONE, "--out", "first").status == 0
+    said = cli("fit", specimen, "--config", "first/run.toml", "--no-figures", "--out", "second")
+    assert said.status == 0, said.err
+    assert_closed_form(summary_of(here / "second")[0])
+
+
+def test_an_option_prevails_over_the_config(cli, here, specimen):
+    cli("fit", specimen, "--noise-sd", 1, "--prior", "C10=uniform(10,110)", *ALONE, "--out", "first")
+    said = cli("fit", "--config", "first/run.toml", "--noise-sd", 2.5, "--no-figures", "--out", "second")
+    assert said.status == 0, said.err
+    assert_closed_form(summary_of(here / "second")[0], 2.5, width_kpa=100)
+
+
+def test_a_name_with_markup_and_spaces_is_shown_as_it_is(cli, here):
+    file = written(here / "<b>pig & cow</b>".replace("/", "_"), stretch=stretch, stress=stress)
+    said = cli("fit", file, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)
+    assert said.status == 0, said.err
+    (report,) = (here / "runs").glob("*/report.html")
+    text = report.read_text()
+    assert "&lt;b&gt;pig &amp; cow&lt;_b&gt;" in text
+    assert "<b>" not in text
+
+
+def test_show_prints_what_fit_printed(cli, here, specimen):
+    fitted = cli("fit", specimen, "--noise-sd", 1, *ALONE)
+    shown = cli("show", "runs/specimen")
+    assert shown.status == 0
+    assert shown.out == fitted.out
+    assert tomllib.loads((here / "runs" / "specimen" / "run.toml").read_text())["file"] == "input/specimen.csv"
+
+
+def test_show_prints_the_study_of_the_paper(cli, paper_run):
+    folder, said = paper_run
+    shown = cli("show", folder)
+    assert shown.status == 0
+    assert shown.out.split("Report:")[0] == said.out.split("Report:")[0]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"summary.json": "[]"},
+        {"summary.json": "{}"},
+        {"summary.json": "[{"},
+        {"summary.json": '[{"formulation": "none"}]'},
+        {"summary.json": "5"},
+        {"run.toml": "= ="},
+        {"run.toml": 'file = "input/specimen.csv"\nmaterail = "yeoh"\n'},
+        {"run.toml": None},
+        {"summary.json": None},
+        {"input/specimen.csv": None},
+    ],
+    ids=str,
+)
+def test_show_refuses_a_folder_that_is_not_a_complete_run(cli, here, specimen, damage):
+    cli("fit", specimen, "--noise-sd", 1, *ALONE)
+    for name, text in damage.items():
+        file = here / "runs" / "specimen" / name
+        file.unlink() if text is None else file.write_text(text)
+    said = cli("show", "runs/specimen")
+    assert said.status == 2
+    assert said.err.startswith("tissuq: ")
+    assert "runs/specimen" in said.err
+    assert "Traceback" not in said.err
+
+
+@pytest.mark.parametrize("folder", ["nowhere", ".", "specimen.csv"])
+def test_show_refuses_what_is_not_a_run_folder(cli, specimen, folder):
+    said = cli("show", folder)
+    assert said.status == 2
+    assert f"'{folder}' is not the folder of a complete run" in said.err

@@ -1,0 +1,57 @@
+"""The structure holds: stages import only to their left, and the documented code runs."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import tissuq
+
+ROOT = Path(tissuq.__file__).parent
+STAGES = [
+    "errors", "registry", "priors", "parameters", "experiments", "mechanics", "discrepancy", "model", "inference",
+    "prediction", "posterior", "fitting", "studies", "report", "cli",
+]  # fmt: skip
+
+
+def imports_of(file: Path) -> set[str]:
+    modules = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("tissuq."):
+            modules.add(node.module.split(".")[1])
+        elif isinstance(node, ast.Import):
+            modules |= {name.name.split(".")[1] for name in node.names if name.name.startswith("tissuq.")}
+    return modules
+
+
+@pytest.mark.parametrize("file", sorted(ROOT.rglob("*.py")), ids=lambda file: str(file.relative_to(ROOT)))
+def test_a_stage_imports_only_stages_to_its_left(file):
+    stage = file.relative_to(ROOT).parts[0].removesuffix(".py")
+    if stage == "__init__":
+        return
+    assert stage in STAGES
+    later = STAGES[STAGES.index(stage) + 1 :]
+    assert not imports_of(file) & set(later)
+
+
+def test_inference_knows_no_particular_material_or_discrepancy():
+    names = {"NeoHookean", "MooneyRivlin", "Yeoh", "GaussianProcess", "Constant", "Quadratic", "YeohTerms"}
+    for file in (ROOT / "inference").glob("*.py"):
+        assert not names & {node.id for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Name)}
+
+
+@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md"])
+def test_the_python_in_the_documents_runs(document):
+    text = (ROOT.parents[1] / document).read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, document, "exec"), {})
+
+
+def test_every_public_name_is_there_and_documented():
+    for name in tissuq.__all__:
+        assert (getattr(tissuq, name).__doc__ or "").strip(), name
