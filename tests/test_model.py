@@ -107,3 +107,17 @@ def test_unknown_noise_beside_a_free_independent_error_is_said_to_be_confounded(
 def test_bad_arguments_of_fit_are_refused_in_words(options, words):
     with pytest.raises(tq.TissuqError, match=words):
         tq.fit(DATA, **({"discrepancy": "none"} | options))
+
+
+def test_a_posterior_that_its_prior_cuts_is_said_to_be_cut():
+    wide = {"C10": tq.Uniform(0, 10)}
+    narrow = {"C10": tq.Uniform(0, 1.0)}  # least squares gives about 1.2
+    assert not tq.fit(DATA, discrepancy="none", noise_sd=0.1, priors=wide).warnings
+    (text,) = tq.fit(DATA, discrepancy="none", noise_sd=0.1, priors=narrow).warnings
+    assert "C10 (upper)" in text
+
+
+def test_a_natural_bound_is_no_cause_for_a_warning():
+    stretch = np.linspace(0.8, 1.5, 20)
+    data = tq.Experiment("uniaxial", stretch, -0.2 * 2 * (stretch - stretch**-2) + 0.01)
+    assert not tq.fit(data, discrepancy="none", noise_sd=0.5, priors={"C10": tq.Uniform(0, 10)}).warnings

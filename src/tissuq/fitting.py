@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -102,4 +102,21 @@ def _warnings(solution: Solution) -> list[str]:
             "noise_sd and S are both unknown, and only noise_sd^2 + S^2 is in the data: read their sum, or give the "
             "noise (repeated measurements at one stretch tell it)."
         )
+    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
+    if cut:
+        found.append(
+            f"the posterior is cut by a bound of the prior of {', '.join(cut)}: there the bound, not the data, decides. "
+            "Give a wider prior, unless the bound is meant."
+        )
     return found
+
+
+def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
+    """Yield the parameters whose posterior is still high at a bound that only the prior sets, and which bound."""
+    for parameter in solution.model.parameters:
+        marginal = solution.marginals[parameter.symbol]
+        ends = zip(("lower", "upper"), solution.model.priors[parameter.symbol].support, parameter.support, strict=True)
+        for name, chosen, natural in ends:
+            inside = chosen + (1e-3 if name == "lower" else -1e-3) * marginal.sd
+            if chosen != natural and marginal.pdf(inside) > 0.1 * marginal.density.max():
+                yield parameter.symbol, name

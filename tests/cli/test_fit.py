@@ -1,8 +1,8 @@
 import csv
+import tomllib
 
 import numpy as np
 import pytest
-import tomllib
 
 from .conftest import STRESS_KPA, STRETCH, command, without_wall_times
 

@@ -1,10 +1,10 @@
 import csv
 import json
+import tomllib
 
 import arviz_stats
 import numpy as np
 import pytest
-import tomllib
 import xarray as xr
 
 from .conftest import command, without_wall_times
@@ -136,9 +136,7 @@ def test_arviz_summarises_and_cross_validates_every_posterior(paper_run, name):
 
 
 def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_priors(cli, here):
-    (here / "base.toml").write_text(
-        "points = 8\nseed = 4\n[priors.c]\ndistribution = 'uniform'\nlow = 0\nhigh = 3\n"
-    )
+    (here / "base.toml").write_text("points = 8\nseed = 4\n[priors.c]\ndistribution = 'uniform'\nlow = 0\nhigh = 3\n")
     options = ["--seed", 5, "--prior", "S=half-normal(2)", "--stretch-range", "0.8:1.6", "--no-figures"]
     said = cli("paper", "--config", "base.toml", *options, "--out", "run")
     assert said.status == 0, said.err

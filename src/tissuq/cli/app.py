@@ -32,7 +32,7 @@ app.command("datasets")(catalogue.datasets)
 def main() -> None:
     """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
     try:
-        app()
+        app(prog_name="tissuq")
     except TissuqError as error:
         typer.echo(f"tissuq: {error}", err=True)
         sys.exit(2)

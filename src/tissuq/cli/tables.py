@@ -31,7 +31,8 @@ def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
     for row in rows:
         table.add_row(*row)
     console = Console()
-    console.width = max(console.width, console.measure(table).minimum)  # a number cut short is no number
+    needed = console.measure(table, options=console.options.update(max_width=1000)).maximum
+    console.width = max(console.width, needed)  # a number cut short is no number
     console.print(table)
 
 
@@ -74,6 +75,8 @@ def _read_run(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]],
     try:
         recipe = tomllib.loads((folder / RECIPE).read_text(encoding="utf-8"))
         rows = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        if not rows:
+            raise ValueError("the summary has no rows")
         if "file" in recipe:
             settings = SpecimenSettings.model_validate(recipe)
             experiment = settings.experiment(folder)

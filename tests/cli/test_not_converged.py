@@ -1,0 +1,91 @@
+"""A sampler that has not converged: exit status 3, and the result says so wherever it is read."""
+
+import json
+from dataclasses import replace
+from math import nan
+
+import pytest
+
+from tissuq import fitting
+from tissuq.inference.exact import solve_exactly
+from tissuq.inference.solution import Diagnostics
+
+VERDICT = "4 chains of 1000 draws have NOT converged: R-hat of C10 is 1.73."
+
+
+@pytest.fixture
+def stuck(monkeypatch):
+    """Make every sampled fit one that has not converged; ``rhat`` may be nan, as of chains that never move."""
+
+    def install(rhat=1.73):
+        def solve(model, sampler, seed):
+            solution = solve_exactly(model, seed)
+            if sampler != "nuts":
+                return solution
+            rhats, sizes = dict.fromkeys(model.symbols, rhat), dict.fromkeys(model.symbols, 12.0)
+            found = Diagnostics(False, VERDICT, rhats, sizes, sizes, divergences=3)
+            return replace(solution, route="nuts", log_evidence=None, log_evidence_error=None, diagnostics=found)
+
+        monkeypatch.setattr(fitting, "_solve", solve)
+
+    return install
+
+
+@pytest.fixture
+def fitted(cli, stuck, specimen):
+    stuck()
+    return cli("fit", specimen, "--sampler", "nuts", "--discrepancy", "none", "--noise-sd", 1, "--no-figures")
+
+
+def test_the_exit_status_is_3_and_the_message_names_the_discrepancy(fitted):
+    assert fitted.status == 3
+    assert fitted.err.startswith("tissuq: sampling has NOT converged for none; do not use these results.")
+    assert fitted.err.count("\n") == 1
+
+
+def test_the_report_warns_and_shows_rhat_and_ess(fitted, here):
+    report = (here / "runs" / "specimen" / "report.html").read_text()
+    assert f'<div class="warning">none: {VERDICT}</div>' in report
+    assert "<th>R-hat</th><th>ESS</th>" in report
+    assert "<td>1.730</td><td>12</td>" in report
+
+
+def test_the_tables_and_the_terminal_hold_rhat_and_ess_and_no_evidence(fitted, cli, here):
+    (row,) = json.loads((here / "runs" / "specimen" / "summary.json").read_text())
+    assert (row["rhat"], row["ess"], row["log_evidence"]) == (1.73, 12.0, None)
+    for said in (fitted, cli("show", "runs/specimen")):
+        line = next(line for line in said.out.splitlines() if line.strip().startswith("none"))
+        assert line.split()[-2:] == ["1.730", "12"]
+
+
+def test_an_rhat_that_is_not_a_number_is_null_in_json(cli, stuck, here, specimen):
+    stuck(rhat=nan)
+    said = cli("fit", specimen, "--sampler", "nuts", "--discrepancy", "none", "--noise-sd", 1, "--no-figures")
+    assert said.status == 3
+    text = (here / "runs" / "specimen" / "summary.json").read_text()
+    (row,) = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+    assert (row["rhat"], row["ess"]) == (None, 12.0)
+    assert cli("show", "runs/specimen").status == 0
+
+
+def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_results(cli, stuck, here):
+    stuck()
+    said = cli("paper", "--points", 6, "--sampler", "both", "--no-figures", "--out", "run")
+    assert said.status == 3
+    assert "NOT converged for none, constant, linear, quadratic, mooney-rivlin, yeoh, gp" in said.err
+    exact, sampled = (json.loads((here / "run" / f"summary{which}.json").read_text()) for which in ("", "-nuts"))
+    assert all(row["rhat"] is None and row["log_evidence"] is not None for row in exact)
+    assert all(row["rhat"] == 1.73 and row["log_evidence"] is None for row in sampled)
+    assert len(list((here / "run" / "posterior").glob("*-nuts.nc"))) == 7
+    report = (here / "run" / "report.html").read_text()
+    assert report.count(VERDICT) == 7
+    assert "Two independent routes" in report
+
+
+def test_no_number_of_a_wide_table_is_cut_short_in_a_narrow_terminal(cli, stuck, here, monkeypatch):
+    stuck()
+    monkeypatch.setenv("COLUMNS", "60")
+    said = cli("paper", "--points", 6, "--sampler", "nuts", "--no-figures", "--out", "run")
+    assert said.status == 3
+    assert "…" not in said.out
+    assert said.out.count("1.730") == 7

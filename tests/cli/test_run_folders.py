@@ -1,0 +1,182 @@
+"""Nothing is overwritten unasked, nothing foreign is deleted, and a failed run leaves nothing."""
+
+import errno
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tissuq import datasets
+
+from .conftest import tree
+
+ALONE = ["--noise-sd", "1", "--discrepancy", "none", "--no-figures"]
+
+
+def test_an_existing_run_is_refused_without_force_and_left_as_it_was(cli, here, specimen):
+    assert cli("fit", specimen, *ALONE).status == 0
+    before = tree(here)
+    said = cli("fit", specimen, *ALONE, "--seed", 9)
+    assert said.status == 2
+    assert "run folder 'runs/specimen' exists" in said.err
+    assert "--force" in said.err
+    assert tree(here) == before
+
+
+def test_an_existing_run_is_replaced_with_force(cli, here, specimen):
+    assert cli("fit", specimen, *ALONE).status == 0
+    assert cli("fit", specimen, *ALONE, "--seed", 9, "--force").status == 0
+    assert "seed = 9" in (here / "runs" / "specimen" / "run.toml").read_text()
+    assert [path.name for path in (here / "runs").iterdir()] == ["specimen"]
+
+
+def test_an_empty_folder_is_taken(cli, here, specimen):
+    (here / "empty").mkdir()
+    assert cli("fit", specimen, *ALONE, "--out", "empty").status == 0
+    assert (here / "empty" / "run.toml").exists()
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]], ids=["without force", "with force"])
+@pytest.mark.parametrize("name", ["thesis.docx", "run.toml", "summary.csv"])
+@pytest.mark.parametrize("command", ["fit", "paper"])
+def test_a_folder_of_other_files_is_never_touched(cli, here, specimen, command, name, force):
+    (here / "mine").mkdir()
+    (here / "mine" / name).write_text("mine")
+    before = tree(here)
+    options = [specimen, *ALONE] if command == "fit" else ["--no-figures"]
+    said = cli(command, *options, "--out", "mine", *force)
+    assert said.status == 2
+    assert "folder 'mine' holds files that are not a run" in said.err
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "figures/mine.png", "posterior/deep/er/mine.nc"])
+def test_files_that_someone_put_into_a_run_folder_are_not_deleted_by_force(cli, here, specimen, name):
+    assert cli("fit", specimen, *ALONE).status == 0
+    mine = here / "runs" / "specimen" / name
+    mine.parent.mkdir(parents=True, exist_ok=True)
+    mine.write_text("mine")
+    before = tree(here)
+    said = cli("fit", specimen, *ALONE, "--force")
+    assert said.status == 2
+    assert name in said.err
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [
+        ("specimen.csv", ["'specimen.csv' is a file", "--out"]),
+        ("specimen.csv/run", ["'specimen.csv/run' cannot be made", "is a file", "--out"]),
+        (".", ["'.' is the folder you are in", "--out"]),
+        ("/proc/no/run", ["'/proc/no/run'", "--out"]),
+        ("deep/" + "a" * 300, ["aaa'", "too long", "--out"]),
+        ("deep/" + "a" * 250, ["aaa'", "too long", "--out"]),
+    ],
+    ids=["a file", "under a file", "the current folder", "unwritable", "name too long", "name nearly too long"],
+)
+def test_a_folder_that_cannot_be_made_is_refused_and_leaves_nothing(cli, here, specimen, out, words):
+    before = tree(here)
+    said = cli("fit", specimen, *ALONE, "--out", out)
+    assert said.status == 2
+    assert all(word in said.err for word in words)
+    assert "Traceback" not in said.err
+    assert tree(here) == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
+def test_a_folder_without_permission_is_refused_before_the_work(cli, here, specimen):
+    (here / "locked").mkdir(mode=0o555)
+    said = cli("fit", specimen, *ALONE, "--out", "locked/run")
+    assert said.status == 2
+    assert "locked" in said.err
+
+
+@pytest.mark.parametrize("step", ["write_recipe", "write_data", "write_posteriors", "render"])
+def test_a_disk_that_is_full_at_any_step_leaves_nothing(cli, here, specimen, monkeypatch, step):
+    def fail(*arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before = tree(here)
+    monkeypatch.setattr(f"tissuq.report.specimen.{step}", fail)
+    said = cli("fit", specimen, *ALONE, "--out", "new/folder/run")
+    assert said.status == 2
+    assert "the run could not be written to 'new/folder/run': No space left on device" in said.err
+    assert tree(here) == before
+
+
+def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(cli, here, specimen, monkeypatch):
+    assert cli("fit", specimen, *ALONE).status == 0
+    before = tree(here)
+
+    def fail(*arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("tissuq.report.specimen.render", fail)
+    assert cli("fit", specimen, *ALONE, "--force").status == 2
+    assert tree(here) == before
+
+
+def test_the_earlier_run_is_put_back_when_the_new_one_cannot_take_its_place(cli, here, specimen, monkeypatch):
+    assert cli("fit", specimen, *ALONE).status == 0
+    before = tree(here)
+    rename = type(here).rename
+
+    def fail(self, target):
+        if str(target).endswith("specimen") and not self.name.endswith("-earlier"):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return rename(self, target)
+
+    monkeypatch.setattr(type(here), "rename", fail)
+    said = cli("fit", specimen, *ALONE, "--force", "--seed", 9)
+    assert said.status == 2
+    assert tree(here) == before
+
+
+@pytest.mark.parametrize("largest_file", [100, 3_000, 30_000, 150_000])
+def test_a_file_system_that_stops_writing_ends_with_one_message_and_leaves_nothing(here, specimen, largest_file):
+    before = tree(here)
+
+    code = (
+        "import resource, signal\n"
+        "from tissuq.cli import main\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({largest_file}, {largest_file}))\n"
+        "main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", code, "fit", specimen.name, *ALONE],
+        cwd=here, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("tissuq: the run could not be written to 'runs/specimen': File too large.")
+    assert done.stderr.count("\n") == 1
+    assert tree(here) == before
+
+
+def test_a_full_standard_output_ends_without_a_traceback():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", "from tissuq.cli import main; main()", "materials"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert done.returncode != 0
+    assert "No space left on device" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_run_through_a_link_to_a_folder_keeps_the_link(cli, here, specimen):
+    (here / "real").mkdir()
+    (here / "link").symlink_to("real")
+    assert cli("fit", specimen, *ALONE, "--out", "link").status == 0
+    assert cli("fit", specimen, *ALONE, "--out", "link", "--force").status == 0
+    assert (here / "link").is_symlink()
+    assert (here / "real" / "run.toml").exists()
+
+
+def test_a_run_is_repeated_into_its_own_folder_with_force(cli, here):
+    assert cli("fit", "rubber-treloar-uniaxial", *ALONE, "--out", "run").status == 0
+    assert cli("fit", "--config", "run/run.toml", "--no-figures", "--out", "run", "--force").status == 0
+    copy = here / "run" / "input" / "rubber-treloar-uniaxial.csv"
+    assert copy.read_bytes() == datasets.path("rubber-treloar-uniaxial").read_bytes()

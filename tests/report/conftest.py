@@ -1,0 +1,29 @@
+"""Small studies, made once."""
+
+import numpy as np
+import pytest
+
+from tissuq.mechanics import simulate
+from tissuq.studies.paper import PaperSettings, run_paper
+from tissuq.studies.specimen import SpecimenSettings, run_specimen
+
+
+@pytest.fixture(scope="session")
+def specimen_file(tmp_path_factory):
+    """Twelve measurements of a Yeoh material in kPa."""
+    truth = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
+    data = simulate("yeoh", truth, np.linspace(0.6, 2, 12), noise_sd=0.2, seed=1)
+    file = tmp_path_factory.mktemp("data") / "specimen.csv"
+    rows = [f"{l!r},{1000 * s!r}\n" for l, s in zip(data.stretch.tolist(), data.stress.tolist(), strict=True)]
+    file.write_text("stretch,stress_kPa\n" + "".join(rows))
+    return file
+
+
+@pytest.fixture(scope="session")
+def specimen_study(specimen_file):
+    return run_specimen(SpecimenSettings(file=str(specimen_file), noise_sd=200.0, seed=5))
+
+
+@pytest.fixture(scope="session")
+def paper_study():
+    return run_paper(PaperSettings(points=10, seed=11))

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from tissuq.experiments.units import StressUnit
+from tissuq.report.figures import marginal_figure, predictive_figure, save_figure
+
+KPA = StressUnit("kPa", 1e-3)
+
+
+def first(posteriors, count):
+    return dict(list(posteriors.items())[:count])
+
+
+@pytest.mark.parametrize("count", range(1, 8))
+def test_every_column_of_panels_has_tick_labels_beneath_its_lowest_panel(specimen_study, count):
+    figure = predictive_figure(first(specimen_study.posteriors, count), discrepancy=True, unit=KPA)
+    shown = [axis for axis in figure.axes if axis.get_visible()]
+    assert len(shown) == count
+    figure.draw_without_rendering()
+    lowest = {}
+    for axis in shown:
+        lowest[axis.get_subplotspec().colspan.start] = axis
+    for axis in lowest.values():
+        labels = [label for label in axis.get_xticklabels() if label.get_visible() and label.get_text()]
+        assert len(labels) >= 2
+    assert sum(axis.xaxis.get_tick_params()["labelbottom"] for axis in shown) == len(lowest)
+
+
+def test_panels_share_the_limits_of_stress_and_hold_every_measurement(specimen_study):
+    figure = predictive_figure(specimen_study.posteriors, discrepancy=False, unit=KPA)
+    shown = [axis for axis in figure.axes if axis.get_visible()]
+    assert len({axis.get_ylim() for axis in shown}) == 1
+    low, high = shown[0].get_ylim()
+    stress_kpa = 1000 * specimen_study.experiment.stress
+    assert low < stress_kpa.min() < stress_kpa.max() < high
+
+
+def test_a_panel_tells_how_many_measurements_are_inside_its_band(specimen_study):
+    figure = predictive_figure(specimen_study.posteriors, discrepancy=True, unit=KPA)
+    for axis, (name, posterior) in zip(figure.axes, specimen_study.posteriors.items(), strict=False):
+        stretch, stress = posterior.model.experiment.stretch, posterior.model.experiment.stress
+        band = posterior.predict(stretch)
+        inside = int(((band["low"] <= stress) & (stress <= band["high"])).sum())
+        assert axis.get_title(loc="left") == f"{name}:  {inside} of 12 inside"
+
+
+def test_the_axis_names_the_unit_of_the_file(specimen_study):
+    posteriors = first(specimen_study.posteriors, 2)
+    assert predictive_figure(posteriors, discrepancy=True, unit=KPA)._supylabel.get_text() == (
+        "engineering stress [kPa]"
+    )
+    assert marginal_figure(posteriors, "C10", KPA).axes[0].get_xlabel() == "C10 [kPa]"
+
+
+def test_a_marginal_bar_is_the_95_percent_interval_in_the_unit_of_the_file(specimen_study):
+    posteriors = first(specimen_study.posteriors, 1)
+    (posterior,) = posteriors.values()
+    axis = marginal_figure(posteriors, "C10", KPA, truth=1.2).axes[0]
+    bar = next(line for line in axis.lines if line.get_linewidth() == 4)
+    np.testing.assert_allclose(bar.get_xdata(), 1000 * np.array(posterior.solution.marginals["C10"].hdi()))
+    assert axis.texts[0].get_text() == "true value 1200"
+
+
+def test_the_same_figure_is_saved_as_the_same_bytes(specimen_study, tmp_path):
+    posteriors = first(specimen_study.posteriors, 2)
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        save_figure(predictive_figure(posteriors, discrepancy=True, unit=KPA), tmp_path / name, "figure")
+    for kind in ("svg", "png"):
+        one, two = ((tmp_path / name / f"figure.{kind}").read_bytes() for name in ("one", "two"))
+        assert one == two
+
+
+def test_drawing_leaves_the_users_matplotlib_settings_alone(specimen_study):
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    predictive_figure(first(specimen_study.posteriors, 1), discrepancy=True, unit=KPA)
+    assert dict(mpl.rcParams) == before
