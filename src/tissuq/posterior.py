@@ -150,7 +150,7 @@ class Posterior:
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
         # The HDF5 library must not meet a full disk itself: it then fails at a place where no one can catch it.
-        content = self.data.to_netcdf(engine="h5netcdf")
+        content = bytes(self.data.to_netcdf(engine="h5netcdf"))
         Path(path).write_bytes(content)
 
     def _labels(self) -> dict[str, str | float]:

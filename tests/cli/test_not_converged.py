@@ -80,12 +80,3 @@ def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_resul
     report = (here / "run" / "report.html").read_text()
     assert report.count(VERDICT) == 7
     assert "Two independent routes" in report
-
-
-def test_no_number_of_a_wide_table_is_cut_short_in_a_narrow_terminal(cli, stuck, here, monkeypatch):
-    stuck()
-    monkeypatch.setenv("COLUMNS", "60")
-    said = cli("paper", "--points", 6, "--sampler", "nuts", "--no-figures", "--out", "run")
-    assert said.status == 3
-    assert "…" not in said.out
-    assert said.out.count("1.730") == 7

@@ -14,7 +14,10 @@ def specimen_file(tmp_path_factory):
     truth = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
     data = simulate("yeoh", truth, np.linspace(0.6, 2, 12), noise_sd=0.2, seed=1)
     file = tmp_path_factory.mktemp("data") / "specimen.csv"
-    rows = [f"{l!r},{1000 * s!r}\n" for l, s in zip(data.stretch.tolist(), data.stress.tolist(), strict=True)]
+    rows = [
+        f"{stretch!r},{1000 * stress!r}\n"
+        for stretch, stress in zip(data.stretch.tolist(), data.stress.tolist(), strict=True)
+    ]
     file.write_text("stretch,stress_kPa\n" + "".join(rows))
     return file
 

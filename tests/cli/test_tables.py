@@ -1,0 +1,21 @@
+import pytest
+
+from tissuq.cli.tables import print_rows
+
+
+@pytest.mark.parametrize("columns", ["40", "80"])
+def test_no_cell_of_a_wide_table_is_cut_short_in_a_narrow_terminal(capsys, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", columns)
+    cells = ["mooney-rivlin", *(f"{number:.6f}" for number in range(10, 22))]
+    print_rows("A title", [f"heading {number}" for number in range(13)], [cells])
+    said = capsys.readouterr().out
+    assert "…" not in said
+    assert cells in [line.split() for line in said.splitlines()]
+
+
+def test_a_title_stands_above_a_table_whose_numbers_end_in_one_column(capsys):
+    print_rows("A title", ["name", "value"], [["one", "1.0"], ["two", "100.0"]])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].strip() == "A title"
+    one, two = (next(line for line in lines if name in line) for name in ("one", "two"))
+    assert one.rindex("1.0") + len("1.0") == two.rindex("100.0") + len("100.0")
