@@ -105,8 +105,8 @@ def _warnings(solution: Solution) -> list[str]:
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:
         found.append(
-            f"the posterior is cut by a bound of the prior of {', '.join(cut)}: there the bound, not the data, decides. "
-            "Give a wider prior, unless the bound is meant."
+            f"the posterior is cut by a bound of the prior of {', '.join(cut)}: there the bound, not the data, "
+            "decides. Give a wider prior, unless the bound is meant."
         )
     return found
 

@@ -256,7 +256,7 @@ def prior_from(settings: dict[str, Any]) -> Prior:
     """
     arguments = dict(settings)
     name = arguments.pop("distribution", "uniform")
-    kind = find(Prior, "prior distribution", name, InputError)
+    kind = find(Prior, "prior distribution", str(name), InputError)
     expected = [field.name for field in fields(kind)]
     needed = [field.name for field in fields(kind) if field.default is MISSING]
     if set(arguments) - set(expected) or set(needed) - set(arguments):

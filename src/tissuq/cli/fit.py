@@ -86,11 +86,13 @@ def fit(
 
 
 def _resolve(file: Path) -> Path:
-    """Return the user's file, or the built-in data set of that name."""
+    """Return the user's file, or the built-in data set of that name, which must be one that can be fitted."""
     from tissuq.experiments import datasets
 
-    is_name = str(file) in datasets.names() and not file.exists()
-    return datasets.path(str(file)) if is_name else file
+    if file.exists() or str(file) not in datasets.names():
+        return file
+    datasets.load(str(file))
+    return datasets.path(str(file))
 
 
 def _check_same(file: Path, named: Path, config: Path) -> None:

@@ -208,6 +208,11 @@ def _check_measures(table: Table, choice: ColumnChoice, stress_type: str) -> Non
             'Leave out stress_type="cauchy" (--stress-type cauchy), or rename the column.'
         )
     strain_words = set(heading(table.names[choice.deformation]).quantity.split())
+    if choice.is_strain and strain_words & {"stretch", "lambda", "λ"}:
+        raise InputError(
+            f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
+            "(--column stretch=NAME), or rename the column."
+        )
     other_strains = strain_words & {"true", "log", "logarithmic", "hencky", "green", "almansi"}
     if other_strains:
         raise InputError(

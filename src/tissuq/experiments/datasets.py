@@ -111,12 +111,15 @@ def copy(name: str, folder: str | os.PathLike[str], force: bool = False) -> Path
     """
     source = path(name)
     target = Path(folder) / source.name
+    partial = target.with_name(f".{target.name}-partial")
     if target.exists() and not force:
         raise InputError(f"{target} is already there; give force=True (--force) to overwrite it.")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
+        shutil.copyfile(source, partial)
+        partial.replace(target)
     except OSError as error:
+        partial.unlink(missing_ok=True)
         raise InputError(f"{target} cannot be written: {error}.") from error
     return target
 
