@@ -121,3 +121,13 @@ def test_a_natural_bound_is_no_cause_for_a_warning():
     stretch = np.linspace(0.8, 1.5, 20)
     data = tq.Experiment("uniaxial", stretch, -0.2 * 2 * (stretch - stretch**-2) + 0.01)
     assert not tq.fit(data, discrepancy="none", noise_sd=0.5, priors={"C10": tq.Uniform(0, 10)}).warnings
+
+
+def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch):
+    def fails(model, seed):
+        raise tq.ConvergenceError("quadrature did not reach its tolerance")
+
+    monkeypatch.setattr("tissuq.fitting.solve_exactly", fails)
+    assert tq.fit(DATA, discrepancy="none", noise_sd=0.1).solution.route == "nuts"
+    with pytest.raises(tq.ConvergenceError):
+        tq.fit(DATA, discrepancy="none", noise_sd=0.1, sampler="exact")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
 from tissuq.discrepancy import Discrepancy, discrepancy_named
-from tissuq.errors import InputError
+from tissuq.errors import ConvergenceError, InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.exact import is_exact, solve_exactly
 from tissuq.inference.solution import Solution
@@ -48,7 +49,7 @@ def fit(
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     sampler : str
         ``"exact"`` (closed form and quadrature), ``"nuts"`` (the joint density, as in the paper), or ``"auto"``: exact
-        where it applies.
+        where it applies and reaches its tolerance.
     seed : int
         Of the draws.
 
@@ -86,8 +87,11 @@ def fit(
 
 
 def _solve(model: StatisticalModel, sampler: Sampler, seed: int) -> Solution:
-    if sampler == "exact" or (sampler == "auto" and is_exact(model)):
+    if sampler == "exact":
         return solve_exactly(model, seed)
+    if sampler == "auto" and is_exact(model):
+        with suppress(ConvergenceError):
+            return solve_exactly(model, seed)
     from tissuq.inference.sampled import solve_by_sampling
 
     return solve_by_sampling(model, seed)
