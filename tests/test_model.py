@@ -131,3 +131,51 @@ def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch)
     assert tq.fit(DATA, discrepancy="none", noise_sd=0.1).solution.route == "nuts"
     with pytest.raises(tq.ConvergenceError):
         tq.fit(DATA, discrepancy="none", noise_sd=0.1, sampler="exact")
+
+
+def test_a_material_that_is_not_linear_in_its_parameters_is_refused():
+    class Squared(tq.Material):
+        """W = a^2 (I1 - 3)."""
+
+        name = "squared"
+        formula = "a^2 (I1 - 3)"
+        source = "this test"
+        parameters = (tq.Parameter("a", "root of C10", support=(0.0, float("inf"))),)
+
+        def strain_energy(self, I1, I2, values):
+            return values[0] ** 2 * (I1 - 3)
+
+    with pytest.raises(tq.ModelError, match="not proportional to its parameters"):
+        tq.fit(DATA, material=Squared(), discrepancy="none", noise_sd=0.1)
+
+
+def test_an_energy_that_jax_cannot_differentiate_is_refused_in_words():
+    class WithNumpy(tq.Material):
+        """W = C10 (exp(I1 - 3) - 1), written with the wrong library."""
+
+        name = "with-numpy"
+        formula = "C10 (exp(I1 - 3) - 1)"
+        source = "this test"
+        parameters = (tq.Parameter("C10", "half the modulus", support=(0.0, float("inf"))),)
+
+        def strain_energy(self, I1, I2, values):
+            return values[0] * (np.exp(I1 - 3) - 1)
+
+    with pytest.raises(tq.ModelError, match="jax.numpy"):
+        tq.fit(DATA, material=WithNumpy(), discrepancy="none", noise_sd=0.1)
+
+
+def test_two_materials_of_one_name_are_refused():
+    import gc
+
+    kind = type("Yeoh", (tq.Material,), {"name": "yeoh", "__module__": "elsewhere", "strain_energy": lambda *a: 0.0})
+    with pytest.raises(tq.ModelError, match="two classes are named 'yeoh'"):
+        tq.materials()
+    del kind
+    gc.collect()
+    assert "yeoh" in tq.materials()
+
+
+def test_an_amplitude_cut_by_its_prior_is_said_to_be_cut(paper):
+    posterior = tq.fit(paper.experiment(), discrepancy="gp", noise_sd=0.5, priors=paper.priors_of("gp"))
+    assert any("c (upper)" in text for text in posterior.warnings)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tissuq.discrepancy import Discrepancy
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics import Material, engineering_stress, stress_basis
 from tissuq.parameters import Parameter
 from tissuq.priors import Normal, Prior, Uniform
 
@@ -190,6 +190,19 @@ class StatisticalModel:
         for parameter in self.parameters:
             self._chosen_prior(parameter)
 
+    def _check_linearity(self) -> None:
+        """Refuse a material whose stress is not proportional to its parameters, which are all taken to be linear."""
+        own = len(self.material.parameters)
+        tried = 0.3 + np.random.default_rng(0).random((own, own))
+        found = engineering_stress(self.material, self.experiment.mode, self.experiment.stretch, tried)
+        expected = tried @ self.design[:, :own].T
+        if not np.allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()):
+            raise ModelError(
+                f"the stress of material '{self.material.name}' is not proportional to its parameters "
+                f"({', '.join(self.material_symbols)}), for example because one stands in an exponent; only materials "
+                "that are linear in their parameters can be fitted yet."
+            )
+
     def _check_data(self) -> None:
         n, name = len(self.experiment), self.experiment.name
         if n < len(self.parameters):
@@ -199,6 +212,7 @@ class StatisticalModel:
             )
         if not self.experiment.stress.any():
             raise InputError(f"experiment '{name}': every stress is zero, so there is nothing to identify.")
+        self._check_linearity()
         lengths = np.linalg.norm(self.design, axis=0)
         if not lengths.all() or np.linalg.cond(self.design / lengths) > 1e10:
             raise ModelError(

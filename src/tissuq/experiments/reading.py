@@ -94,6 +94,12 @@ def read_experiment(
     if stress_type == "cauchy":
         stress = stress / stretch
         stress_source += ", divided by stretch to engineering stress"
+    if compression_positive and (stretch >= 1).all():
+        raise InputError(
+            f"{table.place(choice.deformation)}: compression_positive=True (--compression-positive) is given, but no "
+            "stretch is below 1, so nothing would change. If the file counts compressive strains as positive, too, "
+            "change their sign in the file; otherwise leave it out."
+        )
     if compression_positive:
         stress = np.where(stretch < 1, -stress, stress)
         stress_source += ", sign changed at stretch < 1"

@@ -91,7 +91,10 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, side: int, values: Floa
     heavy = np.abs(lines.series[:, 0] * lines.width) > 1e-8
     lines = Lines(lines.before[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
     seen = values[rule.weights > 1e-8]
-    points = np.linspace(seen.min(), seen.max(), GRID if len(lines.start) <= MANY_LINES else GRID // 4)
+    low, high = warp.bounds(side)
+    margin = 0.05 * np.ptp(seen)
+    ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
+    points = np.linspace(*ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
     coordinates, slope = warp.coordinate(side, points, lines.before)
     density = np.maximum(lines.evaluate(coordinates, slope), 0.0)
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))

@@ -45,7 +45,7 @@ class Components:
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Components(*(np.concatenate(pair) for pair in pairs))
 
-    def thinned(self, count: int = 1500) -> Components:
+    def thinned(self, count: int = 500) -> Components:
         """Return few components that stand for all, their weights summing to one.
 
         The lightest, together less than 1e-7, are left out; if more than ``count`` remain, systematic resampling in

@@ -52,6 +52,12 @@ class Warp:
         h = np.where(self.is_log, np.exp(np.where(self.is_log, g, 0.0)), g)
         return h, log_density - (g * self.is_log).sum(axis=1)
 
+    def bounds(self, j: int) -> tuple[float, float]:
+        """Return the lowest and highest value of parameter j."""
+        ends = np.array([self.lower[j], self.upper[j]])
+        low, high = np.exp(ends) if self.is_log[j] else ends
+        return float(low), float(high)
+
     def coordinate(self, j: int, value: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the coordinate u_j (N, k) of values (k,) given coordinates before it (N, j), and du_j/dvalue."""
         g = np.zeros((len(before), len(self.scale)))
@@ -65,7 +71,7 @@ class Warp:
         distance = (target - centre) / self.scale[j]
         slope = 1 / (np.pi * self.scale[j] * (1 + distance**2) * mass)
         coordinate = (0.5 + np.arctan(distance) / np.pi - start) / mass
-        return np.clip(coordinate, 0.0, 1.0), slope / value if self.is_log[j] else slope
+        return np.clip(coordinate, 0.0, 1.0 - 1e-12), slope / value if self.is_log[j] else slope
 
     def _centre(self, j: int, g: FloatArray) -> FloatArray:
         return np.asarray(self.centre[j] + (g[:, :j] - self.centre[:j]) @ self.slope[j, :j])

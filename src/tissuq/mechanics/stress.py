@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.material import Material
 
@@ -47,7 +48,14 @@ def engineering_stress(
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
     """
     values = np.asarray(values, dtype=np.float64)
-    curves = _curves(material, mode)(np.asarray(stretch, dtype=np.float64), np.atleast_2d(values))
+    jax = differentiator()
+    try:
+        curves = _curves(material, mode)(np.asarray(stretch, dtype=np.float64), np.atleast_2d(values))
+    except jax.errors.TracerArrayConversionError as error:
+        raise ModelError(
+            f"the strain energy of material '{material.name}' cannot be differentiated: write it with plain arithmetic "
+            "and jax.numpy (jnp.exp, not np.exp)."
+        ) from error
     return np.asarray(curves if values.ndim == 2 else curves[0])
 
 

@@ -15,6 +15,9 @@ __all__ = ["Band", "predict_band", "share_inside"]
 
 FloatArray = NDArray[np.float64]
 
+BLOCK = 2000
+"""Stretches predicted at once: what bounds the memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class Band:
@@ -60,10 +63,13 @@ def predict_band(
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
     components = solution.components.thinned()
-    mean, variance = stress_moments(solution.model, components, points, discrepancy=discrepancy, noise=noise)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
-    low, high = (_mixture_quantile(tail, components.weights, mean, variance) for tail in tails)
-    return Band(points, components.weights @ mean, low, high)
+    curves = []
+    for block in np.array_split(points, max(1, len(points) // BLOCK)):
+        mean, variance = stress_moments(solution.model, components, block, discrepancy=discrepancy, noise=noise)
+        ends = [_mixture_quantile(tail, components.weights, mean, variance) for tail in tails]
+        curves.append([components.weights @ mean, *ends])
+    return Band(points, *np.concatenate(curves, axis=1))
 
 
 def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
@@ -92,4 +98,4 @@ def _mixture_quantile(probability: float, weights: FloatArray, mean: FloatArray,
         density = weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
         step = value - excess / np.maximum(density, 1e-300)
         value = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-    return np.asarray(value)
+    return np.where(spread > 0, value, centre)
