@@ -12,8 +12,8 @@ import tissuq
 
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
-    "errors", "registry", "priors", "parameters", "experiments", "mechanics", "discrepancy", "model", "inference",
-    "prediction", "posterior", "fitting", "studies", "report", "cli",
+    "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "model",
+    "inference", "prediction", "posterior", "fitting", "studies", "report", "cli",
 ]  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from numbers import Integral
 from typing import Literal
 
 from tissuq.discrepancy import Discrepancy, discrepancy_named
@@ -77,7 +78,7 @@ def fit(
     """
     if sampler not in SAMPLERS:
         raise InputError(f"there is no sampler '{sampler}'. Choose one of: {', '.join(SAMPLERS)}.")
-    if not isinstance(seed, int) or seed < 0:
+    if not isinstance(seed, Integral) or seed < 0:
         raise InputError(f"seed must be a whole number, zero or more, not {seed!r}.")
     model = StatisticalModel(
         data, material_named(material), discrepancy_named(discrepancy), noise_sd, dict(priors or {})
@@ -103,8 +104,8 @@ def _warnings(solution: Solution) -> list[str]:
         found.append(solution.diagnostics.verdict)
     if solution.model.confounds_noise:
         found.append(
-            "noise_sd and S are both unknown, and only noise_sd^2 + S^2 is in the data: read their sum, or give the "
-            "noise (repeated measurements at one stretch tell it)."
+            "noise_sd and S are both unknown, and only noise_sd^2 + S^2 is in the data: read neither alone, or give "
+            "the noise (repeated measurements at one stretch tell it)."
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -135,6 +136,8 @@ class StatisticalModel:
 
     def _chosen_prior(self, parameter: Parameter) -> Prior | None:
         prior = self.chosen_priors.get(parameter.symbol)
+        if prior is not None and not isinstance(prior, Prior):
+            raise InputError(f"{parameter.symbol}: a prior must be one such as tissuq.Uniform(0, 1), not {prior!r}.")
         try:
             return prior.within(parameter.support) if prior else None
         except InputError as error:
@@ -144,6 +147,11 @@ class StatisticalModel:
         if parameter.relative_prior is None:
             raise ModelError(f"parameter {parameter.symbol} has no default prior: give one.")
         data = self.experiment
+        if parameter.dimension == "stretch" and not np.ptp(data.stretch):
+            raise ModelError(
+                f"experiment '{data.name}' has one stretch only, so nothing tells the {parameter.description} "
+                f"{parameter.symbol}: measure at other stretches, or choose another discrepancy."
+            )
         unit = {"stress": np.abs(data.stress).max(), "stretch": np.ptp(data.stretch), "number": 1.0}
         return parameter.relative_prior.scaled(float(unit[parameter.dimension]))
 
@@ -167,7 +175,7 @@ class StatisticalModel:
     def _check_noise(self) -> None:
         if self.noise_sd == "unknown":
             return
-        if not isinstance(self.noise_sd, int | float) or not 0 < self.noise_sd < inf:
+        if not isinstance(self.noise_sd, Real) or self.noise_sd is True or not 0 < self.noise_sd < inf:
             raise InputError(
                 f"noise_sd must be a positive number of MPa or 'unknown', not {self.noise_sd!r}. "
                 "Noise of zero would make every measurement exact; if you do not know it, say 'unknown'."

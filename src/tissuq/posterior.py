@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tissuq.errors import InputError
 from tissuq.inference.solution import Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
-from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data
+from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,6 +69,8 @@ class Posterior:
         """
         import pandas as pd
 
+        if not 0 < prob < 1:
+            raise InputError(f"prob must be between 0 and 1, not {prob}.")
         rows = {}
         for symbol, marginal in self.solution.marginals.items():
             low, high = marginal.hdi(prob)
@@ -115,16 +118,17 @@ class Posterior:
         """Everything as labelled arrays that ArviZ reads.
 
         Groups posterior, posterior_predictive, log_likelihood (dimensions chain, draw and, for the latter two,
-        measurement), observed_data and constant_data.
+        measurement), observed_data and constant_data. With very many measurements the latter two hold only some of
+        the draws. On the exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the
+        quadrature's points: for their intervals and densities use `summary` and ``solution.marginals``.
         """
         import xarray as xr
 
         solution, experiment = self.solution, self.model.experiment
         point = {"measurement": np.arange(len(experiment))}
-        sample = {
-            "chain": np.arange(solution.drawn_from.shape[0]),
-            "draw": np.arange(solution.drawn_from.shape[1]),
-        }
+        chains, draws = (np.arange(size) for size in solution.shape)
+        sample = {"chain": chains, "draw": draws}
+        some = {"chain": chains, "draw": draws[:: stride(solution)]}
         parameters = {parameter.symbol: parameter for parameter in self.model.parameters}
         stress = ("chain", "draw", "measurement")
         in_mpa = {"units": "MPa"}
@@ -137,9 +141,9 @@ class Posterior:
                 sample,
             ),
             "posterior_predictive": xr.Dataset(
-                {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, sample | point
+                {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, some | point
             ),
-            "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, sample | point),
+            "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, some | point),
             "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
             "constant_data": xr.Dataset({"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point),
         }

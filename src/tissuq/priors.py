@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import MISSING, dataclass, fields, replace
-from math import erf, inf, isnan, log, pi, sqrt
+from math import inf, isnan, log, pi, sqrt
+from numbers import Real
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.registry import find, variants
+from tissuq.gaussian import interval_quantile, log_interval
+from tissuq.registry import find
 
 __all__ = ["Exponential", "HalfCauchy", "HalfNormal", "LogNormal", "Normal", "Prior", "Uniform", "prior_from"]
 
@@ -34,7 +36,7 @@ class Prior(ABC):
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, int | float) or isnan(value) or (abs(value) == inf and field.default is MISSING):
+            if not isinstance(value, Real) or isnan(value) or (abs(value) == inf and field.default is MISSING):
                 raise InputError(f"prior {self.name}: {field.name} must be a finite number, not {value!r}.")
         self._check()
 
@@ -79,7 +81,9 @@ class Prior(ABC):
         return {"distribution": self.name} | self._given()
 
     def __str__(self) -> str:
-        return f"{self.name}({', '.join(f'{value:.6g}' for value in self._given().values())})"
+        optional = {field.name for field in fields(self) if field.default is not MISSING}
+        given = (f"{name}={value:.6g}" if name in optional else f"{value:.6g}" for name, value in self._given().items())
+        return f"{self.name}({', '.join(given)})"
 
     def _given(self) -> dict[str, float]:
         """Return the arguments, without infinite bounds at the end."""
@@ -142,17 +146,15 @@ class Normal(Prior):
     @property
     def log_size(self) -> float:
         """Log of the integral of exp(-(x - mean)^2 / (2 sd^2)) between the bounds."""
-        start, end = self._ends()
-        return log(self.sd * sqrt(2 * pi) * (end - start))
+        return log(self.sd * sqrt(2 * pi)) + float(log_interval(*self._ends))
 
     def quantile(self, probability: Any) -> Any:
-        from scipy.special import ndtri
+        return self.mean + self.sd * interval_quantile(probability, *self._ends)
 
-        start, end = self._ends()
-        return self.mean + self.sd * ndtri(start + (end - start) * np.asarray(probability))
-
+    @property
     def _ends(self) -> tuple[float, float]:
-        return tuple(0.5 * (1 + erf((end - self.mean) / (self.sd * sqrt(2)))) for end in self.support)  # type: ignore[return-value]
+        """The bounds in standard deviations from the mean."""
+        return (self.low - self.mean) / self.sd, (self.high - self.mean) / self.sd
 
 
 @dataclass(frozen=True)
@@ -265,11 +267,6 @@ def prior_from(settings: dict[str, Any]) -> Prior:
         optional = f" (and may have {' and '.join(may)})" if may else ""
         raise InputError(f"a {name} prior needs {' and '.join(needed)}{optional}; it was given {given}.")
     return kind(**arguments)
-
-
-def distributions() -> dict[str, type[Prior]]:
-    """Return every prior distribution by name."""
-    return variants(Prior)
 
 
 def _log(value: Any) -> Any:

@@ -37,7 +37,8 @@ def test_parameters_far_from_their_bounds_cost_no_accuracy():
 
 def test_points_in_a_box_have_the_moments_of_the_bounded_gaussian():
     box = Box(np.array([0.0, -np.inf, -np.inf]), np.array([np.inf, np.inf, np.inf]))
-    weights, points = box.points(np.zeros((1, 3)), ROOT[None], 20_000)
+    log_weights, points = box.points(np.zeros((1, 3)), ROOT[None], 20_000)
+    weights = np.exp(log_weights)
     law = truncnorm(0, np.inf)
     mean = weights[0] @ points[0] / weights[0].sum()
     assert mean == pytest.approx(law.mean() * np.array([1.0, 0.6, 0.2]), abs=5e-3)
@@ -62,7 +63,7 @@ def test_a_smooth_kernel_has_a_small_rank():
 def test_repeated_points_do_not_break_the_spectrum():
     points = np.repeat([1.0, 1.5, 2.0], 3)
     found = correlation_spectrum(GaussianProcess(), points, (0.5,))
-    assert len(found.values) == 3
+    assert (found.values > 1e-12).sum() == 3
 
 
 def test_the_hpd_of_a_gaussian_is_its_central_interval():

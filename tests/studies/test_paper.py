@@ -105,6 +105,7 @@ def test_a_check_fails_only_where_chance_would_be_too_rare():
     assert at_most(25) < 0.025 < at_most(26)
     assert not passes(25 / 30, 30)
     assert passes(26 / 30, 30)
+    assert passes(0.95, 10_000)
 
 
 @pytest.mark.parametrize(

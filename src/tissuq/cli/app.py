@@ -18,6 +18,7 @@ app = typer.Typer(
     name="tissuq",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted.",
 )

@@ -24,7 +24,10 @@ def fit(
         typer.Option(help="Discrepancy; repeat for more; 'all' fits every one that applies [all]."),
     ] = None,
     noise_sd: Annotated[
-        str | None, typer.Option(help="Standard deviation of the noise in the file's stress unit [unknown].")
+        str | None,
+        typer.Option(
+            help="Sd of the noise of the engineering stress, in the file's stress unit, or unknown [unknown]."
+        ),
     ] = None,
     prior: Annotated[
         list[str] | None,

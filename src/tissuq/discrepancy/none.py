@@ -11,4 +11,6 @@ class NoDiscrepancy(Discrepancy):
     name = "none"
     formula = "0"
     source = "Zeraatpisheh et al. 2021, eq. 12"
-    caution = "If the material is wrong, its parameters are over-confident and nothing here shows it."
+    caution = (
+        "If the material is wrong, its parameters are over-confident: the interval does not show it, the check may."
+    )

@@ -44,7 +44,8 @@ def resampled(points: Components) -> Components:
 
 def _points_within(components: Components, box: Box) -> Components:
     few = components.thinned(REPRESENTED)
-    shares, points = box.points(few.mean, few.root, max(POINTS, ALL_POINTS // len(few.weights)))
+    log_shares, points = box.points(few.mean, few.root, max(POINTS, ALL_POINTS // len(few.weights)))
+    shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
     weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
     kept = weights > 1e-12 * weights.max()
     p = points.shape[2]

@@ -8,6 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.gaussian import interval_quantile, log_interval
+
 __all__ = ["NEGLIGIBLE", "POINTS", "Box"]
 
 FloatArray = NDArray[np.float64]
@@ -15,7 +17,7 @@ FloatArray = NDArray[np.float64]
 NEGLIGIBLE = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
 POINTS = 512
-SMALLEST = 1e-300
+MANY_POINTS = 65_536
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Box:
         the mass inside is computed over the parameters that come near their bounds: exactly for one, and by
         Genz's sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
         """
-        from scipy.special import ndtr
+        from scipy.special import logsumexp, ndtr
 
         sd = np.sqrt((root**2).sum(2))
         low, high = (self.lower - mean) / sd, (self.upper - mean) / sd
@@ -44,59 +46,35 @@ class Box:
             crossed = np.flatnonzero((active == pattern).all(axis=1))
             kept = np.flatnonzero(pattern)
             if len(kept) == 1:
-                log_inside[crossed] = _log_interval(low[crossed, kept[0]], high[crossed, kept[0]])
-            else:
-                part = Box(self.lower[kept], self.upper[kept])
-                covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
-                weights, _ = part.points(
-                    mean[crossed][:, kept], np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-                )
-                log_inside[crossed] = np.log(np.maximum(weights.mean(1), SMALLEST))
+                log_inside[crossed] = log_interval(low[crossed, kept[0]], high[crossed, kept[0]])
+                continue
+            part = Box(self.lower[kept], self.upper[kept])
+            covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
+            triangle = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+            number = max(POINTS, min(MANY_POINTS, MANY_POINTS // len(crossed)))
+            log_weights, _ = part.points(mean[crossed][:, kept], triangle, number)
+            log_inside[crossed] = logsumexp(log_weights, axis=1) - np.log(number)
         return outside, log_inside
 
     def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
-        """Return weights (N, P) and P = number points (N, P, p) inside the box, distributed as the bounded Gaussian.
+        """Return log weights (N, P) and P = number points (N, P, p) inside the box: a weighted bounded Gaussian.
 
         The mean weight is the mass inside.
         """
         count, p = mean.shape
         triangle = np.linalg.cholesky(root @ root.swapaxes(1, 2))
         uniforms = _quasi_random(p, number)
-        weights = np.ones((count, len(uniforms)))
+        log_weights = np.zeros((count, len(uniforms)))
         standard = np.empty((count, len(uniforms), p))
         points = np.empty_like(standard)
         for j in range(p):
             centre = mean[:, None, j] + np.einsum("nqk,nk->nq", standard[:, :, :j], triangle[:, j, :j])
             scale = triangle[:, j, j][:, None]
             low, high = (self.lower[j] - centre) / scale, (self.upper[j] - centre) / scale
-            standard[:, :, j], mass = _truncated_quantile(uniforms[:, j], low, high)
-            weights *= mass
+            log_weights += log_interval(low, high)
+            standard[:, :, j] = interval_quantile(uniforms[:, j], low, high)
             points[:, :, j] = np.clip(centre + scale * standard[:, :, j], self.lower[j], self.upper[j])
-        return weights, points
-
-
-def _truncated_quantile(probability: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return quantiles of a standard normal between bounds, and the mass between them; right in both tails."""
-    from scipy.special import ndtr, ndtri
-
-    flip = low > 0
-    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
-    below, above = ndtr(a), ndtr(b)
-    mass = above - below
-    position = np.where(flip, 1 - probability, probability)
-    value = ndtri(np.clip(below + position * mass, SMALLEST, 1 - 1e-16))
-    value = np.clip(value, a, b)
-    return np.where(flip, -value, value), mass
-
-
-def _log_interval(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return log(Phi(high) - Phi(low)), right in both tails."""
-    from scipy.special import log_ndtr
-
-    flip = low > 0
-    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
-    upper, lower = log_ndtr(b), log_ndtr(a)
-    return np.asarray(upper + np.log(np.maximum(-np.expm1(lower - upper), SMALLEST)))
+        return log_weights, points
 
 
 @lru_cache

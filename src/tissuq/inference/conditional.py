@@ -9,6 +9,7 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.errors import ConvergenceError
 from tissuq.inference.box import Box
 from tissuq.inference.lowrank import correlation_spectrum
 from tissuq.model import StatisticalModel
@@ -76,7 +77,13 @@ class ConditionalGaussian:
         precision = moments[:, :p, :p] + self._prior_precision
         pull = np.einsum("nij,nj->ni", moments[:, :p, p:], rest) + self._prior_pull
         misfit = np.einsum("ni,nij,nj->n", rest, moments[:, p:, p:], rest) + self._prior_misfit
-        cholesky = np.linalg.cholesky(precision)
+        try:
+            cholesky = np.linalg.cholesky(precision)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                "the linear parameters cannot be integrated to working precision: the noise is too small beside the "
+                "discrepancy. Give the noise, or narrower priors, or use the sampler 'nuts'."
+            ) from error
         inverse_root = np.linalg.inv(cholesky)
         whitened = np.einsum("nij,nj->ni", inverse_root, pull)
         root = self._inverse @ inverse_root.swapaxes(1, 2)

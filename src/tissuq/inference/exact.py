@@ -73,8 +73,7 @@ def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
         for side, symbol in enumerate(model.nonlinear):
             marginals[symbol] = marginal_of_quadrature(rule, warp, side, settings[:, side])
     components = inner.joined(resampled(cut)) if len(cut.weights) else inner
-    drawn_from, draws = _draw(components, seed)
-    columns = dict(zip((*model.nonlinear, *model.linear), draws, strict=True))
+    columns = dict(zip((*model.nonlinear, *model.linear), _draw(components, seed), strict=True))
     return Solution(
         model=model,
         route="exact",
@@ -82,7 +81,6 @@ def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
         components=components,
         marginals={symbol: marginals[symbol] for symbol in model.symbols},
         draws={symbol: columns[symbol] for symbol in model.symbols},
-        drawn_from=drawn_from,
         log_evidence=rule.log_integral if rule else float(given.log_likelihood[0]),
         log_evidence_error=rule.log_error if rule else 0.0,
     )
@@ -115,13 +113,13 @@ def _linear_marginal(inner: Components, cut: Components, place: int, bounds: tup
     return blended(parts, bounds)
 
 
-def _draw(components: Components, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return which component each draw comes from, and the draws of (nonlinear, linear) parameters."""
+def _draw(components: Components, seed: int) -> FloatArray:
+    """Return draws (d + p, chains, draws) of the nonlinear and the linear parameters."""
     generator = np.random.default_rng(seed)
     chosen = generator.choice(len(components.weights), size=(CHAINS, DRAWS), p=components.weights)
     noise = generator.standard_normal((CHAINS, DRAWS, components.root.shape[2]))
     linear = components.mean[chosen] + np.einsum("cdij,cdj->cdi", components.root[chosen], noise)
-    return chosen, np.moveaxis(np.concatenate([components.settings[chosen], linear], axis=2), 2, 0)
+    return np.moveaxis(np.concatenate([components.settings[chosen], linear], axis=2), 2, 0)
 
 
 def _reason(model: StatisticalModel, is_bounded: bool) -> str:

@@ -15,8 +15,10 @@ __all__ = ["Spectrum", "correlation_spectrum"]
 
 FloatArray = NDArray[np.float64]
 
-TOLERANCE = 1e-13
-"""Share of the trace that the factor may leave out."""
+TOLERANCE = 1e-14
+"""Share of the trace that the factor of many points may leave out."""
+ROUNDING = 1e-17
+"""Eigenvalue, relative to the trace, below which the decomposition of few points gives only rounding errors."""
 FEW_POINTS = 128
 
 
@@ -57,7 +59,7 @@ def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float,
     values = dict(zip(discrepancy.shape_symbols, shape, strict=True))
     if len(points) <= FEW_POINTS:
         spectrum, vectors = np.linalg.eigh(discrepancy.correlation(points, points, values))
-        kept = spectrum > TOLERANCE * len(points)
+        kept = spectrum > ROUNDING * len(points)
         return Spectrum(vectors[:, kept], spectrum[kept])
     root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points)
     vectors, singular, _ = np.linalg.svd(root, full_matrices=False)

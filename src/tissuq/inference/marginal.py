@@ -66,7 +66,9 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
     mean = float(weights @ means)
     sd = float(np.sqrt(weights @ (sds**2 + (means - mean) ** 2)))
     weights, means, sds = _merged(weights, means, sds)
-    points = np.linspace(mean - 10 * sd, mean + 10 * sd, GRID)
+    scores = np.linspace(-8, 8, 65)
+    spread, shares = means[:, None] + sds[:, None] * scores, weights[:, None] * np.exp(-0.5 * scores**2)
+    points = _grid(spread.ravel(), shares.ravel(), (spread.min(), spread.max()), GRID)
     scores = (points - means[:, None]) / sds[:, None]
     density = (weights / sds) @ np.exp(-0.5 * scores**2) / np.sqrt(2 * np.pi)
     return Marginal(mean, sd, points, density, _proper(weights @ ndtr(scores)))
@@ -94,7 +96,7 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, side: int, values: Floa
     low, high = warp.bounds(side)
     margin = 0.05 * np.ptp(seen)
     ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
-    points = np.linspace(*ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
+    points = _grid(values, rule.weights, ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
     coordinates, slope = warp.coordinate(side, points, lines.before)
     density = np.maximum(lines.evaluate(coordinates, slope), 0.0)
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))
@@ -123,6 +125,18 @@ def marginal_of_points(points: FloatArray, weights: FloatArray, bounds: tuple[fl
     return Marginal(mean, sd, edges, np.interp(edges, edges[:-1] + 0.5 * step, smooth), _proper(cumulative))
 
 
+def _grid(values: FloatArray, weights: FloatArray, ends: tuple[float, float], count: int) -> FloatArray:
+    """Return about ``count`` points between two ends, close where weighted values are: heavy tails get their share."""
+    order = np.argsort(values)
+    cumulative = np.cumsum(weights[order])
+    tails = 10.0 ** -np.arange(1, 10)
+    probabilities = np.concatenate([np.linspace(0, 1, count // 2), tails, 1 - tails])
+    close = np.interp(probabilities * cumulative[-1], cumulative, values[order])
+    core = np.interp(np.array([1e-4, 1 - 1e-4]) * cumulative[-1], cumulative, values[order])
+    even = np.linspace(max(ends[0], core[0]), min(ends[1], core[1]), count // 2)
+    return np.unique(np.clip(np.concatenate([close, even, ends]), *ends))
+
+
 def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Merge Gaussians that are nearly the same (means within a 300th of the range, sds within 5 %), keeping moments."""
     if len(weights) <= FEW:
@@ -144,9 +158,7 @@ def blended(parts: list[tuple[float, Marginal]], bounds: tuple[float, float]) ->
         return parts[0][1]
     mean = sum(weight * part.mean for weight, part in parts)
     variance = sum(weight * (part.sd**2 + (part.mean - mean) ** 2) for weight, part in parts)
-    low = max(bounds[0], min(part.points[0] for _, part in parts))
-    high = min(bounds[1], max(part.points[-1] for _, part in parts))
-    points = np.linspace(low, high, 2 * GRID)
+    points = np.unique(np.clip(np.concatenate([part.points for _, part in parts]), *bounds))
     density = sum(weight * part.pdf(points) for weight, part in parts)
     cumulative = sum(
         weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0) for weight, part in parts

@@ -92,9 +92,9 @@ def _start(model: StatisticalModel) -> FloatArray:
     chosen = dict(zip((*model.nonlinear, *model.linear), [*settings[best], *given.mean[best]], strict=True))
     for symbol in model.linear:
         low, high = model.priors[symbol].support
-        if np.isfinite(high - low):
-            margin = 1e-6 * (high - low)
-            chosen[symbol] = float(np.clip(chosen[symbol], low + margin, high - margin))
+        sd = float(np.linalg.norm(given.root[best, model.linear.index(symbol)]))
+        margin = min(1e-6 * (high - low), 1e-3 * sd)
+        chosen[symbol] = float(np.clip(chosen[symbol], low + margin, high - margin))
     return np.array([chosen[symbol] for symbol in model.symbols])
 
 
@@ -123,6 +123,5 @@ def _solution(model: StatisticalModel, sampled: NutsDraws) -> Solution:
             for symbol in model.symbols
         },
         draws=values,
-        drawn_from=np.arange(count).reshape(chains, draws),
         diagnostics=diagnostics,
     )

@@ -45,7 +45,7 @@ class Components:
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Components(*(np.concatenate(pair) for pair in pairs))
 
-    def thinned(self, count: int = 500) -> Components:
+    def thinned(self, count: int) -> Components:
         """Return few components that stand for all, their weights summing to one.
 
         The lightest, together less than 1e-7, are left out; if more than ``count`` remain, systematic resampling in
@@ -87,9 +87,8 @@ class Solution:
     marginals : dict of str to Marginal
         One for each parameter.
     draws : dict of str to (chains, draws) array
-        Draws of every parameter; independent of each other on the exact route.
-    drawn_from : (chains, draws) array of int
-        The component that each draw belongs to.
+        Draws of every parameter. On the exact route they are independent of each other, and those of nonlinear
+        parameters take the values of the quadrature's points: for densities and intervals use the marginals.
     log_evidence, log_evidence_error : float or None
         Log of p(y) with respect to the normalised priors, y in MPa; None where the route has none.
     diagnostics : Diagnostics or None
@@ -104,7 +103,6 @@ class Solution:
     components: Components
     marginals: dict[str, Marginal]
     draws: dict[str, FloatArray]
-    drawn_from: NDArray[np.intp]
     log_evidence: float | None = None
     log_evidence_error: float | None = None
     diagnostics: Diagnostics | None = None
@@ -115,6 +113,8 @@ class Solution:
         """Whether the result must not be used as it stands, because sampling has not converged."""
         return self.diagnostics is not None and not self.diagnostics.converged
 
-    def drawn_values(self) -> dict[str, Any]:
-        """Return the draws as flat arrays, chain after chain."""
-        return {symbol: values.ravel() for symbol, values in self.draws.items()}
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of chains, and of draws in each."""
+        chains, draws = next(iter(self.draws.values())).shape
+        return chains, draws

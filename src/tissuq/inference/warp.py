@@ -19,8 +19,8 @@ PROBES = 10
 """Prior probabilities tried along each parameter in the search for the mode: 2^-1, 2^-2, ..."""
 NEWTON_STEPS = 25
 STEP = 1e-3
-REACH = 60.0
-"""e-folds below the mode at which the logarithm of a parameter ends: what lies below has no mass."""
+REACH = 20.0
+"""e-folds below the mode at which the logarithm of a parameter ends: about e^-20 of the mass lies below."""
 
 
 @dataclass(frozen=True, eq=False)

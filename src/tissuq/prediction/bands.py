@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
+MANY, FEW = 3000, 200
+"""Components that stand for the posterior at a block of stretches, and at more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ def predict_band(
         raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    components = solution.components.thinned()
+    components = solution.components.thinned(FEW if len(points) > BLOCK else MANY)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
     curves = []
     for block in np.array_split(points, max(1, len(points) // BLOCK)):

@@ -103,13 +103,11 @@ def _condition(
     data = model.experiment
     cross = model.discrepancy.correlation(stretch, data.stretch, part.shape)
     vectors = part.correlation.vectors
-    inside, outside = cross @ vectors, cross - (cross @ vectors) @ vectors.T
+    inside = cross @ vectors
     gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
-    stretch_gain = part.amplitude / part.white
     columns = np.column_stack([model.design, data.stress])
     smoothed = np.einsum("gr,nr,rk->ngk", inside, gain, vectors.T @ columns)
-    smoothed += stretch_gain[:, None, None] * (outside @ columns)
     pull, of_data = smoothed[:, :, :-1], smoothed[:, :, -1]
-    explained = gain @ (inside**2).T + stretch_gain[:, None] * (outside**2).sum(axis=1)
+    explained = gain @ (inside**2).T
     variance = np.maximum(part.amplitude[:, None] * (1 - explained), 0.0)
     return of_data - np.einsum("ngk,nk->ng", pull, mean_b), pull, variance

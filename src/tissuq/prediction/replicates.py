@@ -10,15 +10,25 @@ from numpy.typing import NDArray
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import correlated_parts
 
-__all__ = ["pointwise_log_likelihood", "replicate_data"]
+__all__ = ["pointwise_log_likelihood", "replicate_data", "stride"]
 
 FloatArray = NDArray[np.float64]
+
+MOST_VALUES = 40_000_000
+"""Values at most in an array over draws and measurements (320 MB)."""
+
+
+def stride(solution: Solution) -> int:
+    """Return the step between the draws that get values at every measurement: one, unless memory would not do."""
+    chains, draws = solution.shape
+    return min(draws, 1 + chains * draws * len(solution.model.experiment) // MOST_VALUES)
 
 
 def replicate_data(solution: Solution, seed: int) -> FloatArray:
     """Return (chains, draws, n) replicated stresses, MPa: a draw of everything, discrepancy and noise included.
 
-    A correlated discrepancy is drawn given the data, at the draw's own parameters (eq. 27 as corrected).
+    Where there are many measurements, only every `stride`-th draw is there. A correlated discrepancy is drawn given
+    the data, at the draw's own parameters (eq. 27 as corrected).
     """
     generator = np.random.default_rng([seed, 3])
     mean, settings, white = _given_draws(solution)
@@ -31,7 +41,7 @@ def replicate_data(solution: Solution, seed: int) -> FloatArray:
             along = share * (residual[part.chosen] @ part.correlation.vectors)
             along += np.sqrt(share * part.white[:, None]) * score
             replicate[part.chosen] += along @ part.correlation.vectors.T
-    return replicate.reshape(*solution.drawn_from.shape, -1)
+    return replicate.reshape(solution.shape[0], -1, mean.shape[1])
 
 
 def pointwise_log_likelihood(solution: Solution) -> FloatArray:
@@ -53,13 +63,14 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
             diagonal = inverse @ (vectors**2).T + rest / part.white[:, None]
             residual[part.chosen], variance[part.chosen] = solved / diagonal, 1 / diagonal
     density = -0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi))
-    return density.reshape(*solution.drawn_from.shape, -1)
+    return density.reshape(solution.shape[0], -1, mean.shape[1])
 
 
 def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return mean stress (D, n), nonlinear parameters (D, d) and white variance (D,) of every draw."""
-    model, values = solution.model, solution.drawn_values()
-    count = solution.drawn_from.size
+    """Return mean stress (D, n), nonlinear parameters (D, d) and white variance (D,) of every `stride`-th draw."""
+    model, step = solution.model, stride(solution)
+    values = {symbol: drawn[:, ::step].ravel() for symbol, drawn in solution.draws.items()}
+    count = len(next(iter(values.values())))
     columns = np.column_stack([values[symbol] for symbol in model.column_symbols])
     settings = np.array([values[symbol] for symbol in model.nonlinear]).reshape(-1, count).T
     white = np.broadcast_to(model.white_variance(values), count).astype(float)

@@ -79,7 +79,7 @@ def predictive_figure(
                     ":",
                     color=BASE,
                     lw=1.4,
-                    label="mean without discrepancy",
+                    label="mean of the fit 'none'",
                 )
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")

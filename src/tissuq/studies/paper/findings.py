@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 
@@ -65,6 +64,6 @@ def find(posterior: Posterior, truth: float, base: Band | None = None) -> Findin
 
 def passes(share: float, measurements: int, prob: float = 0.95) -> bool:
     """Return whether a share inside a 95 % band is what chance allows: not in the lowest 2.5 % of a binomial law."""
-    inside = round(share * measurements)
-    at_most = sum(comb(measurements, k) * prob**k * (1 - prob) ** (measurements - k) for k in range(inside + 1))
-    return at_most > 0.025
+    from scipy.special import bdtr
+
+    return bool(bdtr(round(share * measurements), measurements, prob) > 0.025)

@@ -10,7 +10,7 @@ from tissuq.priors import Uniform
 from tissuq.studies.paper.findings import Findings
 from tissuq.studies.paper.settings import FORMULATIONS, PaperSettings
 
-__all__ = ["AMPLITUDE_BOUNDS", "RANGES", "Cell", "sensitivity"]
+__all__ = ["AMPLITUDE_BOUNDS", "RANGES", "Cell", "ranges_of", "sensitivity"]
 
 RANGES = ((0.5, 4.25), (0.5, 3.0), (0.6, 2.0), (1.0, 4.25))
 AMPLITUDE_BOUNDS = (1.0, 10.0)
@@ -36,7 +36,7 @@ def sensitivity(settings: PaperSettings, own: Sequence[Findings], step: Callable
     """
     cells = []
     here = (settings.stretch_low, settings.stretch_high)
-    for low, high in dict.fromkeys((here, *RANGES)):
+    for low, high in ranges_of(settings):
         step(f"stretch range {low:g} to {high:g}")
         there = settings.model_copy(update={"stretch_low": low, "stretch_high": high})
         for formulation in FORMULATIONS:
@@ -48,6 +48,11 @@ def sensitivity(settings: PaperSettings, own: Sequence[Findings], step: Callable
             else:
                 cells.append(_fitted(there, formulation, None))
     return cells
+
+
+def ranges_of(settings: PaperSettings) -> list[tuple[float, float]]:
+    """Return the stretch ranges of the table: the study's own, and the others."""
+    return list(dict.fromkeys(((settings.stretch_low, settings.stretch_high), *RANGES)))
 
 
 def _fitted(settings: PaperSettings, formulation: str, bound: float | None) -> Cell:

@@ -13,7 +13,7 @@ from tissuq.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.studies.paper.claims import Verdict, judge
 from tissuq.studies.paper.findings import Finding, Findings, find
-from tissuq.studies.paper.sensitivity import Cell, sensitivity
+from tissuq.studies.paper.sensitivity import Cell, ranges_of, sensitivity
 from tissuq.studies.paper.settings import FORMULATIONS, PaperSettings
 
 __all__ = ["Fitted", "PaperStudy", "run_paper", "steps_of"]
@@ -50,7 +50,7 @@ class PaperStudy:
 def steps_of(settings: PaperSettings) -> int:
     """Return how many steps a run announces."""
     fits = len(FORMULATIONS) * (2 if settings.sampler == "both" else 1)
-    return fits + settings.replicates - 1 + 5
+    return fits + settings.replicates - 1 + len(ranges_of(settings)) + 1
 
 
 def run_paper(settings: PaperSettings, step: Callable[[str], None] = lambda text: None) -> PaperStudy:
