@@ -149,7 +149,7 @@ class Normal(Prior):
         return log(self.sd * sqrt(2 * pi)) + float(log_interval(*self._ends))
 
     def quantile(self, probability: Any) -> Any:
-        return self.mean + self.sd * interval_quantile(probability, *self._ends)
+        return self.mean + self.sd * interval_quantile(probability, *self._ends)[0]
 
     @property
     def _ends(self) -> tuple[float, float]:

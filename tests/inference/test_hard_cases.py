@@ -1,4 +1,4 @@
-"""Inputs at the edge: few points, tiny noise, wrong signs, bounds far away. Each once gave a wrong number or a crash."""
+"""Inputs at the edge: few points, tiny noise, wrong signs, far bounds. Each once gave a wrong number or a crash."""
 
 from __future__ import annotations
 

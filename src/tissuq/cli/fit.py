@@ -53,7 +53,7 @@ def fit(
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
     """Identify a material's parameters from a file of stretches and stresses."""
-    from tissuq.cli.tables import print_summary
+    from tissuq.cli.tables import print_summary, print_warnings
     from tissuq.report.run_folder import check_target, run_folder
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import SpecimenSettings, run_specimen
@@ -83,6 +83,7 @@ def fit(
         with run_folder(target, force=force) as folder:
             write_specimen_run(study, source, folder, figures=figures)
     print_summary(target)
+    print_warnings(study.warnings)
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     not_converged(study.not_converged)

@@ -31,7 +31,7 @@ def paper(
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
     """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
-    from tissuq.cli.tables import print_summary
+    from tissuq.cli.tables import print_summary, print_warnings
     from tissuq.report.paper import write_paper_run
     from tissuq.report.run_folder import check_target, run_folder
     from tissuq.studies.paper import PaperSettings, run_paper
@@ -52,6 +52,7 @@ def paper(
         with run_folder(out, force=force) as folder:
             write_paper_run(study, folder, figures=figures)
     print_summary(out)
+    print_warnings(study.warnings)
     not_converged(study.not_converged)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from tissuq.errors import InputError
 from tissuq.report.run_folder import RECIPE
 
-__all__ = ["print_rows", "print_summary"]
+__all__ = ["print_rows", "print_summary", "print_warnings"]
 
 
 def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
@@ -61,6 +62,12 @@ def print_summary(folder: Path) -> None:
     )
     print("A good predictive check does not mean that C10 is right.")
     print(f"Report: {folder / 'report.html'}")
+
+
+def print_warnings(warnings: list[str]) -> None:
+    """Print what a reader of a run must know."""
+    for text in warnings:
+        print(fill(text, 96, initial_indent="Note: ", subsequent_indent="      "))
 
 
 def _read_run(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]], str, str]:

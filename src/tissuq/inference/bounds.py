@@ -13,9 +13,9 @@ __all__ = ["resampled", "split_at_bounds"]
 FloatArray = NDArray[np.float64]
 
 RESAMPLED = 4000
-REPRESENTED = 400
+REPRESENTED = 200
 """Components, at most, that are represented by points."""
-ALL_POINTS = 100_000
+ALL_POINTS = 50_000
 """Points, at least, that represent all of them together."""
 
 

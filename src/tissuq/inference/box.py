@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 NEGLIGIBLE = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
 POINTS = 512
-MANY_POINTS = 65_536
+MANY_POINTS = 16_384
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +71,8 @@ class Box:
             centre = mean[:, None, j] + np.einsum("nqk,nk->nq", standard[:, :, :j], triangle[:, j, :j])
             scale = triangle[:, j, j][:, None]
             low, high = (self.lower[j] - centre) / scale, (self.upper[j] - centre) / scale
-            log_weights += log_interval(low, high)
-            standard[:, :, j] = interval_quantile(uniforms[:, j], low, high)
+            standard[:, :, j], log_mass = interval_quantile(uniforms[:, j], low, high)
+            log_weights += log_mass
             points[:, :, j] = np.clip(centre + scale * standard[:, :, j], self.lower[j], self.upper[j])
         return log_weights, points
 

@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
-MANY, FEW = 3000, 200
+MANY, FEW = 1500, 200
 """Components that stand for the posterior at a block of stretches, and at more."""
 
 

@@ -123,7 +123,6 @@ def _claims(study: PaperStudy) -> list[Row]:
 def _context(study: PaperStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
     posteriors = _posteriors(study.main)
     drawn = folder / "figures"
-    every = [*study.main.values(), *study.sampled.values()]
     return {
         "settings": study.settings,
         "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
@@ -131,7 +130,7 @@ def _context(study: PaperStudy, summary: list[Row], folder: Path) -> dict[str, A
         "held": [row["formulation"] for row in summary if row["contains_truth"]],
         "passed": [name for name, each in study.main.items() if each.finding.passes],
         "is_sampled": study.settings.sampler == "nuts",
-        "warnings": [f"{each.formulation}: {text}" for each in every for text in each.posterior.warnings],
+        "warnings": study.warnings,
         "verdicts": study.verdicts,
         "cells": _cells(study),
         "agreement": [_readable_agreement(row) for row in _agreement(study)],

@@ -74,7 +74,7 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         "lead": _lead(summary, study),
         "summary": readable_summary(summary, study.unit),
         "is_sampled": any(row["rhat"] is not None for row in summary),
-        "warnings": _warnings(study),
+        "warnings": study.warnings,
         "cautions": {
             name: each.model.discrepancy.caution
             for name, each in study.posteriors.items()
@@ -90,6 +90,9 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
 def _lead(summary: list[Row], study: SpecimenStudy) -> str:
     """Return the finding in a sentence or two."""
     scale, unit = study.unit.to_mpa, study.unit.name
+    if len(summary) > 1:
+        summary = [row for row in summary if not study.is_cut_by_prior(row["formulation"])] or summary
+    left_out = len(study.posteriors) - len(summary)
     means = [row["C10_mean"] / scale for row in summary]
     if len(summary) == 1:
         row = summary[0]
@@ -108,13 +111,5 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
     return (
         f"With {len(summary)} ways to account for model uncertainty, the mean of C10 ranges from {significant(low)} to "
         f"{significant(high)} {unit}; {verdict}."
+        + (f" ({left_out} more left out here, because a bound of a prior decides part of them.)" if left_out else "")
     )
-
-
-def _warnings(study: SpecimenStudy) -> list[str]:
-    """Return each warning once, with the discrepancies that it concerns."""
-    concerned: dict[str, list[str]] = {}
-    for name, posterior in study.posteriors.items():
-        for text in posterior.warnings:
-            concerned.setdefault(text, []).append(name)
-    return [f"{', '.join(names)}: {text}" for text, names in concerned.items()]

@@ -97,6 +97,24 @@ class SpecimenStudy:
         return stress_unit(self.experiment.stress_unit)
 
     @property
+    def warnings(self) -> list[str]:
+        """What a reader must know of the data and the fits, each once with the discrepancies that it concerns."""
+        concerned: dict[str, list[str]] = {}
+        for name, posterior in self.posteriors.items():
+            for text in posterior.warnings:
+                concerned.setdefault(text, []).append(name)
+        found = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        if "the file states no unit" in self.experiment.source:
+            found.insert(
+                0, "the file states no unit of stress, so MPa was assumed; if it is another, give --stress-unit."
+            )
+        return found
+
+    def is_cut_by_prior(self, name: str) -> bool:
+        """Whether a bound of a prior, not the data, decides part of a fit."""
+        return any("cut by a bound" in text for text in self.posteriors[name].warnings)
+
+    @property
     def not_converged(self) -> list[str]:
         """Discrepancies with which sampling has not converged."""
         return [name for name, posterior in self.posteriors.items() if posterior.solution.is_approximate]

@@ -41,6 +41,12 @@ class PaperStudy:
     cells: list[Cell]
 
     @property
+    def warnings(self) -> list[str]:
+        """What a reader must know of the fits."""
+        every = [*self.main.values(), *self.sampled.values()]
+        return list(dict.fromkeys(f"{each.formulation}: {text}" for each in every for text in each.posterior.warnings))
+
+    @property
     def not_converged(self) -> list[str]:
         """Formulations whose sampling has not converged."""
         every = {**self.main, **self.sampled}
