@@ -6,12 +6,13 @@ from tissuq.experiments import datasets
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.experiments.reading import read_experiment
-from tissuq.fitting import fit
-from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus, simulate
+from tissuq.fitting import fit, fit_many
+from tissuq.mechanics import Material, StretchMaterial, engineering_stress, initial_shear_modulus, simulate
 from tissuq.mechanics.material import materials
+from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, UnknownNoise
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
-from tissuq.priors import Exponential, HalfCauchy, HalfNormal, LogNormal, Normal, Prior, Uniform
+from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, Normal, Prior, Uniform
 
 __version__ = "0.1.0"
 
@@ -20,23 +21,31 @@ __all__ = [
     "Discrepancy",
     "Experiment",
     "Exponential",
+    "Flat",
     "HalfCauchy",
     "HalfNormal",
     "InputError",
+    "KnownNoise",
     "LoadingMode",
     "LogNormal",
     "Material",
     "ModelError",
+    "Noise",
     "Normal",
     "Parameter",
     "Posterior",
     "Prior",
+    "ProportionalNoise",
+    "RepeatNoise",
+    "StretchMaterial",
     "TissuqError",
     "Uniform",
+    "UnknownNoise",
     "datasets",
     "discrepancies",
     "engineering_stress",
     "fit",
+    "fit_many",
     "initial_shear_modulus",
     "loading_modes",
     "materials",

@@ -1,27 +1,28 @@
-"""The main call: from an experiment to the posterior of a material's parameters."""
+"""The main calls: from experiments to the posterior of a material's parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
 from numbers import Integral
 from typing import Literal
 
 from tissuq.discrepancy import Discrepancy, discrepancy_named
-from tissuq.errors import ConvergenceError, InputError
+from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.inference.exact import is_exact, solve_exactly
+from tissuq.inference.exact import solve_exactly, why_not_exact
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import Material, material_named
 from tissuq.model import StatisticalModel
+from tissuq.noise import Noise, noise_named
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior
 
-__all__ = ["SAMPLERS", "fit"]
+__all__ = ["METHODS", "Method", "fit", "fit_many"]
 
-Sampler = Literal["auto", "exact", "nuts"]
-SAMPLERS: tuple[Sampler, ...] = ("auto", "exact", "nuts")
+Method = Literal["auto", "exact", "nuts", "smc", "joint"]
+METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
 
 
 def fit(
@@ -29,9 +30,10 @@ def fit(
     *,
     discrepancy: str | Discrepancy,
     material: str | Material = "neo-hookean",
-    noise_sd: float | Literal["unknown"] = "unknown",
+    noise_sd: float | Literal["unknown"] | None = None,
+    noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    sampler: Sampler = "auto",
+    method: Method = "auto",
     seed: int = 0,
 ) -> Posterior:
     """Identify the parameters of a material from an experiment, with a model discrepancy and noise.
@@ -45,12 +47,19 @@ def fit(
     material : str or Material
         The material whose parameters are wanted.
     noise_sd : float or "unknown"
-        Standard deviation of the measurement noise in MPa; unknown makes it a parameter.
+        Standard deviation of the measurement noise in MPa; unknown, as when nothing is said, makes it a parameter.
+    noise : str or Noise
+        Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), or ``"repeats"`` (told
+        by repeated measurements at the same stretch).
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
-    sampler : str
-        ``"exact"`` (closed form and quadrature), ``"nuts"`` (the joint density, as in the paper), or ``"auto"``: exact
-        where it applies and reaches its tolerance.
+    method : str
+        ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
+        ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
+        ``"smc"``: the same with tempered sequential Monte Carlo, which gives the evidence, too.
+        ``"joint"``: the no-U-turn sampler over all parameters, nothing integrated, as in the paper.
+        ``"auto"``: exact where it applies and reaches its tolerance; else nuts, with the evidence from smc.
+        The posterior's ``solution.route`` and ``solution.reason`` say what was done and why.
     seed : int
         Of the draws.
 
@@ -59,7 +68,9 @@ def fit(
     InputError
         When data, noise or priors cannot be used.
     ModelError
-        When the parts do not fit each other, or the sampler does not apply.
+        When the parts do not fit each other, or the method does not apply.
+    ConvergenceError
+        When the method was asked for by name and cannot reach its tolerance.
 
     References
     ----------
@@ -76,52 +87,128 @@ def fit(
     >>> bool(low < 1.2 < high)
     True
     """
-    if sampler not in SAMPLERS:
-        raise InputError(f"there is no sampler '{sampler}'. Choose one of: {', '.join(SAMPLERS)}.")
-    if not isinstance(seed, Integral) or seed < 0:
-        raise InputError(f"seed must be a whole number, zero or more, not {seed!r}.")
-    model = StatisticalModel(
-        data, material_named(material), discrepancy_named(discrepancy), noise_sd, dict(priors or {})
-    )
-    solution = _solve(model, sampler, seed)
-    return Posterior(replace(solution, warnings=tuple(_warnings(solution))), seed)
+    recipe = _Recipe.of(discrepancy, material, noise_sd, noise, priors, method, seed)
+    return recipe.posteriors([data])[0]
 
 
-def _solve(model: StatisticalModel, sampler: Sampler, seed: int) -> Solution:
-    if sampler == "exact":
-        return solve_exactly(model, seed)
-    if sampler == "auto" and is_exact(model):
-        with suppress(ConvergenceError):
-            return solve_exactly(model, seed)
-    from tissuq.inference.sampled import solve_by_sampling
+def fit_many(
+    datasets: Sequence[Experiment],
+    *,
+    discrepancy: str | Discrepancy,
+    material: str | Material = "neo-hookean",
+    noise_sd: float | Literal["unknown"] | None = None,
+    noise: str | Noise | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    method: Method = "auto",
+    seed: int = 0,
+) -> list[Posterior]:
+    """Fit many experiments with the same model, each by itself; the parameters are those of `fit`.
 
-    return solve_by_sampling(model, seed)
+    Experiments on the same stretches in the same loading mode (replicates, specimens, synthetic data) share all
+    factorisations and are integrated together, which takes a small part of the time of as many calls of `fit` and gives
+    the same posteriors to the accuracy of the integration.
+
+    Parameters
+    ----------
+    datasets : sequence of Experiment
+
+    Returns
+    -------
+    list of Posterior
+        In the order of the experiments.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4]
+    >>> specimens = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.05, seed=s) for s in range(20)]
+    >>> posteriors = tq.fit_many(specimens, discrepancy="none", noise_sd=0.05)
+    >>> held = [0.5 > p.summary().loc["C10", "hdi_low"] for p in posteriors]
+    >>> len(held)
+    20
+    """
+    recipe = _Recipe.of(discrepancy, material, noise_sd, noise, priors, method, seed)
+    keys = [(data.mode.name, data.stretch.tobytes()) for data in datasets]
+    found: dict[int, Posterior] = {}
+    for _, group in groupby(sorted(range(len(keys)), key=keys.__getitem__), key=keys.__getitem__):
+        places = list(group)
+        found |= zip(places, recipe.posteriors([datasets[place] for place in places]), strict=True)
+    return [found[place] for place in range(len(datasets))]
 
 
-def _warnings(solution: Solution) -> list[str]:
-    found = []
-    if solution.is_approximate and solution.diagnostics is not None:
-        found.append(solution.diagnostics.verdict)
-    if solution.model.confounds_noise:
-        found.append(
-            "noise_sd and S are both unknown, and only noise_sd^2 + S^2 is in the data: read neither alone, or give "
-            "the noise (repeated measurements at one stretch tell it)."
+@dataclass(frozen=True, eq=False)
+class _Recipe:
+    """What is fitted and how: everything but the data."""
+
+    discrepancy: Discrepancy
+    material: Material
+    noise: Noise
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+    method: Method = "auto"
+    seed: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        discrepancy: str | Discrepancy,
+        material: str | Material,
+        noise_sd: float | Literal["unknown"] | None,
+        noise: str | Noise | None,
+        priors: Mapping[str, Prior] | None,
+        method: Method,
+        seed: int,
+    ) -> _Recipe:
+        """Check the arguments of `fit` and return them as objects."""
+        if method not in METHODS:
+            raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
+        if not isinstance(seed, Integral) or seed < 0:
+            raise InputError(f"seed must be a whole number, zero or more, not {seed!r}.")
+        if noise_sd is not None and noise is not None:
+            raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
+        chosen = noise if noise is not None else "unknown" if noise_sd is None else noise_sd
+        return cls(
+            discrepancy_named(discrepancy),
+            material_named(material),
+            noise_named(chosen),
+            dict(priors or {}),
+            method,
+            seed,
         )
-    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
-    if cut:
-        found.append(
-            f"the posterior is cut by a bound of the prior of {', '.join(cut)}: there the bound, not the data, "
-            "decides. Give a wider prior, unless the bound is meant."
+
+    def posteriors(self, datasets: Sequence[Experiment]) -> list[Posterior]:
+        """Fit experiments on the same stretches."""
+        return self.solved(
+            [StatisticalModel(data, self.material, self.discrepancy, self.noise, self.priors) for data in datasets]
         )
-    return found
 
+    def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
+        """Return the posteriors of models on the same stretches."""
+        return [Posterior(solution, self.seed, self.solved) for solution in self._solve(models)]
 
-def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
-    """Yield the parameters whose posterior is still high at a bound that only the prior sets, and which bound."""
-    for parameter in solution.model.parameters:
-        marginal = solution.marginals[parameter.symbol]
-        ends = zip(("lower", "upper"), solution.model.priors[parameter.symbol].support, parameter.support, strict=True)
-        for name, chosen, natural in ends:
-            inside = chosen + (1e-3 if name == "lower" else -1e-3) * marginal.sd
-            if chosen != natural and marginal.pdf(inside) > 0.1 * marginal.density.max():
-                yield parameter.symbol, name
+    def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
+        """Solve models on the same stretches: together by the exact route, one by one by the others."""
+        if self.method != "auto":
+            return solve_exactly(models, self.seed) if self.method == "exact" else [self._sample(m) for m in models]
+        refusal = why_not_exact(models[0])
+        if not refusal:
+            try:
+                return solve_exactly(models, self.seed)
+            except ConvergenceError as error:
+                refusal = str(error)
+        if len(models) > 1:
+            return [solution for model in models for solution in self._solve([model])]
+        return [self._sample(models[0], refusal)]
+
+    def _sample(self, model: StatisticalModel, refusal: str = "") -> Solution:
+        from tissuq.inference import sampled
+
+        if self.method == "joint":
+            return sampled.sample_joint(model, self.seed)
+        if not model.nonlinear and self.method in ("nuts", "smc"):
+            raise ModelError(
+                f"the method '{self.method}' does not apply: every parameter is linear with a flat, uniform or Gaussian "
+                "prior, so nothing is left to sample. Use 'exact', or 'joint' to sample all of them."
+            )
+        if self.method == "smc":
+            return sampled.sample_smc_given(model, self.seed)
+        return sampled.sample_nuts_given(model, self.seed, refusal)

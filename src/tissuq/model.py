@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from math import inf
-from numbers import Real
-from typing import Any, Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tissuq.discrepancy import Discrepancy
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, engineering_stress, stress_basis
+from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
-from tissuq.priors import Normal, Prior, Uniform
+from tissuq.priors import Flat, Prior, Uniform
+from tissuq.statistics import CHUNK, Statistics
 
 __all__ = ["StatisticalModel"]
 
 FloatArray = NDArray[np.float64]
 
-NOISE = Parameter.scale("noise_sd", "standard deviation of the measurement noise")
 BOX_MARGIN = 10.0
 """Default boxes of linear parameters reach this many times further than least squares could."""
 
@@ -32,8 +32,9 @@ BOX_MARGIN = 10.0
 class StatisticalModel:
     """measured stress = material(l) + discrepancy(l) + noise, with a prior on every parameter (eq. 15).
 
-    The stress is linear in most parameters (`linear`), and Gaussian in everything else once a few `nonlinear` ones
-    are given: the structure that inference rests on.
+    The stress is linear in most parameters. Those of them with a flat, uniform or Gaussian prior are `linear`: given
+    the few others, the `nonlinear` ones, the posterior is Gaussian, and inference rests on that. The `structure`
+    is what costs a factorisation to vary: nonlinear parameters of the material or of a correlation's shape.
 
     Parameters
     ----------
@@ -43,10 +44,12 @@ class StatisticalModel:
         The model whose parameters are wanted.
     discrepancy : Discrepancy
         What it cannot explain.
-    noise_sd : float or "unknown"
-        Standard deviation of the noise in MPa; unknown makes it a parameter.
+    noise : float, str or Noise
+        Standard deviation in MPa, or the name of a noise with parameters (``"unknown"``).
     chosen_priors : mapping of str to Prior
         Priors in MPa that replace the defaults.
+    known_statistics : Statistics, optional
+        `statistics`, where they are known already.
 
     Raises
     ------
@@ -59,20 +62,20 @@ class StatisticalModel:
     experiment: Experiment
     material: Material
     discrepancy: Discrepancy
-    noise_sd: float | Literal["unknown"] = "unknown"
+    noise: Noise = "unknown"  # type: ignore[assignment]  # a name or a number becomes a Noise
     chosen_priors: Mapping[str, Prior] = field(default_factory=dict)
+    known_statistics: Statistics | None = None
 
     def __post_init__(self) -> None:
-        self._check_noise()
+        object.__setattr__(self, "noise", noise_named(self.noise))
         self._check_parameters()
         self._check_priors()
         self._check_data()
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Every parameter: of the material, the discrepancy and, when it is unknown, the noise."""
-        noise = (NOISE,) if self.noise_sd == "unknown" else ()
-        return (*self.material.parameters, *self.discrepancy.parameters, *noise)
+        """Every parameter: of the material, the discrepancy and, when it has some, the noise."""
+        return (*self.material.parameters, *self.discrepancy.parameters, *self.noise.parameters)
 
     @cached_property
     def priors(self) -> dict[str, Prior]:
@@ -90,16 +93,19 @@ class StatisticalModel:
 
     @cached_property
     def linear(self) -> tuple[str, ...]:
-        """Parameters that can be integrated in closed form: stress linear in them, prior uniform or Gaussian."""
-        return tuple(
-            p.symbol for p in self.parameters if p.is_linear and isinstance(self.priors[p.symbol], Uniform | Normal)
-        )
+        """Parameters that can be integrated in closed form: stress linear in them, prior flat, uniform or Gaussian."""
+        return tuple(p.symbol for p in self.parameters if p.is_linear and self.priors[p.symbol].gaussian is not None)
 
     @cached_property
     def nonlinear(self) -> tuple[str, ...]:
-        """All other parameters, those of a correlation's shape first: they cost most to vary."""
+        """All other parameters, those of the structure first."""
         others = [p.symbol for p in self.parameters if p.symbol not in self.linear]
-        return tuple(sorted(others, key=lambda symbol: symbol not in self.discrepancy.shape_symbols))
+        return tuple(sorted(others, key=lambda symbol: symbol not in self.structure))
+
+    @cached_property
+    def structure(self) -> tuple[str, ...]:
+        """Parameters on which the basis of the mean stress or the correlation of the discrepancy depends."""
+        return (*self.bent_symbols, *self.discrepancy.shape_symbols)
 
     @cached_property
     def column_symbols(self) -> tuple[str, ...]:
@@ -107,37 +113,123 @@ class StatisticalModel:
         return tuple(p.symbol for p in self.parameters if p.is_linear)
 
     @cached_property
+    def bent_symbols(self) -> tuple[str, ...]:
+        """The material's parameters in which its stress is not linear, such as exponents."""
+        return tuple(p.symbol for p in self.material.parameters if not p.is_linear)
+
+    @cached_property
     def material_symbols(self) -> tuple[str, ...]:
         """The parameters of the material."""
         return tuple(p.symbol for p in self.material.parameters)
 
-    def basis(self, stretch: FloatArray) -> FloatArray:
-        """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,)."""
+    def basis(self, stretch: FloatArray, bent: ArrayLike = ()) -> FloatArray:
+        """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,).
+
+        Where the material has parameters in which its stress is not linear, ``bent`` holds their values: (s,), or
+        (m, s) for (m, n, k) mean stresses.
+        """
         mode = self.experiment.mode
-        return np.hstack([stress_basis(self.material, mode, stretch), self.discrepancy.mean_basis(mode, stretch)])
+        own = stress_basis(self.material, mode, stretch, bent)
+        other = self.discrepancy.mean_basis(mode, stretch)
+        return np.concatenate([own, np.broadcast_to(other, (*own.shape[:-1], other.shape[-1]))], axis=-1)
+
+    @property
+    def headline(self) -> str:
+        """The parameter that summaries put first: the material's first one."""
+        return self.material.parameters[0].symbol
 
     @cached_property
     def design(self) -> FloatArray:
-        """`basis` at the measured stretches."""
-        return self.basis(self.experiment.stretch)
+        """`basis` at the measured stretches; at the medians of the priors where it depends on parameters."""
+        if len(self.experiment) > CHUNK:
+            return self.basis(self.experiment.stretch, self._usual_bent)
+        key = self.experiment.stretch.tobytes()
+        return _remembered_basis(self.material, self.discrepancy, self.experiment.mode, key, self._usual_bent)
 
-    def noise_variance(self, values: Mapping[str, Any]) -> Any:
-        """Return the variance of the measurement noise, MPa^2."""
-        return (values["noise_sd"] if self.noise_sd == "unknown" else self.noise_sd) ** 2
+    @cached_property
+    def statistics(self) -> Statistics:
+        """The data and `design`, reduced in one pass."""
+        return self.known_statistics or Statistics.of_rows(self._rows())
 
-    def white_variance(self, values: Mapping[str, Any]) -> Any:
-        """Return the variance of everything independent from point to point: noise and discrepancy, MPa^2."""
-        return self.noise_variance(values) + self.discrepancy.independent_variance(values)
+    def with_more(self, experiment: Experiment) -> StatisticalModel:
+        """Return the same model of this experiment and further measurements, at a cost that only these set.
+
+        Raises
+        ------
+        InputError
+            When the further measurements are in another loading mode.
+        """
+        rows = np.column_stack([self.basis(experiment.stretch, self._usual_bent), experiment.stress])
+        known = self.statistics.joined(Statistics.of_rows([rows]))
+        return replace(self, experiment=self.experiment.joined(experiment), known_statistics=known)
+
+    def noise_variance(self, values: Mapping[str, Any], level: Any) -> Any:
+        """Return the variance (MPa^2) of the measurement noise where the absolute stress has a level (MPa)."""
+        return self.noise.sd(values, level) ** 2
+
+    def white_variance(self, values: Mapping[str, Any], level: Any = 0.0) -> Any:
+        """Return the variance (MPa^2) of all that is independent from measurement to measurement."""
+        own = 0.0 if self.noise.shares_discrepancy else self.discrepancy.independent_variance(values)
+        return self.noise_variance(values, level) + own
+
+    @cached_property
+    def levels(self) -> FloatArray:
+        """The level of the stress (n,) at every measurement, MPa, for noise that depends on it."""
+        return stress_level(self.experiment)
+
+    @property
+    def is_correlated(self) -> bool:
+        """Whether the discrepancy at one measurement tells something about another."""
+        return self.discrepancy.is_correlated or self.is_repeated
+
+    @cached_property
+    def is_repeated(self) -> bool:
+        """Whether measurements at one stretch share an otherwise independent discrepancy."""
+        has_own = not self.discrepancy.is_correlated and "S" in self.symbols
+        return self.noise.shares_discrepancy and has_own
+
+    def correlated_variance(self, values: Mapping[str, Any]) -> Any:
+        """Return the variance (MPa^2) of the correlated part of the discrepancy."""
+        part = self.discrepancy.independent_variance if self.is_repeated else self.discrepancy.correlated_variance
+        return part(values)
+
+    def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
+        """Return the (n, m) correlation of the correlated part between two sets of stretches."""
+        if self.is_repeated:
+            return 1.0 * (first[:, None] == second[None, :])
+        return self.discrepancy.correlation(first, second, values)
 
     @property
     def confounds_noise(self) -> bool:
-        """Whether only the sum of noise and discrepancy variance is in the data."""
-        return self.noise_sd == "unknown" and "S" in self.symbols
+        """Whether only the sum of noise and discrepancy variance is in the data, whatever they are."""
+        is_one_level = not self.noise.depends_on_level and not self.noise.shares_discrepancy
+        return bool(self.noise.parameters) and is_one_level and "S" in self.symbols
+
+    def _rows(self) -> Iterator[FloatArray]:
+        """Yield the rows [X y], block by block; every block has one length, so that JAX compiles once."""
+        stretch, stress = self.experiment.stretch, self.experiment.stress
+        if len(stress) <= CHUNK:
+            yield np.column_stack([self.design, stress])
+            return
+        for start in range(0, len(stress), CHUNK):
+            block = slice(start, start + CHUNK)
+            count = len(stress[block])
+            basis = self.basis(np.pad(stretch[block], (0, CHUNK - count), mode="edge"), self._usual_bent)
+            yield np.column_stack([basis[:count], stress[block]])
+
+    @cached_property
+    def _usual_bent(self) -> tuple[float, ...]:
+        """The medians of the priors of `bent_symbols`."""
+        own = {p.symbol: p for p in self.material.parameters}
+        priors = [self._chosen_prior(own[s]) or self._default_scale_prior(own[s]) for s in self.bent_symbols]
+        return tuple(float(prior.quantile(0.5)) for prior in priors)
 
     def _chosen_prior(self, parameter: Parameter) -> Prior | None:
         prior = self.chosen_priors.get(parameter.symbol)
         if prior is not None and not isinstance(prior, Prior):
             raise InputError(f"{parameter.symbol}: a prior must be one such as tissuq.Uniform(0, 1), not {prior!r}.")
+        if isinstance(prior, Flat) and not parameter.is_linear:
+            raise InputError(f"{parameter.symbol}: a flat prior is improper and only serves linear parameters.")
         try:
             return prior.within(parameter.support) if prior else None
         except InputError as error:
@@ -161,25 +253,17 @@ class StatisticalModel:
         |b_j| <= ||row j of pinv(X)|| ||y|| bounds every least-squares coefficient. The material's boxes come from
         its own columns alone, so that they are the same for every discrepancy.
         """
-        own = len(self.material.parameters)
-        of_material, of_all = (np.linalg.pinv(X) for X in (self.design[:, :own], self.design))
+        triangle = self.statistics.triangle
+        own = sum(p.is_linear for p in self.material.parameters)
+        of_material, of_all = (np.linalg.inv(triangle[:k, :k]) for k in (own, len(self.column_symbols)))
         rows = [*of_material, *of_all[own:]]
-        size = float(np.linalg.norm(self.experiment.stress))
+        size = float(np.linalg.norm(triangle[:, -1]))
         boxes: dict[str, Prior] = {}
         for parameter, row in zip((p for p in self.parameters if p.is_linear), rows, strict=True):
             reach = BOX_MARGIN * float(np.linalg.norm(row)) * size
             low, high = parameter.support
             boxes[parameter.symbol] = Uniform(max(low, -reach), min(high, reach))
         return boxes
-
-    def _check_noise(self) -> None:
-        if self.noise_sd == "unknown":
-            return
-        if not isinstance(self.noise_sd, Real) or self.noise_sd is True or not 0 < self.noise_sd < inf:
-            raise InputError(
-                f"noise_sd must be a positive number of MPa or 'unknown', not {self.noise_sd!r}. "
-                "Noise of zero would make every measurement exact; if you do not know it, say 'unknown'."
-            )
 
     def _check_parameters(self) -> None:
         shared = [p.symbol for p in self.discrepancy.parameters if p.symbol in self.material_symbols]
@@ -198,19 +282,6 @@ class StatisticalModel:
         for parameter in self.parameters:
             self._chosen_prior(parameter)
 
-    def _check_linearity(self) -> None:
-        """Refuse a material whose stress is not proportional to its parameters, which are all taken to be linear."""
-        own = len(self.material.parameters)
-        tried = 0.3 + np.random.default_rng(0).random((own, own))
-        found = engineering_stress(self.material, self.experiment.mode, self.experiment.stretch, tried)
-        expected = tried @ self.design[:, :own].T
-        if not np.allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()):
-            raise ModelError(
-                f"the stress of material '{self.material.name}' is not proportional to its parameters "
-                f"({', '.join(self.material_symbols)}), for example because one stands in an exponent; only materials "
-                "that are linear in their parameters can be fitted yet."
-            )
-
     def _check_data(self) -> None:
         n, name = len(self.experiment), self.experiment.name
         if n < len(self.parameters):
@@ -220,11 +291,46 @@ class StatisticalModel:
             )
         if not self.experiment.stress.any():
             raise InputError(f"experiment '{name}': every stress is zero, so there is nothing to identify.")
-        self._check_linearity()
-        lengths = np.linalg.norm(self.design, axis=0)
-        if not lengths.all() or np.linalg.cond(self.design / lengths) > 1e10:
+        if self.noise.shares_discrepancy and len(np.unique(self.experiment.stretch)) == n:
+            raise InputError(
+                f"experiment '{name}' has no two measurements at the same stretch, so nothing tells the noise by "
+                "itself: choose the noise 'unknown', or round the stretches to the steps of the test."
+            )
+        low, high = float(self.experiment.stretch.min()), float(self.experiment.stretch.max())
+        _check_linearity(self.material, self.experiment.mode, low, high, self._usual_bent)
+        triangle = self.statistics.triangle[:, :-1]
+        lengths = np.linalg.norm(triangle, axis=0)
+        if not lengths.all() or np.linalg.cond(triangle / lengths) > 1e10:
             raise ModelError(
                 f"the stretches of experiment '{name}' cannot separate the parameters "
                 f"{', '.join(self.column_symbols)}: measure at more or other stretches, or choose a simpler "
                 "material or discrepancy."
             )
+
+
+@lru_cache(maxsize=256)
+def _remembered_basis(
+    material: Material, discrepancy: Discrepancy, mode: LoadingMode, stretch: bytes, bent: tuple[float, ...]
+) -> FloatArray:
+    points = np.frombuffer(stretch)
+    own = stress_basis(material, mode, points, bent)
+    return np.hstack([own, discrepancy.mean_basis(mode, points)])
+
+
+@lru_cache(maxsize=256)
+def _check_linearity(material: Material, mode: LoadingMode, low: float, high: float, bent: tuple[float, ...]) -> None:
+    """Refuse a material whose stress is not proportional to the parameters that it calls linear."""
+    stretch = np.linspace(low, high, 16)
+    is_linear = np.array([p.is_linear for p in material.parameters])
+    tried = np.empty((is_linear.sum() + 1, len(is_linear)))
+    tried[:, ~is_linear] = bent
+    tried[:, is_linear] = 0.3 + np.random.default_rng(0).random((len(tried), is_linear.sum()))
+    found = engineering_stress(material, mode, stretch, tried)
+    expected = tried[:, is_linear] @ stress_basis(material, mode, stretch, bent).T
+    if not np.allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()):
+        linear = [p.symbol for p in material.parameters if p.is_linear]
+        raise ModelError(
+            f"the stress of material '{material.name}' is not proportional to its parameters ({', '.join(linear)}), "
+            "for example because one stands in an exponent: declare such a parameter with is_linear=False and a "
+            "relative_prior."
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
 from tissuq.inference.solution import Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
@@ -31,11 +34,16 @@ class Posterior:
         Marginals, mixture components and draws.
     seed : int
         From which the draws follow.
+    solve : callable
+        Returns the posteriors of models by the method that gave this one.
     """
 
-    def __init__(self, solution: Solution, seed: int) -> None:
+    def __init__(
+        self, solution: Solution, seed: int, solve: Callable[[Sequence[StatisticalModel]], Sequence[Posterior]]
+    ) -> None:
         self.solution = solution
         self.seed = seed
+        self._solve = solve
         self._coverage: dict[tuple[bool, float], float] = {}
 
     @property
@@ -45,13 +53,44 @@ class Posterior:
 
     @property
     def log_evidence(self) -> float | None:
-        """Log of p(data), data in MPa, priors normalised (uniform densities included); None from a sampler."""
+        """Log of p(data), data in MPa, priors normalised (uniform densities included).
+
+        None where the method gives none (nuts and joint when asked for by name), or a prior is flat and improper.
+        """
         return self.solution.log_evidence
 
     @property
+    def log_evidence_error(self) -> float | None:
+        """Estimated error of `log_evidence`."""
+        return self.solution.log_evidence_error
+
+    @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader of this posterior must know, in sentences."""
-        return self.solution.warnings
+        return tuple(warnings_about(self.solution))
+
+    def update(self, more: Experiment) -> Posterior:
+        """Return the posterior after further measurements, as if all had been fitted at once.
+
+        Where noise and discrepancy are independent from point to point and the stress is linear in its parameters, the
+        measurements so far enter by their sufficient statistics, and only the new ones are read.
+
+        Raises
+        ------
+        InputError
+            When the measurements are in another loading mode.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> first = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.05, seed=1)
+        >>> more = tq.simulate("neo-hookean", {"C10": 0.5}, [0.7, 1.3], noise_sd=0.05, seed=2)
+        >>> before = tq.fit(first, discrepancy="none", noise_sd=0.05)
+        >>> after = before.update(more)
+        >>> bool(after.summary().loc["C10", "sd"] < before.summary().loc["C10", "sd"])
+        True
+        """
+        return self._solve([self.model.with_more(more)])[0]
 
     def summary(self, prob: float = 0.95) -> pd.DataFrame:
         """Return mean, sd and the highest-density interval of every parameter (MPa; psi in stretch).
@@ -165,13 +204,14 @@ class Posterior:
             "loading_mode": model.experiment.mode.name,
             "material": model.material.name,
             "discrepancy": model.discrepancy.name,
-            "noise_sd": str(model.noise_sd),
-            "sampler": solution.route,
-            "sampler_reason": solution.reason,
+            "noise": str(model.noise),
+            "method": solution.route,
+            "method_reason": solution.reason,
             "seed": self.seed,
         }
         labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
-        return labels if solution.log_evidence is None else labels | {"log_evidence": solution.log_evidence}
+        evidence = {"log_evidence": solution.log_evidence, "log_evidence_error": solution.log_evidence_error}
+        return labels | {name: value for name, value in evidence.items() if value is not None}
 
     def __repr__(self) -> str:
         model = self.model

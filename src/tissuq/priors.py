@@ -18,7 +18,7 @@ from tissuq.errors import InputError
 from tissuq.gaussian import interval_quantile, log_interval
 from tissuq.registry import find
 
-__all__ = ["Exponential", "HalfCauchy", "HalfNormal", "LogNormal", "Normal", "Prior", "Uniform", "prior_from"]
+__all__ = ["Exponential", "Flat", "HalfCauchy", "HalfNormal", "LogNormal", "Normal", "Prior", "Uniform", "prior_from"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,14 @@ class Prior(ABC):
     @abstractmethod
     def support(self) -> tuple[float, float]:
         """The lowest and highest value with positive density."""
+
+    @property
+    def gaussian(self) -> tuple[float, float, float] | None:
+        """Mean, precision and log of the factor of exp(-precision (x - mean)^2 / 2) inside the support.
+
+        Flat and uniform densities have precision zero; None where the density is not of this form.
+        """
+        return None
 
     @abstractmethod
     def log_density(self, value: Any) -> Any:
@@ -109,11 +117,49 @@ class Uniform(Prior):
     def support(self) -> tuple[float, float]:
         return self.low, self.high
 
+    @property
+    def gaussian(self) -> tuple[float, float, float]:
+        return 0.0, 0.0, -log(self.high - self.low)
+
     def log_density(self, value: Any) -> Any:
         return -log(self.high - self.low) + 0.0 * value
 
     def quantile(self, probability: Any) -> Any:
         return self.low + (self.high - self.low) * probability
+
+
+@dataclass(frozen=True)
+class Flat(Prior):
+    """Density one between bounds that may be infinite: improper, for linear parameters only, and without evidence."""
+
+    low: float = -inf
+    high: float = inf
+
+    name = "flat"
+    with_unit = ("low", "high")
+
+    def _check(self) -> None:
+        if self.low >= self.high:
+            raise InputError(f"prior {self}: low must be less than high.")
+
+    @property
+    def support(self) -> tuple[float, float]:
+        return self.low, self.high
+
+    @property
+    def gaussian(self) -> tuple[float, float, float]:
+        return 0.0, 0.0, 0.0
+
+    def within(self, support: tuple[float, float]) -> Self:
+        return replace(self, low=max(self.low, support[0]), high=min(self.high, support[1]))
+
+    def log_density(self, value: Any) -> Any:
+        return 0.0 * value
+
+    def quantile(self, probability: Any) -> Any:
+        raise InputError(
+            f"the prior {self} is improper: it has no quantiles, and can be that of no nonlinear parameter."
+        )
 
 
 @dataclass(frozen=True)
@@ -140,13 +186,12 @@ class Normal(Prior):
     def within(self, support: tuple[float, float]) -> Self:
         return replace(self, low=max(self.low, support[0]), high=min(self.high, support[1]))
 
-    def log_density(self, value: Any) -> Any:
-        return -0.5 * ((value - self.mean) / self.sd) ** 2 - self.log_size
-
     @property
-    def log_size(self) -> float:
-        """Log of the integral of exp(-(x - mean)^2 / (2 sd^2)) between the bounds."""
-        return log(self.sd * sqrt(2 * pi)) + float(log_interval(*self._ends))
+    def gaussian(self) -> tuple[float, float, float]:
+        return self.mean, self.sd**-2, -log(self.sd * sqrt(2 * pi)) - float(log_interval(*self._ends))
+
+    def log_density(self, value: Any) -> Any:
+        return -0.5 * ((value - self.mean) / self.sd) ** 2 + self.gaussian[2]
 
     def quantile(self, probability: Any) -> Any:
         return self.mean + self.sd * interval_quantile(probability, *self._ends)[0]

@@ -29,6 +29,10 @@ def fit(
             help="Sd of the noise of the engineering stress, in the file's stress unit, or unknown [unknown]."
         ),
     ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(help="Instead: unknown, proportional (grows with the stress) or repeats (same stretch again)."),
+    ] = None,
     prior: Annotated[
         list[str] | None,
         typer.Option(help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more."),
@@ -45,7 +49,7 @@ def fit(
         bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
     ] = None,
     skip_rows: Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")] = None,
-    sampler: Annotated[str | None, typer.Option(help="auto, exact or nuts [auto].")] = None,
+    method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
     config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
@@ -62,7 +66,7 @@ def fit(
         "file": str(_resolve(file)) if file and not config else None, "material": material, "mode": mode,
         "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "stress_unit": stress_unit,
         "stress_type": stress_type, "strain_unit": strain_unit, "compression_positive": compression_positive,
-        "skip_rows": skip_rows, "sampler": sampler, "seed": seed,
+        "skip_rows": skip_rows, "noise": noise, "method": method, "seed": seed,
     }  # fmt: skip
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))

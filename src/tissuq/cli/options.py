@@ -95,7 +95,7 @@ def not_converged(names: list[str]) -> None:
     if names:
         typer.echo(
             f"tissuq: sampling has NOT converged for {', '.join(names)}; do not use these results. "
-            "Try --sampler exact, narrower priors or another seed.",
+            "Try another method (--method exact or smc), narrower priors or another seed.",
             err=True,
         )
         raise typer.Exit(NOT_CONVERGED)

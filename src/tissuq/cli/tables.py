@@ -9,6 +9,7 @@ from typing import Any
 
 from tissuq.errors import InputError
 from tissuq.report.run_folder import RECIPE
+from tissuq.report.tables import headline_of
 
 __all__ = ["print_rows", "print_summary", "print_warnings"]
 
@@ -48,7 +49,7 @@ def print_summary(folder: Path) -> None:
     rows, readable, unit, title = _read_run(folder)
     known = [row["contains_truth"] is not None for row in rows]
     sampled = any(row["rhat"] is not None for row in rows)
-    headers = ["formulation", f"C10, {unit}", "sd", "HPD low", "high", "log ev.", "in band", "alone"]
+    headers = ["formulation", f"{headline_of(rows[0])}, {unit}", "sd", "HPD low", "high", "log ev.", "in band", "alone"]
     headers += ["truth"] * any(known) + ["R-hat", "ESS"] * sampled
     table = []
     for row in readable:
@@ -60,7 +61,7 @@ def print_summary(folder: Path) -> None:
     print(
         "HPD: 95 %. In band, alone: measurements inside the 95 % band with the discrepancy, and of the material alone."
     )
-    print("A good predictive check does not mean that C10 is right.")
+    print(f"A good predictive check does not mean that {headline_of(rows[0])} is right.")
     print(f"Report: {folder / 'report.html'}")
 
 

@@ -88,6 +88,24 @@ class Experiment:
     def __len__(self) -> int:
         return len(self.stretch)
 
+    def joined(self, other: Experiment) -> Experiment:
+        """Return this experiment with the measurements of another one in the same loading mode added.
+
+        Raises
+        ------
+        InputError
+            When the loading modes differ.
+        """
+        if other.mode != self.mode:
+            raise InputError(
+                f"experiment '{other.name}' is {other.mode.name} and experiment '{self.name}' {self.mode.name}: only "
+                "measurements in the same loading mode can be added."
+            )
+        stretch, stress = (
+            np.concatenate(pair) for pair in ((self.stretch, other.stretch), (self.stress, other.stress))
+        )
+        return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit)
+
 
 def _column(name: str, values: Any) -> NDArray[np.float64]:
     try:

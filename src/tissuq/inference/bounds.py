@@ -2,53 +2,117 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.box import NEGLIGIBLE, POINTS, Box
+from tissuq.inference.box import NEGLIGIBLE, Boxes, Inside
+from tissuq.inference.marginal import (
+    Marginal,
+    blended,
+    marginal_of_cut_mixture,
+    marginal_of_mixture,
+    marginal_of_points,
+)
 from tissuq.inference.solution import Components
 
-__all__ = ["resampled", "split_at_bounds"]
+__all__ = ["Bounded", "bounded"]
 
 FloatArray = NDArray[np.float64]
 
 RESAMPLED = 4000
 REPRESENTED = 200
 """Components, at most, that are represented by points."""
-ALL_POINTS = 50_000
-"""Points, at least, that represent all of them together."""
+FEW_POINTS, ALL_POINTS = 2000, 50_000
+"""Points, at least, that represent all of them together: few where they are a small share of the posterior."""
+SMALL_SHARE = 0.05
 
 
-def split_at_bounds(components: Components, outside: FloatArray, box: Box) -> tuple[Components, Components]:
-    """Return the components that stay Gaussian, and weighted points within the bounds for those that are cut.
+@dataclass(frozen=True, eq=False)
+class Bounded:
+    """A posterior in three parts, by what bounds do to its components.
 
-    The Gaussian ones together have less than 1e-8 of the posterior outside the bounds.
+    Attributes
+    ----------
+    free : Components
+        Gaussian: together they have less than 1e-8 of the posterior outside the bounds.
+    cut : dict of int to Components
+        Gaussian before a bound of one parameter, by the parameter's place, cut them; weights are those within.
+    crossed : Components
+        The others, which several bounds cut.
+    box : Boxes
+        The bounds (1, p).
     """
-    loss = components.weights * outside
+
+    free: Components
+    cut: dict[int, Components]
+    crossed: Components
+    box: Boxes
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether any bound matters."""
+        return bool(self.cut) or len(self.crossed.weights) > 0
+
+    def components(self) -> Components:
+        """Return all as one mixture: Gaussians, and equally weighted points within the bounds for what they cut."""
+        cut = [each for each in (*self.cut.values(), self.crossed) if len(each.weights)]
+        whole = self.free
+        for each in cut:
+            whole = whole.joined(_resampled(self._points(each), RESAMPLED // len(cut)))
+        return whole
+
+    def marginal(self, place: int) -> Marginal:
+        """Return the marginal of one linear parameter: in closed form unless several bounds cut."""
+        bounds = float(self.box.lower[0, place]), float(self.box.upper[0, place])
+        parts = []
+        if len(self.free.weights):
+            sds = np.sqrt((self.free.root[:, place] ** 2).sum(axis=1))
+            marginal = marginal_of_mixture(self.free.weights, self.free.mean[:, place], sds)
+            parts.append((self.free.weights.sum(), marginal))
+        for which, each in self.cut.items():
+            ends = float(self.box.lower[0, which]), float(self.box.upper[0, which])
+            covariance = each.root @ each.root.swapaxes(1, 2)
+            marginal = marginal_of_cut_mixture(each.weights, each.mean, covariance, place, which, ends)
+            parts.append((each.weights.sum(), marginal))
+        if len(self.crossed.weights):
+            points = self._points(self.crossed)
+            parts.append((points.weights.sum(), marginal_of_points(points.mean[:, place], points.weights, bounds)))
+        return blended(parts, bounds)
+
+    def _points(self, components: Components) -> Components:
+        few = components.thinned(REPRESENTED)
+        share = components.weights.sum()
+        total = ALL_POINTS if share > SMALL_SHARE else FEW_POINTS
+        every = self.box[np.zeros(len(few.weights), dtype=int)]
+        log_shares, points = every.points(few.mean, few.root, max(64, total // len(few.weights)))
+        shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
+        weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
+        kept = weights > 1e-12 * weights.max()
+        p = points.shape[2]
+        settings = np.repeat(few.settings, points.shape[1], axis=0)[kept]
+        weights = weights[kept] * (share / weights[kept].sum())
+        return Components(weights, settings, points.reshape(-1, p)[kept], np.zeros((len(weights), p, p)))
+
+
+def bounded(components: Components, inside: Inside, box: Boxes) -> Bounded:
+    """Return a posterior's components sorted by what bounds (1, p) do to them."""
+    loss = components.weights * inside.outside
     order = np.argsort(loss)
     is_cut = np.zeros(len(loss), dtype=bool)
     is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE]] = True
-    cut = components[is_cut]
-    return components[~is_cut], _points_within(cut, box) if len(cut.weights) else cut
+    alone = is_cut & (inside.active.sum(axis=1) == 1)
+    which = inside.active.argmax(axis=1)
+    cut = {int(place): components[alone & (which == place)] for place in np.unique(which[alone])}
+    return Bounded(components[~is_cut], cut, components[is_cut & ~alone], box)
 
 
-def resampled(points: Components) -> Components:
-    """Return at most 4000 of the points, equally weighted, that stand for all of them (systematic resampling)."""
-    if len(points.weights) <= RESAMPLED:
+def _resampled(points: Components, count: int) -> Components:
+    """Return at most ``count`` of the points, equally weighted, that stand for all of them (systematic resampling)."""
+    if len(points.weights) <= count:
         return points
     total = points.weights.sum()
-    targets = (np.arange(RESAMPLED) + 0.5) * total / RESAMPLED
+    targets = (np.arange(count) + 0.5) * total / count
     chosen = points[np.minimum(np.searchsorted(np.cumsum(points.weights), targets), len(points.weights) - 1)]
-    return Components(np.full(RESAMPLED, total / RESAMPLED), chosen.settings, chosen.mean, chosen.root)
-
-
-def _points_within(components: Components, box: Box) -> Components:
-    few = components.thinned(REPRESENTED)
-    log_shares, points = box.points(few.mean, few.root, max(POINTS, ALL_POINTS // len(few.weights)))
-    shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
-    weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
-    kept = weights > 1e-12 * weights.max()
-    p = points.shape[2]
-    settings = np.repeat(few.settings, points.shape[1], axis=0)[kept]
-    weights = weights[kept] * (components.weights.sum() / weights[kept].sum())
-    return Components(weights, settings, points.reshape(-1, p)[kept], np.zeros((len(weights), p, p)))
+    return Components(np.full(count, total / count), chosen.settings, chosen.mean, chosen.root)

@@ -4,62 +4,102 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.gaussian import interval_quantile, log_interval
 
-__all__ = ["NEGLIGIBLE", "POINTS", "Box"]
+__all__ = ["NEGLIGIBLE", "Boxes", "Inside"]
 
 FloatArray = NDArray[np.float64]
 
 NEGLIGIBLE = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
+TOUCHED = 1e-3 * NEGLIGIBLE
+"""Mass of one parameter beyond its bounds below which it is as good as unbounded."""
+SMALL = 1e-6
+"""Mass outside below which the sum over parameters is near enough."""
 POINTS = 512
 MANY_POINTS = 16_384
+FEW_POINTS = 128
+NEARLY_ALL = 1e-2
+"""Mass outside up to which few points compute the mass inside: their error is a share of the mass outside."""
+SHIFTS = 8
+"""Shifted copies of the quasi-random points, whose spread tells the error."""
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
-    """Lower and upper bounds (p,) of p jointly Gaussian parameters."""
+class Inside:
+    """For M Gaussians (M,): log mass inside the bounds, its error, an upper bound on the mass outside.
+
+    And (M, p) which parameters come near their bounds.
+    """
+
+    log_mass: FloatArray
+    error: FloatArray
+    outside: FloatArray
+    active: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Lower and upper bounds (B, p) of p jointly Gaussian parameters, for each of B data sets."""
 
     lower: FloatArray
     upper: FloatArray
 
-    def mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return, for N Gaussians, an upper bound on the mass outside and the log of the mass inside.
+    def __getitem__(self, chosen: Any) -> Boxes:
+        return Boxes(self.lower[chosen], self.upper[chosen])
 
-        The bound is the sum over parameters (Boole). Where it is negligible the log mass is taken from it; elsewhere
-        the mass inside is computed over the parameters that come near their bounds: exactly for one, and by
-        Genz's sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
+    def ceiling(self, mean: FloatArray, root: FloatArray) -> FloatArray:
+        """Return an upper bound on the log mass inside, (M,) for M Gaussians: the least over single parameters."""
+        if not np.isfinite(self.lower).any() and not np.isfinite(self.upper).any():
+            return np.zeros(len(mean))
+        low, high = self._scores(mean, root)
+        return np.minimum(log_interval(low, high).min(axis=1, initial=0.0), 0.0)
+
+    def inside(self, mean: FloatArray, root: FloatArray) -> Inside:
+        """Return the mass of M Gaussians inside the bounds (M, p).
+
+        The mass outside is at most the sum over parameters (Boole), and the mass inside is at least one less that
+        sum, which is near enough where it is small. Elsewhere it is computed over the parameters that come near
+        their bounds: exactly for one, and by Genz's sequential conditioning on quasi-random points for more
+        (Genz 1992, J. Comput. Graph. Stat. 1:141).
         """
-        from scipy.special import logsumexp, ndtr
+        from scipy.special import ndtr
 
-        sd = np.sqrt((root**2).sum(2))
-        low, high = (self.lower - mean) / sd, (self.upper - mean) / sd
-        by_parameter = ndtr(low) + ndtr(-high)
-        outside = by_parameter.sum(1)
-        log_inside = np.log1p(-np.minimum(outside, 0.5))
-        active = by_parameter > 1e-3 * NEGLIGIBLE
-        for pattern in np.unique(active[active.any(axis=1)], axis=0):
-            crossed = np.flatnonzero((active == pattern).all(axis=1))
-            kept = np.flatnonzero(pattern)
-            if len(kept) == 1:
-                log_inside[crossed] = log_interval(low[crossed, kept[0]], high[crossed, kept[0]])
-                continue
-            part = Box(self.lower[kept], self.upper[kept])
+        low, high = self._scores(mean, root)
+        beyond = ndtr(low) + ndtr(-high)
+        outside = beyond.sum(axis=1)
+        log_mass, error = np.log1p(-np.minimum(outside, 0.5)), np.minimum(outside, SMALL)
+        active = beyond > TOUCHED
+        alone = active.sum(axis=1) == 1
+        only = active[alone].argmax(axis=1)[:, None]
+        log_mass[alone] = log_interval(*(np.take_along_axis(s[alone], only, 1)[:, 0] for s in (low, high)))
+        error[alone] = 0.0
+        several = (active.sum(axis=1) > 1) & (outside > SMALL)
+        effort = np.column_stack([outside < NEARLY_ALL, active])
+        for pattern in np.unique(effort[several], axis=0):
+            crossed = np.flatnonzero(several & (effort == pattern).all(axis=1))
+            kept = np.flatnonzero(pattern[1:])
             covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
             triangle = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-            number = max(POINTS, min(MANY_POINTS, MANY_POINTS // len(crossed)))
+            part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
+            number = FEW_POINTS if pattern[0] else max(POINTS, MANY_POINTS // len(crossed))
             log_weights, _ = part.points(mean[crossed][:, kept], triangle, number)
-            log_inside[crossed] = logsumexp(log_weights, axis=1) - np.log(number)
-        return outside, log_inside
+            top = log_weights.max(axis=1, keepdims=True)
+            shares = np.exp(log_weights - top).reshape(len(crossed), SHIFTS, -1).mean(axis=2)
+            mass = shares.mean(axis=1)
+            log_mass[crossed] = top[:, 0] + np.log(mass)
+            error[crossed] = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / mass
+        return Inside(log_mass, error, outside, active)
 
     def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
-        """Return log weights (N, P) and P = number points (N, P, p) inside the box: a weighted bounded Gaussian.
+        """Return log weights (M, P) and P = number points (M, P, p) inside the bounds (M, p).
 
-        The mean weight is the mass inside.
+        They stand for M bounded Gaussians; the mean weight is the mass inside.
         """
         count, p = mean.shape
         triangle = np.linalg.cholesky(root @ root.swapaxes(1, 2))
@@ -70,21 +110,30 @@ class Box:
         for j in range(p):
             centre = mean[:, None, j] + np.einsum("nqk,nk->nq", standard[:, :, :j], triangle[:, j, :j])
             scale = triangle[:, j, j][:, None]
-            low, high = (self.lower[j] - centre) / scale, (self.upper[j] - centre) / scale
+            low, high = ((ends[:, j, None] - centre) / scale for ends in (self.lower, self.upper))
             standard[:, :, j], log_mass = interval_quantile(uniforms[:, j], low, high)
             log_weights += log_mass
-            points[:, :, j] = np.clip(centre + scale * standard[:, :, j], self.lower[j], self.upper[j])
+            points[:, :, j] = np.clip(
+                centre + scale * standard[:, :, j], self.lower[:, j, None], self.upper[:, j, None]
+            )
         return log_weights, points
+
+    def _scores(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the bounds in standard deviations from the means."""
+        sd = np.sqrt((root**2).sum(axis=2))
+        return (self.lower - mean) / sd, (self.upper - mean) / sd
 
 
 @lru_cache
 def _quasi_random(dimension: int, number: int) -> FloatArray:
-    """Return a Kronecker sequence of the generalised golden ratio in the unit cube, folded by the tent map.
+    """Return a Kronecker sequence of the generalised golden ratio in the unit cube, shifted copy by shifted copy.
 
-    The fold makes any integrand periodic, which lets the error fall faster than one over the number of points.
+    The tent map makes any integrand periodic, which lets the error fall faster than one over the number of points.
     """
     ratio = 2.0
     for _ in range(64):
         ratio = (1 + ratio) ** (1 / (dimension + 1))
     steps = ratio ** -np.arange(1.0, dimension + 1)
-    return np.asarray(np.abs(2 * ((0.5 + np.arange(1, number + 1)[:, None] * steps) % 1.0) - 1))
+    shifts = np.random.default_rng(0).random((SHIFTS, 1, dimension))
+    lattice = shifts + np.arange(1, number // SHIFTS + 1)[:, None] * steps
+    return np.asarray(np.abs(2 * (lattice % 1.0) - 1)).reshape(-1, dimension)

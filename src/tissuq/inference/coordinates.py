@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import jax
@@ -188,24 +189,33 @@ class Mode:
         return self.location + self.scale @ whitened
 
 
-def log_density_on_line(log_density: LogDensity, box: Box) -> LogDensity:
-    """Return a log density of the box as the log density of real-line coordinates, Jacobian included."""
-    return lambda line: log_density(box.from_line(line)) + box.log_jacobian(line)
+def log_density_on_line(log_density: Callable[..., Any], box: Box, *data: Any) -> LogDensity:
+    """Return a log density of the box, and of data, as that of real-line coordinates, Jacobian included."""
+    return lambda line: log_density(box.from_line(line), *data) + box.log_jacobian(line)
 
 
-def derivatives_on_line(log_density: LogDensity, box: Box) -> Derivatives:
-    """Return the compiled value, gradient and Hessian of a box's log density on the real line."""
-    value_and_gradient = jax.value_and_grad(log_density_on_line(log_density, box))
+def derivatives_on_line(log_density: Callable[..., Any], box: Box, *data: Any) -> Derivatives:
+    """Return the compiled value, gradient and Hessian of a box's log density, given data, on the real line."""
+    compiled = _compiled_derivatives(log_density, tuple(box.lower.tolist()), tuple(box.upper.tolist()))
+    return lambda line: tuple(np.asarray(array) for array in compiled(line, *data))  # type: ignore[return-value]
 
-    def derivatives(line: Any) -> tuple[Any, Any, Any]:
+
+@lru_cache(maxsize=64)
+def _compiled_derivatives(
+    log_density: Callable[..., Any], lower: tuple[float, ...], upper: tuple[float, ...]
+) -> Callable[..., Any]:
+    box = Box(lower, upper)
+
+    def derivatives(line: Any, *data: Any) -> tuple[Any, Any, Any]:
+        value_and_gradient = jax.value_and_grad(log_density_on_line(log_density, box, *data))
+
         def along(direction: Any) -> tuple[Any, Any, Any]:
             (value, gradient), (_, column) = jax.jvp(value_and_gradient, (line,), (direction,))
             return value, gradient, column
 
         return jax.vmap(along, out_axes=(None, None, 0))(jnp.eye(line.size))
 
-    compiled = jax.jit(derivatives)
-    return lambda line: tuple(np.asarray(array) for array in compiled(line))  # type: ignore[return-value]
+    return jax.jit(derivatives)
 
 
 def find_modes(

@@ -2,53 +2,70 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.inference.bounds import resampled, split_at_bounds
-from tissuq.inference.conditional import ConditionalGaussian
-from tissuq.inference.marginal import (
-    Marginal,
-    blended,
-    marginal_of_mixture,
-    marginal_of_points,
-    marginal_of_quadrature,
-)
+from tissuq.inference.bounds import bounded
+from tissuq.inference.box import Inside
+from tissuq.inference.conditional import Conditional, ConditionalGaussian
+from tissuq.inference.marginal import Marginal, marginal_of_quadrature
 from tissuq.inference.quadrature import MAX_DIMENSION, Quadrature, integrate
 from tissuq.inference.solution import Components, Solution
-from tissuq.inference.warp import Warp, warp_around_mode
+from tissuq.inference.survey import log_prior_density, survey
+from tissuq.inference.threads import one_thread
+from tissuq.inference.warp import Warp, warp_along
 from tissuq.model import StatisticalModel
+from tissuq.priors import Flat
 
-__all__ = ["is_exact", "solve_exactly"]
+__all__ = ["ExactSolution", "solve_exactly", "why_not_exact"]
 
 FloatArray = NDArray[np.float64]
 
 CHAINS, DRAWS = 4, 1000
+TOGETHER = (2000, 200, 40, 5)
+"""Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
+IRRELEVANT = 40.0
+"""Log density below the largest at which the mass inside the bounds need not be known exactly."""
 
 
-def is_exact(model: StatisticalModel) -> bool:
-    """Return whether the exact route applies: at most three parameters that are not linear Gaussian."""
-    return len(model.nonlinear) <= MAX_DIMENSION
+def why_not_exact(model: StatisticalModel) -> str:
+    """Return why the exact route does not apply to a model, or nothing where it does."""
+    if model.noise.depends_on_level and model.is_correlated:
+        return (
+            f"noise '{model.noise.name}' and discrepancy '{model.discrepancy.name}' are not independent along any "
+            "fixed directions"
+        )
+    if len(model.nonlinear) > MAX_DIMENSION:
+        return (
+            f"it integrates at most {MAX_DIMENSION} nonlinear parameters, and this model has {len(model.nonlinear)} "
+            f"({', '.join(model.nonlinear)})"
+        )
+    return ""
 
 
-def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
-    """Return the posterior and the evidence of a model with at most three nonlinear parameters.
+def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[ExactSolution]:
+    """Return posterior and evidence of models with at most three nonlinear parameters each.
 
     Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
     linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
-    off more, it is represented by points within them. The error given with the evidence is that of the quadrature.
+    off more, it is represented by points within them. The error given with the evidence is that of the
+    quadrature and of the mass within the bounds.
 
     Parameters
     ----------
-    model : StatisticalModel
+    models : sequence of StatisticalModel
+        With the same material, discrepancy and noise on the same stretches: they share every factorisation.
     seed : int
         Of the draws; nothing else is random.
 
     Raises
     ------
     ModelError
-        When the model has more than three nonlinear parameters.
+        When a model has more than three nonlinear parameters, or noise and discrepancy without closed form.
     ConvergenceError
         When the quadrature does not reach its tolerance.
 
@@ -56,74 +73,120 @@ def solve_exactly(model: StatisticalModel, seed: int = 0) -> Solution:
     ----------
     Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
     """
-    if not is_exact(model):
-        raise ModelError(
-            f"the exact route integrates at most {MAX_DIMENSION} nonlinear parameters; this model has "
-            f"{len(model.nonlinear)} ({', '.join(model.nonlinear)}). Use the sampler 'nuts'."
-        )
-    conditional = ConditionalGaussian(model)
-    rule, warp = _integrate_nonlinear(model, conditional)
-    settings = warp.parameters(rule.points)[0] if rule and warp else np.zeros((1, 0))
-    given = conditional(settings)
-    components = Components(rule.weights if rule else np.ones(1), settings, given.mean, given.root)
-    inner, cut = split_at_bounds(components, given.outside, conditional.box)
-    bounds = [model.priors[symbol].support for symbol in model.linear]
-    marginals = {symbol: _linear_marginal(inner, cut, j, bounds[j]) for j, symbol in enumerate(model.linear)}
-    if rule and warp:
-        for side, symbol in enumerate(model.nonlinear):
-            marginals[symbol] = marginal_of_quadrature(rule, warp, side, settings[:, side])
-    components = inner.joined(resampled(cut)) if len(cut.weights) else inner
-    columns = dict(zip((*model.nonlinear, *model.linear), _draw(components, seed), strict=True))
-    return Solution(
-        model=model,
-        route="exact",
-        reason=_reason(model, is_bounded=len(cut.weights) > 0),
-        components=components,
-        marginals={symbol: marginals[symbol] for symbol in model.symbols},
-        draws={symbol: columns[symbol] for symbol in model.symbols},
-        log_evidence=rule.log_integral if rule else float(given.log_likelihood[0]),
-        log_evidence_error=rule.log_error if rule else 0.0,
-    )
+    reason = why_not_exact(models[0])
+    if reason:
+        raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
+    together = TOGETHER[len(models[0].nonlinear)]
+    blocks = [models[start : start + together] for start in range(0, len(models), together)]
+    with one_thread():
+        return [
+            ExactSolution(integration, index, seed)
+            for integration in map(_Integration, blocks)
+            for index in range(len(integration.models))
+        ]
 
 
-def _integrate_nonlinear(
-    model: StatisticalModel, conditional: ConditionalGaussian
-) -> tuple[Quadrature, Warp] | tuple[None, None]:
-    """Integrate likelihood times prior over the nonlinear parameters, in coordinates that follow the posterior."""
-    if not model.nonlinear:
-        return None, None
-    priors = [model.priors[symbol] for symbol in model.nonlinear]
-    warp = warp_around_mode(priors, lambda h: conditional(h).log_likelihood)
+class _Integration:
+    """Everything that data sets on the same stretches share while their nonlinear parameters are integrated."""
 
-    def log_integrand(u: FloatArray) -> FloatArray:
-        h, log_density = warp.parameters(u)
-        log_prior = sum(prior.log_density(column) for prior, column in zip(priors, h.T, strict=True))
-        return np.asarray(conditional(h).log_likelihood + log_prior - log_density)
+    def __init__(self, models: Sequence[StatisticalModel]) -> None:
+        self.models = models
+        self.conditional = ConditionalGaussian(models)
+        self.dimension = len(models[0].nonlinear)
+        self._priors = [[model.priors[symbol] for symbol in model.nonlinear] for model in models]
+        self._top = np.full((len(models), 1), -np.inf)
+        self.rule: Quadrature | None = None
+        self.warp: Warp | None = None
+        if self.dimension:
+            self.warp = warp_along(survey(self._priors, len(models[0].structure), self._log_ceiling))
+            self.rule = integrate(self._log_integrand, self.dimension)
+            self.settings = self.warp.parameters(self.rule.points)[0]
+        else:
+            self.settings = np.zeros((len(models), 1, 0))
+        self.given = self.conditional(self.settings)
 
-    return integrate(log_integrand, len(priors)), warp
+    def _log_ceiling(self, h: FloatArray) -> FloatArray:
+        """Return a likelihood that is no less than the true one, and equal where at most one bound is near."""
+        given = self.conditional(h)
+        return given.log_likelihood + self._ceiling(given)
+
+    def _log_integrand(self, u: FloatArray) -> FloatArray:
+        """Return the posterior's log density (B, N) in the coordinates of the warp; bounds count where it matters."""
+        assert self.warp is not None  # noqa: S101 (only called once it is there)
+        h, log_density = self.warp.parameters(u)
+        given = self.conditional(h)
+        value = given.log_likelihood + self._ceiling(given) + log_prior_density(self._priors, h) - log_density
+        value = np.where(np.isnan(value), -np.inf, value)
+        relevant = value > np.maximum(self._top, value.max(axis=1, keepdims=True)) - IRRELEVANT
+        data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
+        inside = self.conditional.boxes[data_set].inside(given.mean[relevant], given.root[relevant])
+        value[relevant] += inside.log_mass - self._ceiling(given)[relevant]
+        self._top = np.maximum(self._top, value.max(axis=1, keepdims=True))
+        return value
+
+    def _ceiling(self, given: Conditional) -> FloatArray:
+        shape, p = given.log_likelihood.shape, given.mean.shape[2]
+        every = self.conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
+        return every.ceiling(given.mean.reshape(-1, p), given.root.reshape(-1, p, p)).reshape(shape)
+
+    def inside(self, index: int) -> Inside:
+        """Return the mass of one data set's components inside their bounds."""
+        mean, root = self.given.mean[index], self.given.root[index]
+        return self.conditional.boxes[np.full(len(mean), index)].inside(mean, root)
 
 
-def _linear_marginal(inner: Components, cut: Components, place: int, bounds: tuple[float, float]) -> Marginal:
-    parts = []
-    if len(inner.weights):
-        sds = np.sqrt((inner.root[:, place] ** 2).sum(axis=1))
-        parts.append((inner.weights.sum(), marginal_of_mixture(inner.weights, inner.mean[:, place], sds)))
-    if len(cut.weights):
-        parts.append((cut.weights.sum(), marginal_of_points(cut.mean[:, place], cut.weights, bounds)))
-    return blended(parts, bounds)
+class ExactSolution(Solution):
+    """The posterior of one data set by the exact route."""
 
+    route = "exact"
 
-def _draw(components: Components, seed: int) -> FloatArray:
-    """Return draws (d + p, chains, draws) of the nonlinear and the linear parameters."""
-    generator = np.random.default_rng(seed)
-    chosen = generator.choice(len(components.weights), size=(CHAINS, DRAWS), p=components.weights)
-    noise = generator.standard_normal((CHAINS, DRAWS, components.root.shape[2]))
-    linear = components.mean[chosen] + np.einsum("cdij,cdj->cdi", components.root[chosen], noise)
-    return np.moveaxis(np.concatenate([components.settings[chosen], linear], axis=2), 2, 0)
+    def __init__(self, integration: _Integration, index: int, seed: int) -> None:
+        self.model = integration.models[index]
+        self._integration, self._index, self._seed = integration, index, seed
+        rule, given, inside = integration.rule, integration.given, integration.inside(index)
+        weights = rule.weights[index] if rule else np.ones(1)
+        whole = Components(weights, integration.settings[index], given.mean[index], given.root[index])
+        self._bounded = bounded(whole, inside, integration.conditional.boxes[[index]])
+        if not any(isinstance(prior, Flat) for prior in self.model.priors.values()):
+            alone = given.log_likelihood[index, 0] + inside.log_mass[0]
+            self.log_evidence = float(rule.log_integral[index] if rule else alone)
+            self.log_evidence_error = float((rule.log_error[index] if rule else 0.0) + weights @ inside.error)
 
+    @cached_property
+    def components(self) -> Components:  # type: ignore[override]  # a cached property
+        """The posterior as a mixture."""
+        return self._bounded.components()
 
-def _reason(model: StatisticalModel, is_bounded: bool) -> str:
-    linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
-    nonlinear = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
-    bounds = "; bounds of the linear parameters cut the posterior and were honoured" if is_bounded else ""
-    return f"{linear}; {nonlinear}{bounds}"
+    @property
+    def reason(self) -> str:  # type: ignore[override]  # computed, where others store it
+        """What was done and why."""
+        model = self.model
+        linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
+        rest = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
+        cut = "; bounds of the linear parameters cut the posterior and were honoured" if self._bounded.is_cut else ""
+        return f"{linear}; {rest}{cut}"
+
+    @cached_property
+    def marginals(self) -> dict[str, Marginal]:  # type: ignore[override]  # a cached property
+        """The marginal posterior of every parameter."""
+        return {symbol: self._marginal(symbol) for symbol in self.model.symbols}
+
+    @cached_property
+    def draws(self) -> dict[str, FloatArray]:  # type: ignore[override]  # a cached property
+        """Independent draws of every parameter."""
+        generator, parts = np.random.default_rng(self._seed), self.components
+        chosen = generator.choice(len(parts.weights), size=(CHAINS, DRAWS), p=parts.weights)
+        noise = generator.standard_normal((CHAINS, DRAWS, parts.root.shape[2]))
+        linear = parts.mean[chosen] + np.einsum("cdij,cdj->cdi", parts.root[chosen], noise)
+        columns = np.moveaxis(np.concatenate([parts.settings[chosen], linear], axis=2), 2, 0)
+        named = dict(zip((*self.model.nonlinear, *self.model.linear), columns, strict=True))
+        return {symbol: named[symbol] for symbol in self.model.symbols}
+
+    def _marginal(self, symbol: str) -> Marginal:
+        rule, warp = self._integration.rule, self._integration.warp
+        if symbol in self.model.linear:
+            return self._bounded.marginal(self.model.linear.index(symbol))
+        assert rule is not None and warp is not None  # noqa: S101 (there is a nonlinear parameter)
+        side = self.model.nonlinear.index(symbol)
+        values = self._integration.settings[self._index, :, side]
+        return marginal_of_quadrature(rule, warp, self._index, side, values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy import Discrepancy
+from tissuq.model import StatisticalModel
 
-__all__ = ["Spectrum", "correlation_spectrum"]
+__all__ = ["Spectrum", "correlation_spectrum", "scaled_spectrum"]
 
 FloatArray = NDArray[np.float64]
 
@@ -30,8 +31,8 @@ class Spectrum:
     values: FloatArray
 
 
-def correlation_spectrum(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
-    """Return the spectrum of a discrepancy's correlation on points (n,), at a cost of n r^2 for numerical rank r.
+def correlation_spectrum(model: StatisticalModel, shape: tuple[float, ...]) -> Spectrum:
+    """Return the spectrum of a model's correlation at its measurements, at a cost of n r^2 for numerical rank r.
 
     Few points are decomposed directly, and remembered, because many data sets share their stretches. For many,
     pivoted Cholesky finds a root of the matrix without forming it, and its singular values give the rest. Smooth
@@ -39,18 +40,36 @@ def correlation_spectrum(discrepancy: Discrepancy, points: FloatArray, shape: tu
 
     Parameters
     ----------
-    discrepancy : Discrepancy
-    points : (n,) array, dimensionless
-        Stretches.
+    model : StatisticalModel
     shape : tuple of float
-        Values of ``discrepancy.shape_symbols``.
+        Values of the parameters on which the correlation depends.
     """
+    points = model.experiment.stretch
+    if model.is_repeated:
+        return _of_repeats(points)
     if len(points) <= FEW_POINTS:
-        return _remembered(discrepancy, points.tobytes(), shape)
-    return _decompose(discrepancy, points, shape)
+        return _remembered(model.discrepancy, points.tobytes(), shape)
+    return _decompose(model.discrepancy, points, shape)
 
 
-@lru_cache(maxsize=2048)
+def scaled_spectrum(model: StatisticalModel, shape: Mapping[str, float], scale: FloatArray) -> Spectrum:
+    """Return the spectrum of a model's correlation at its measurements, rows and columns divided by a scale (n,)."""
+    points = model.experiment.stretch
+    correlation = model.correlation(points, points, shape) / np.multiply.outer(scale, scale)
+    values, vectors = np.linalg.eigh(correlation)
+    kept = values > ROUNDING * np.trace(correlation)
+    return Spectrum(vectors[:, kept], values[kept])
+
+
+def _of_repeats(points: FloatArray) -> Spectrum:
+    """Return the spectrum of the correlation that is one at equal points and zero elsewhere."""
+    _, place, count = np.unique(points, return_inverse=True, return_counts=True)
+    vectors = np.zeros((len(points), len(count)))
+    vectors[np.arange(len(points)), place] = 1 / np.sqrt(count[place])
+    return Spectrum(vectors, count.astype(np.float64))
+
+
+@lru_cache(maxsize=512)
 def _remembered(discrepancy: Discrepancy, points: bytes, shape: tuple[float, ...]) -> Spectrum:
     return _decompose(discrepancy, np.frombuffer(points), shape)
 

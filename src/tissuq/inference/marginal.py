@@ -7,10 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.gaussian import log_interval
 from tissuq.inference.quadrature import Lines, Quadrature
 from tissuq.inference.warp import Warp
 
-__all__ = ["Marginal", "blended", "marginal_of_mixture", "marginal_of_points", "marginal_of_quadrature"]
+__all__ = [
+    "Marginal",
+    "blended",
+    "marginal_of_cut_mixture",
+    "marginal_of_mixture",
+    "marginal_of_points",
+    "marginal_of_quadrature",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -74,7 +82,55 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
     return Marginal(mean, sd, points, density, _proper(weights @ ndtr(scores)))
 
 
-def marginal_of_quadrature(rule: Quadrature, warp: Warp, side: int, values: FloatArray) -> Marginal:
+def marginal_of_cut_mixture(
+    weights: FloatArray, means: FloatArray, covariances: FloatArray, place: int, which: int, ends: tuple[float, float]
+) -> Marginal:
+    """Return the marginal of one parameter of M Gaussians that the bounds of one parameter cut, in closed form.
+
+    Parameters
+    ----------
+    weights : (M,) array
+        Of the Gaussians after the cut.
+    means : (M, p) array
+    covariances : (M, p, p) array
+        Before the cut.
+    place, which : int
+        The parameter whose marginal is wanted, and the one with bounds.
+    ends : tuple of float
+        The bounds.
+    """
+    heavy = weights > 1e-9 * weights.max()
+    weights, means, covariances = weights[heavy] / weights[heavy].sum(), means[heavy], covariances[heavy]
+    sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (place, which))
+    low, high = ((end - means[:, which]) / sd_cut for end in ends)
+    log_mass = log_interval(low, high)
+    at_low, at_high = (np.exp(-0.5 * score**2 - log_mass) / np.sqrt(2 * np.pi) for score in (low, high))
+    shift = at_low - at_high
+    ends_pull = np.where(np.isfinite(low), low, 0) * at_low - np.where(np.isfinite(high), high, 0) * at_high
+    shrink = 1 + ends_pull - shift**2
+    along = covariances[:, place, which] / sd_cut
+    own_mean = means[:, place] + along * shift
+    own_variance = np.maximum(sd**2 - along**2 * (1 - shrink), 0.0)
+    mean = float(weights @ own_mean)
+    variance = float(weights @ (own_variance + (own_mean - mean) ** 2))
+    scores = np.linspace(-8, 8, 33)
+    spread = own_mean[:, None] + np.sqrt(own_variance)[:, None] * scores
+    limits = ends if place == which else (-np.inf, np.inf)
+    reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
+    shares = weights[:, None] * np.exp(-0.5 * scores**2)
+    points = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, 2 * GRID)
+    scores = (points - means[:, place, None]) / sd[:, None]
+    log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
+    if place != which:
+        correlation = np.clip(along / sd, -1 + 1e-12, 1 - 1e-12)[:, None]
+        rest = np.sqrt(1 - correlation**2)
+        log_density += log_interval(*((end[:, None] - correlation * scores) / rest for end in (low, high)))
+    density = weights @ np.exp(log_density)
+    steps = 0.5 * (density[1:] + density[:-1]) * np.diff(points)
+    return Marginal(mean, float(np.sqrt(variance)), points, density, _proper(np.append(0.0, np.cumsum(steps))))
+
+
+def marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, values: FloatArray) -> Marginal:
     """Return the marginal of a nonlinear parameter: the quadrature's own interpolant, other parameters integrated.
 
     Parameters
@@ -82,21 +138,24 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, side: int, values: Floa
     rule : Quadrature
         In the coordinates of the warp.
     warp : Warp
+    index : int
+        The data set's place among those of rule and warp.
     side : int
         The parameter's place among the nonlinear ones.
     values : (M,) array
         Its values at the points of the rule.
     """
-    mean = float(rule.weights @ values)
-    sd = float(np.sqrt(rule.weights @ (values - mean) ** 2))
-    lines = rule.lines(side)
+    weights, warp = rule.weights[index], warp[index]
+    mean = float(weights @ values)
+    sd = float(np.sqrt(weights @ (values - mean) ** 2))
+    lines = rule.lines(side, index)
     heavy = np.abs(lines.series[:, 0] * lines.width) > 1e-8
     lines = Lines(lines.before[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
-    seen = values[rule.weights > 1e-8]
+    seen = values[weights > 1e-8]
     low, high = warp.bounds(side)
     margin = 0.05 * np.ptp(seen)
     ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
-    points = _grid(values, rule.weights, ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
+    points = _grid(values, weights, ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
     coordinates, slope = warp.coordinate(side, points, lines.before)
     density = np.maximum(lines.evaluate(coordinates, slope), 0.0)
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import blackjax
@@ -125,6 +125,10 @@ class NutsDraws:
         """Estimated fraction of missing information of the energy: (chains,) array."""
         return _diagnostic("bfmi", self.energies)
 
+    def of(self, values: Floats, names: tuple[str, ...]) -> NutsDraws:
+        """Return the same run with other quantities (chains, draws, k) that follow from its draws."""
+        return replace(self, values=values, names=names)
+
     @property
     def converged(self) -> bool:
         """Whether every diagnostic passes its threshold."""
@@ -168,12 +172,13 @@ class NutsDraws:
 
 
 def sample_nuts(
-    log_density: LogDensity,
+    log_density: LogDensity | Callable[[Any, Any], Any],
     lower: ArrayLike,
     upper: ArrayLike,
     start: ArrayLike,
     settings: NutsSettings | None = None,
     names: Sequence[str] | None = None,
+    data: Any = None,
 ) -> NutsDraws:
     """Sample a log density on a box.
 
@@ -194,6 +199,9 @@ def sample_nuts(
         Lengths, target and seed.
     names : sequence of str, optional
         What to call the parameters in messages.
+    data : pytree of arrays, optional
+        A second argument of the log density. What is compiled once for a function, bounds and settings serves all
+        data of one shape and every seed.
 
     Returns
     -------
@@ -226,10 +234,14 @@ def sample_nuts(
     if len(labels) != dimension:
         raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
     generator = np.random.default_rng(settings.seed)
-    derivatives = derivatives_on_line(log_density, box)
+    known = data is not None
+    derivatives = derivatives_on_line(log_density, box, *([data] if known else []))
     modes = find_modes(derivatives, box, start, generator)
     states = _overdispersed(derivatives, modes, settings.chains, generator)
-    values, energies, divergent, leapfrogs = _run(log_density, box, modes[0], states, settings)
+    run = _compiled_run(log_density, *_bounds(box), replace(settings, seed=0))
+    key = jax.random.key(settings.seed)
+    found = run(key, states, _schedule(settings), modes[0].location, modes[0].scale, *([data] if known else []))
+    values, energies, divergent, leapfrogs = (np.asarray(array) for array in found)
     gradients = float(leapfrogs.mean()) * settings.thinning
     return NutsDraws(values, energies, int(divergent.sum()), gradients, labels)
 
@@ -265,50 +277,55 @@ class _Tuning(NamedTuple):
     squares: Any
 
 
-def _run(
-    log_density: LogDensity, box: Box, mode: Mode, states: Any, settings: NutsSettings
-) -> tuple[NDArray[Any], ...]:
-    """Run all chains in one compiled loop.
+@lru_cache(maxsize=64)
+def _compiled_run(
+    log_density: Callable[..., Any], lower: tuple[float, ...], upper: tuple[float, ...], settings: NutsSettings
+) -> Any:
+    """Return the function that runs all chains in one compiled loop.
 
-    Returns values by chain and draw; energies, divergences and leapfrogs by chain and trajectory. Warm-up and
+    It returns values by chain and draw; energies, divergences and leapfrogs by chain and trajectory. Warm-up and
     sampling share the loop body: the trajectory code, by far the costliest to compile, appears once.
     """
-    on_line = log_density_on_line(log_density, box)
-    kernel = blackjax.nuts.build_kernel()
-
-    def whitened_density(whitened: Any) -> Any:
-        return on_line(mode.unwhiten(whitened))
-
-    def iterate(carry: tuple[Any, _Tuning], step: tuple[Any, ...]) -> tuple[Any, Any]:
-        states, tuning = carry
-        key, is_warmup, is_slow, ends_window = step
-        learning = tuning.step_size
-        step_size = jnp.exp(jnp.where(is_warmup, learning.log_step_size, learning.log_step_size_avg))
-        keys = jax.random.split(key, settings.chains)
-        move = partial(
-            kernel,
-            logdensity_fn=whitened_density,
-            step_size=step_size,
-            inverse_mass_matrix=tuning.inverse_mass,
-        )
-        states, info = jax.vmap(move)(keys, states)
-        tuned = _tune(tuning, states.position, info.acceptance_rate, is_slow, ends_window, settings.target_acceptance)
-        tuning = jax.tree.map(partial(jnp.where, is_warmup), tuned, tuning)
-        return (states, tuning), (states.position, info.energy, info.is_divergent, info.num_integration_steps)
+    box, kernel = Box(lower, upper), blackjax.nuts.build_kernel()
 
     @jax.jit
-    def run(key: Any, states: Any, schedule: Any) -> Any:
+    def run(key: Any, states: Any, schedule: Any, location: Any, scale: Any, *data: Any) -> Any:
+        on_line = log_density_on_line(log_density, box, *data)
+
+        def to_line(whitened: Any) -> Any:
+            return location + scale @ whitened
+
+        def iterate(carry: tuple[Any, _Tuning], step: tuple[Any, ...]) -> tuple[Any, Any]:
+            states, tuning = carry
+            key, is_warmup, is_slow, ends_window = step
+            learning = tuning.step_size
+            step_size = jnp.exp(jnp.where(is_warmup, learning.log_step_size, learning.log_step_size_avg))
+            keys = jax.random.split(key, settings.chains)
+            move = partial(
+                kernel,
+                logdensity_fn=lambda whitened: on_line(to_line(whitened)),
+                step_size=step_size,
+                inverse_mass_matrix=tuning.inverse_mass,
+            )
+            states, info = jax.vmap(move)(keys, states)
+            acceptance = info.acceptance_rate
+            tuned = _tune(tuning, states.position, acceptance, is_slow, ends_window, settings.target_acceptance)
+            tuning = jax.tree.map(partial(jnp.where, is_warmup), tuned, tuning)
+            return (states, tuning), (states.position, info.energy, info.is_divergent, info.num_integration_steps)
+
         keys = jax.random.split(key, len(schedule[0]))
-        start = (states, _untuned(mode.location.size, settings.target_acceptance))
+        start = (states, _untuned(len(location), settings.target_acceptance))
         _, trace = jax.lax.scan(iterate, start, (keys, *schedule))
         positions, *others = (jnp.swapaxes(array[settings.warmup :], 0, 1) for array in trace)
         kept = slice(settings.thinning - 1, None, settings.thinning)
-        to_box: Any = jax.vmap(jax.vmap(lambda whitened: box.from_line(mode.unwhiten(whitened))))
+        to_box: Any = jax.vmap(jax.vmap(lambda whitened: box.from_line(to_line(whitened))))
         return to_box(positions[:, kept]), *others
 
-    key = jax.random.key(settings.seed)
-    trace = run(key, states, _schedule(settings))
-    return tuple(np.asarray(array) for array in trace)
+    return run
+
+
+def _bounds(box: Box) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(box.lower.tolist()), tuple(box.upper.tolist())
 
 
 def _schedule(settings: NutsSettings) -> tuple[NDArray[np.bool_], ...]:

@@ -1,4 +1,4 @@
-"""Adaptive quadrature of a positive function on the unit cube, known through its logarithm."""
+"""Adaptive quadrature of positive functions on the unit cube, known through their logarithms."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from tissuq.errors import ConvergenceError
 __all__ = ["MAX_DIMENSION", "Lines", "Quadrature", "integrate"]
 
 FloatArray = NDArray[np.float64]
+LogFunction = Callable[[FloatArray], FloatArray]
 
 MAX_DIMENSION = 3
 ORDERS = {1: 10, 2: 10, 3: 7}
@@ -27,21 +28,21 @@ MAX_CELLS = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """C boxes in the unit cube of dimension d, with the function's logarithm at their m^d Gauss points."""
+    """C boxes in the unit cube of dimension d, with the logarithms (B, C, m^d) of B functions at their Gauss points."""
 
     lower: FloatArray
     width: FloatArray
     log_values: FloatArray
 
     def __getitem__(self, chosen: NDArray[np.bool_]) -> Cells:
-        return Cells(self.lower[chosen], self.width[chosen], self.log_values[chosen])
+        return Cells(self.lower[chosen], self.width[chosen], self.log_values[:, chosen])
 
     def joined(self, other: Cells) -> Cells:
         """Return these cells followed by others."""
         return Cells(
             np.concatenate([self.lower, other.lower]),
             np.concatenate([self.width, other.width]),
-            np.concatenate([self.log_values, other.log_values]),
+            np.concatenate([self.log_values, other.log_values], axis=1),
         )
 
 
@@ -87,30 +88,31 @@ class Lines:
 
 @dataclass(frozen=True, eq=False)
 class Quadrature:
-    """The integral of exp(log f), and f normalised, as weighted points and as polynomials along each side.
+    """The integrals of B functions exp(log f), and each f normalised, as weighted points and as polynomials.
 
     Attributes
     ----------
-    log_integral : float
-    log_error : float
-        Estimated error of log_integral, from the decay of the Legendre coefficients in every cell (an upper
-        estimate: it is the error of the interpolant, and Gauss quadrature is more accurate).
+    log_integral : (B,) array
+    log_error : (B,) array
+        Estimated error of log_integral. In every cell the Legendre coefficients of the interpolant fall by some factor
+        from the first to the last; Gauss quadrature of that order leaves out coefficients that are smaller by
+        that factor once more.
     points : (M, d) array
-    weights : (M,) array
+    weights : (B, M) array
         Non-negative, sum one.
     """
 
     cells: Cells
-    log_integral: float
-    log_error: float
+    log_integral: FloatArray
+    log_error: FloatArray
     points: FloatArray
     weights: FloatArray
 
-    def lines(self, side: int) -> Lines:
-        """Return the function along one side, the sides after it integrated."""
+    def lines(self, side: int, index: int = 0) -> Lines:
+        """Return one of the functions along one side, the sides after it integrated."""
         dimension = self.cells.lower.shape[1]
         order = ORDERS[dimension]
-        values = np.exp(self.cells.log_values - self.log_integral).reshape(-1, order**side, order, order ** (
+        values = np.exp(self.cells.log_values[index] - self.log_integral[index]).reshape(-1, order**side, order, order ** (
             dimension - side - 1
         ))  # fmt: skip
         others = np.prod(np.delete(self.cells.width, side, axis=1), axis=1)
@@ -126,53 +128,56 @@ class Quadrature:
         )
 
 
-def integrate(log_function: Callable[[FloatArray], FloatArray], dimension: int) -> Quadrature:
-    """Integrate exp(log_function) over the unit cube of one to three dimensions.
+def integrate(log_function: LogFunction, dimension: int) -> Quadrature:
+    """Integrate exp(log_function) over the unit cube of one to three dimensions, for B functions at once.
 
-    Cells are halved along the side in which the function is worst resolved until the estimated error is below
-    a thousandth of the integral; the integral itself is then right to about a millionth.
+    Cells are halved along the side in which a function is worst resolved until the interpolation error of every
+    function is below a thousandth of its integral; the integral itself is then right to about a millionth.
 
     Parameters
     ----------
     log_function : callable
-        Maps (N, d) points to (N,) values; -inf where the function vanishes.
+        Maps (N, d) points to (B, N) values; -inf where a function vanishes.
     dimension : int
         One to three.
 
     Raises
     ------
     ConvergenceError
-        When the tolerance is not reached with the largest number of cells, or the function vanishes everywhere.
+        When the tolerance is not reached with the largest number of cells, or a function vanishes everywhere.
     """
     cells = _first_cells(log_function, dimension)
     while True:
-        top = cells.log_values.max()
-        if not np.isfinite(top):
+        top = cells.log_values.max(axis=(1, 2))
+        if not np.isfinite(top).all():
             raise ConvergenceError(
                 "the posterior density is not finite or zero at every point tried: data and priors contradict "
                 "each other, or a prior is far too wide."
             )
         integrals, errors = _resolve(cells, top)
-        total, error = integrals.sum(), errors.max(axis=1)
-        if error.sum() <= TOLERANCE * total:
-            return _finish(cells, top, integrals, float(error.sum() / total))
-        if len(cells.lower) > MAX_CELLS:
+        total = integrals.sum(axis=1, keepdims=True)
+        error = errors.max(axis=2) / total
+        if (error.sum(axis=1) <= TOLERANCE).all():
+            return _finish(cells, top, integrals, error)
+        if cells.log_values.shape[1] > MAX_CELLS:
             raise ConvergenceError(
                 f"quadrature over {dimension} nonlinear parameters did not reach its tolerance "
-                f"(relative error {error.sum() / total:.1g}); use the sampler 'nuts' or narrower priors."
+                f"(relative error {error.sum(axis=1).max():.1g}); use the method 'nuts' or narrower priors."
             )
-        cells = _halved(log_function, cells, error, errors.argmax(axis=1))
+        worst = error.argmax(axis=0)
+        cell = np.arange(len(worst))
+        cells = _halved(log_function, cells, error[worst, cell], errors[worst, cell].argmax(axis=1))
 
 
-def _first_cells(log_function: Callable[[FloatArray], FloatArray], dimension: int) -> Cells:
+def _first_cells(log_function: LogFunction, dimension: int) -> Cells:
     corners = np.indices([FIRST_CELLS] * dimension).reshape(dimension, -1).T / FIRST_CELLS
     return _evaluated(log_function, corners, np.full(corners.shape, 1 / FIRST_CELLS))
 
 
-def _evaluated(log_function: Callable[[FloatArray], FloatArray], lower: FloatArray, width: FloatArray) -> Cells:
+def _evaluated(log_function: LogFunction, lower: FloatArray, width: FloatArray) -> Cells:
     points = _cell_points(lower, width, ORDERS[lower.shape[1]])
-    values = log_function(points.reshape(-1, lower.shape[1])).reshape(points.shape[:2])
-    return Cells(lower, width, np.where(np.isnan(values), -np.inf, values))
+    values = log_function(points.reshape(-1, lower.shape[1]))
+    return Cells(lower, width, np.where(np.isnan(values), -np.inf, values).reshape(-1, *points.shape[:2]))
 
 
 def _cell_points(lower: FloatArray, width: FloatArray, order: int) -> FloatArray:
@@ -182,25 +187,24 @@ def _cell_points(lower: FloatArray, width: FloatArray, order: int) -> FloatArray
     return np.asarray(lower[:, None, :] + width[:, None, :] * grid)
 
 
-def _resolve(cells: Cells, top: float) -> tuple[FloatArray, FloatArray]:
-    """Return every cell's integral (relative to the largest value) and its error along every side."""
+def _resolve(cells: Cells, top: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return every cell's integrals (B, C), relative to the largest values, and their errors (B, C, d) by side."""
     dimension = cells.lower.shape[1]
     order = ORDERS[dimension]
-    values = np.exp(cells.log_values - top)
+    values = np.exp(cells.log_values - top[:, None, None])
     volume = np.prod(cells.width, axis=1)
     integrals = volume * (values @ _rule(order, dimension))
-    errors = np.empty(cells.lower.shape)
+    errors = np.empty((*values.shape[:2], dimension))
     across = _rule(order, dimension - 1)
+    grid = values.reshape(*values.shape[:2], *[order] * dimension)
     for side in range(dimension):
-        lines = np.moveaxis(values.reshape(-1, *[order] * dimension), side + 1, 1).reshape(len(values), order, -1)
-        coefficients = np.einsum("kj,cjo->cko", _to_legendre(order)[-2:], lines)
-        errors[:, side] = volume * (np.abs(coefficients).sum(axis=1) @ across)
+        lines = np.moveaxis(grid, side + 2, 2).reshape(*values.shape[:2], order, -1)
+        tail = np.abs(_to_legendre(order)[-2:] @ lines).sum(axis=2)
+        errors[:, :, side] = volume * (tail @ across)
     return integrals, errors
 
 
-def _halved(
-    log_function: Callable[[FloatArray], FloatArray], cells: Cells, error: FloatArray, side: NDArray[np.intp]
-) -> Cells:
+def _halved(log_function: LogFunction, cells: Cells, error: FloatArray, side: NDArray[np.intp]) -> Cells:
     """Halve the worst cells that together hold nine tenths of the error."""
     order = np.argsort(error)[::-1]
     count = int(np.searchsorted(np.cumsum(error[order]), 0.9 * error.sum())) + 1
@@ -213,15 +217,17 @@ def _halved(
     return cells[~chosen].joined(_evaluated(log_function, lower, np.concatenate([width, width])))
 
 
-def _finish(cells: Cells, top: float, integrals: FloatArray, error: float) -> Quadrature:
+def _finish(cells: Cells, top: FloatArray, integrals: FloatArray, error: FloatArray) -> Quadrature:
     dimension = cells.lower.shape[1]
     rule = _rule(ORDERS[dimension], dimension)
-    masses = np.prod(cells.width, axis=1)[:, None] * np.exp(cells.log_values - top) * rule
-    total = integrals.sum()
-    weights = (masses / total).ravel()
-    kept = np.flatnonzero(weights > 1e-12 * weights.max())
+    total = integrals.sum(axis=1, keepdims=True)
+    masses = np.prod(cells.width, axis=1)[:, None] * np.exp(cells.log_values - top[:, None, None]) * rule
+    weights = (masses / total[:, :, None]).reshape(len(top), -1)
+    kept = np.flatnonzero((weights > 1e-12 * weights.max(axis=1, keepdims=True)).any(axis=0))
     points = _cell_points(cells.lower, cells.width, ORDERS[dimension]).reshape(-1, dimension)[kept]
-    return Quadrature(cells, float(top + np.log(total)), error, points, weights[kept] / weights[kept].sum())
+    weights = weights[:, kept] / weights[:, kept].sum(axis=1, keepdims=True)
+    fall = np.minimum(error / np.maximum(integrals / total, 1e-300), 1.0)
+    return Quadrature(cells, top + np.log(total[:, 0]), (error * fall).sum(axis=1), points, weights)
 
 
 def _summed(place: NDArray[np.intp], values: FloatArray, count: int) -> FloatArray:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,18 +71,18 @@ class Diagnostics:
     rhat: dict[str, float]
     ess_bulk: dict[str, float]
     ess_tail: dict[str, float]
-    divergences: int
+    divergences: int | None = None
+    least_bfmi: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """The posterior of one model.
+class Solution(ABC):
+    """The posterior of one model; marginals and draws are computed when they are first asked for.
 
     Attributes
     ----------
     model : StatisticalModel
     route : str
-        ``"exact"`` or ``"nuts"``, and ``reason`` says why it was taken.
+        Which method was used, and ``reason`` says why it was taken and what it did.
     components : Components
         The posterior as a mixture; predictions rest on it.
     marginals : dict of str to Marginal
@@ -90,23 +91,28 @@ class Solution:
         Draws of every parameter. On the exact route they are independent of each other, and those of nonlinear
         parameters take the values of the quadrature's points: for densities and intervals use the marginals.
     log_evidence, log_evidence_error : float or None
-        Log of p(y) with respect to the normalised priors, y in MPa; None where the route has none.
+        Log of p(y) with respect to the normalised priors, y in MPa; None where there is none.
     diagnostics : Diagnostics or None
         Of the sampler; None on the exact route.
-    warnings : tuple of str
-        What a reader of the result must know.
     """
 
     model: StatisticalModel
-    route: Literal["exact", "nuts"]
+    route: str
     reason: str
     components: Components
-    marginals: dict[str, Marginal]
-    draws: dict[str, FloatArray]
     log_evidence: float | None = None
     log_evidence_error: float | None = None
     diagnostics: Diagnostics | None = None
-    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    @abstractmethod
+    def marginals(self) -> dict[str, Marginal]:
+        """The marginal posterior of every parameter."""
+
+    @property
+    @abstractmethod
+    def draws(self) -> dict[str, FloatArray]:
+        """Draws of every parameter."""
 
     @property
     def is_approximate(self) -> bool:

@@ -1,18 +1,23 @@
 """What the material says: strain energies, and stress as their derivative along a loading mode."""
 
-from tissuq.mechanics.material import Material, material_named
-from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Yeoh
+from tissuq.mechanics.material import Material, StretchMaterial, material_named
+from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Ogden1, Ogden2, Ogden3, Yeoh
 from tissuq.mechanics.simulate import simulate
-from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, stress_basis
+from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, stress_basis, traced_stress_basis
 
 __all__ = [
     "Material",
     "MooneyRivlin",
     "NeoHookean",
+    "Ogden1",
+    "Ogden2",
+    "Ogden3",
+    "StretchMaterial",
     "Yeoh",
     "engineering_stress",
     "initial_shear_modulus",
     "material_named",
     "simulate",
     "stress_basis",
+    "traced_stress_basis",
 ]

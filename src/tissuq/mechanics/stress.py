@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import LoadingMode, Uniaxial
 from tissuq.mechanics.material import Material
 
-__all__ = ["engineering_stress", "initial_shear_modulus", "path_energy", "stress_basis"]
+__all__ = ["engineering_stress", "initial_shear_modulus", "path_energy", "stress_basis", "traced_stress_basis"]
 
 
 def path_energy(material: Material, mode: LoadingMode, stretch: Any, values: Any) -> Any:
     """Return the strain energy (MPa) of a material at one stretch of a loading mode; JAX differentiates it."""
-    squares = [principal * principal for principal in mode.principal_stretches(stretch)]
-    I1 = squares[0] + squares[1] + squares[2]
-    I2 = squares[0] * squares[1] + squares[1] * squares[2] + squares[2] * squares[0]
-    return material.strain_energy(I1, I2, values)
+    return material.energy(mode.principal_stretches(stretch), values)
 
 
 def engineering_stress(
@@ -48,39 +47,110 @@ def engineering_stress(
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
     """
     values = np.asarray(values, dtype=np.float64)
-    jax = differentiator()
-    try:
+    with _explained(material):
         curves = _curves(material, mode)(np.asarray(stretch, dtype=np.float64), np.atleast_2d(values))
-    except jax.errors.TracerArrayConversionError as error:
-        raise ModelError(
-            f"the strain energy of material '{material.name}' cannot be differentiated: write it with plain arithmetic "
-            "and jax.numpy (jnp.exp, not np.exp)."
-        ) from error
     return np.asarray(curves if values.ndim == 2 else curves[0])
 
 
-def stress_basis(material: Material, mode: LoadingMode, stretch: ArrayLike) -> NDArray[np.float64]:
-    """Return the (n, k) stresses of unit parameters: the columns of a model linear in its k parameters."""
-    return engineering_stress(material, mode, stretch, np.eye(len(material.parameters))).T
+def stress_basis(
+    material: Material, mode: LoadingMode, stretch: ArrayLike, nonlinear: ArrayLike = ()
+) -> NDArray[np.float64]:
+    """Return the stresses of unit linear parameters: the columns of a model linear in them.
+
+    Parameters
+    ----------
+    material : Material
+        The strain energy, proportional to its k linear parameters.
+    mode : LoadingMode
+        The deformation path.
+    stretch : (n,) array, dimensionless
+        Stretches along the path.
+    nonlinear : (s,) or (m, s) array
+        Values of the other parameters in the material's order; several rows give several bases.
+
+    Returns
+    -------
+    (n, k) or (m, n, k) array, MPa per unit of each linear parameter
+
+    Raises
+    ------
+    ModelError
+        When there is not one value for each nonlinear parameter.
+
+    Examples
+    --------
+    >>> from tissuq.experiments.modes import Uniaxial
+    >>> from tissuq.mechanics import Ogden1, stress_basis
+    >>> stress_basis(Ogden1(), Uniaxial(), [0.5, 1.0, 2.0], nonlinear=[2.0]).ravel().round(12).tolist()
+    [-3.5, 0.0, 1.75]
+    """
+    settings = np.asarray(nonlinear, dtype=np.float64)
+    with _explained(material):
+        bases = _bases(material, mode)(np.asarray(stretch, dtype=np.float64), np.atleast_2d(settings))
+    return np.asarray(bases if settings.ndim == 2 else bases[0])
+
+
+def traced_stress_basis(material: Material, mode: LoadingMode, stretch: Any, nonlinear: Any) -> Any:
+    """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
+    others = [parameter.symbol for parameter in material.parameters if not parameter.is_linear]
+    if np.shape(nonlinear) != (len(others),):
+        raise ModelError(
+            f"the stress of material '{material.name}' is linear in its parameters only at given values of "
+            f"{', '.join(others) or 'nothing else'}, so its basis needs {len(others)} of them: "
+            f"it was given the shape {np.shape(nonlinear)}."
+        )
+    jnp = differentiator().numpy
+    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    unit = jnp.asarray(np.eye(is_linear.size)[is_linear])
+    return _stresses(material, mode)(jnp.asarray(stretch), unit.at[:, ~is_linear].set(nonlinear)).T
 
 
 def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
-    """Return 2 (dW/dI1 + dW/dI2) at the reference, in MPa."""
-    jax = differentiator()
-    given = np.asarray(values, dtype=np.float64)
-    slope = jax.grad(lambda invariants: material.strain_energy(invariants[0], invariants[1], given))
-    return float(2 * slope(np.array([3.0, 3.0])).sum())
+    """Return the shear modulus at the reference, in MPa: a third of the initial slope in uniaxial tension."""
+    with _explained(material):
+        return float(_initial_slope(material)(np.asarray(values, dtype=np.float64))) / 3
 
 
-@lru_cache(maxsize=256)
-def _curves(material: Material, mode: LoadingMode) -> Any:
+def _stresses(material: Material, mode: LoadingMode) -> Any:
+    """Return the function of stretches (n,) and parameter values (m, k) that gives stresses (m, n)."""
     jax = differentiator()
 
     def stress(stretch: Any, values: Any) -> Any:
         slope = jax.grad(path_energy, argnums=2)(material, mode, stretch, values)
         return slope / mode.loaded_axes
 
-    return jax.jit(jax.vmap(jax.vmap(stress, (0, None)), (None, 0)))
+    return jax.vmap(jax.vmap(stress, (0, None)), (None, 0))
+
+
+@lru_cache(maxsize=256)
+def _curves(material: Material, mode: LoadingMode) -> Any:
+    return differentiator().jit(_stresses(material, mode))
+
+
+@lru_cache(maxsize=256)
+def _bases(material: Material, mode: LoadingMode) -> Any:
+    jax = differentiator()
+    basis = partial(traced_stress_basis, material, mode)
+    return jax.jit(jax.vmap(basis, (None, 0)))
+
+
+@lru_cache(maxsize=256)
+def _initial_slope(material: Material) -> Any:
+    jax = differentiator()
+    slope = jax.grad(jax.grad(path_energy, argnums=2), argnums=2)
+    return jax.jit(lambda values: slope(material, Uniaxial(), 1.0, values))
+
+
+@contextmanager
+def _explained(material: Material) -> Iterator[None]:
+    """Say in words that an energy is written with the wrong library."""
+    try:
+        yield
+    except differentiator().errors.TracerArrayConversionError as error:
+        raise ModelError(
+            f"the strain energy of material '{material.name}' cannot be differentiated: write it with plain arithmetic "
+            "and jax.numpy (jnp.exp, not np.exp)."
+        ) from error
 
 
 def differentiator() -> Any:

@@ -8,25 +8,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.lowrank import Spectrum, correlation_spectrum
+from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Components
 from tissuq.model import StatisticalModel
 
-__all__ = ["CorrelatedPart", "coefficients", "correlated_parts", "stress_moments"]
+__all__ = ["CorrelatedPart", "basis_of", "coefficients", "correlated_parts", "mean_stress", "stress_moments"]
 
 FloatArray = NDArray[np.float64]
+
+BLOCK = 1_000_000
+"""Values of the stress at once: what bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class CorrelatedPart:
-    """The components that share one correlation, and what it takes to solve with their covariance of the data.
+    """The components that share one structure, and what it takes to solve with their covariance of the data.
 
-    The covariance of the data is white I + U diag(kernel) U'; all arrays have one row for each chosen component.
+    The covariance of the data is diag(scale) (white I + U diag(kernel) U') diag(scale); arrays of N have one row for
+    each chosen component.
     """
 
     chosen: NDArray[np.intp]
     correlation: Spectrum
     shape: dict[str, float]
+    design: FloatArray
+    scale: FloatArray
     amplitude: FloatArray
     white: FloatArray
 
@@ -49,19 +55,45 @@ def coefficients(model: StatisticalModel, components: Components) -> tuple[Float
     return mean, root
 
 
+def basis_of(model: StatisticalModel, stretch: FloatArray, settings: FloatArray) -> FloatArray:
+    """Return the mean stresses of unit coefficients: (g, k), or (M, g, k) where they depend on settings (M, d)."""
+    if not model.bent_symbols:
+        return model.basis(stretch)
+    return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]])
+
+
+def mean_stress(model: StatisticalModel, coefficients: FloatArray, settings: FloatArray) -> FloatArray:
+    """Return the mean stress (M, n) at the measurements for coefficients (M, k) and settings (M, d)."""
+    if not model.bent_symbols:
+        return np.asarray(coefficients @ model.design.T)
+    stretch = model.experiment.stretch
+    blocks = np.array_split(np.arange(len(settings)), max(1, settings.shape[0] * len(stretch) // BLOCK))
+    curves = [basis_of(model, stretch, settings[block]) @ coefficients[block][:, :, None] for block in blocks]
+    return np.concatenate(curves)[:, :, 0]
+
+
 def correlated_parts(model: StatisticalModel, settings: FloatArray) -> Iterator[CorrelatedPart]:
-    """Group settings (M, d) of the nonlinear parameters by the correlation they imply."""
-    discrepancy, stretch = model.discrepancy, model.experiment.stretch
+    """Group settings (M, d) of the nonlinear parameters by the structure they imply."""
     values = dict(zip(model.nonlinear, settings.T, strict=True))
-    white = np.broadcast_to(model.white_variance(values), len(settings))
-    amplitude = np.broadcast_to(discrepancy.correlated_variance(values), len(settings))
-    shapes = np.column_stack([values[symbol] for symbol in discrepancy.shape_symbols])
-    distinct, group = np.unique(shapes, axis=0, return_inverse=True)
+    amplitude = np.broadcast_to(model.correlated_variance(values), len(settings))
+    shared = model.nonlinear if model.noise.depends_on_level else model.structure
+    keys = np.column_stack([np.zeros(len(settings)), *(values[symbol] for symbol in shared)])
+    distinct, group = np.unique(keys, axis=0, return_inverse=True)
+    one = np.ones(len(model.experiment))
     for index, row in enumerate(distinct):
-        shape = dict(zip(discrepancy.shape_symbols, row, strict=True))
+        own = dict(zip(shared, map(float, row[1:]), strict=True))
         chosen = np.flatnonzero(group.ravel() == index)
-        factor = correlation_spectrum(discrepancy, stretch, tuple(map(float, row)))
-        yield CorrelatedPart(chosen, factor, shape, amplitude[chosen], white[chosen])
+        shape = {symbol: own[symbol] for symbol in model.discrepancy.shape_symbols}
+        bent = np.array([own[symbol] for symbol in model.bent_symbols])
+        design = model.basis(model.experiment.stretch, bent) if len(bent) else model.design
+        if model.noise.depends_on_level:
+            scale = np.sqrt(model.white_variance(own, model.levels))
+            spectrum, white = scaled_spectrum(model, shape, scale), np.ones(len(chosen))
+        else:
+            scale, spectrum = one, correlation_spectrum(model, tuple(shape.values()))
+            own_values = {symbol: column[chosen] for symbol, column in values.items()}
+            white = np.broadcast_to(model.white_variance(own_values), len(chosen)).astype(float)
+        yield CorrelatedPart(chosen, spectrum, shape, design, scale, amplitude[chosen], white)
 
 
 def stress_moments(
@@ -72,24 +104,25 @@ def stress_moments(
     Without the discrepancy it is the model alone (eq. 28); with it, a correlated discrepancy is conditioned on
     the data (eq. 27; differs from the source, whose GP is drawn from its prior).
     """
-    values = dict(zip(model.nonlinear, components.settings.T, strict=True))
+    values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
-    basis = model.basis(stretch)
+    basis = basis_of(model, stretch, components.settings)
     if not discrepancy:
         basis = basis * np.isin(model.column_symbols, model.material_symbols)
-    mean = mean_b @ basis.T
-    root = np.einsum("gk,mkp->mgp", basis, root_b)
+    mean = (basis @ mean_b[:, :, None])[:, :, 0]
+    root = basis @ root_b
     extra = np.zeros_like(mean)
-    if discrepancy:
-        extra += np.reshape(model.discrepancy.independent_variance(values), (-1, 1))
-        if model.discrepancy.is_correlated:
-            for part in correlated_parts(model, components.settings):
-                shift, pull, variance = _condition(model, part, stretch, mean_b[part.chosen])
-                mean[part.chosen] += shift
-                root[part.chosen] -= np.einsum("mgk,mkp->mgp", pull, root_b[part.chosen])
-                extra[part.chosen] += variance
+    if discrepancy and model.is_correlated:
+        for part in correlated_parts(model, components.settings):
+            shift, pull, variance = _condition(model, part, stretch, mean_b[part.chosen])
+            mean[part.chosen] += shift
+            root[part.chosen] -= np.einsum("mgk,mkp->mgp", pull, root_b[part.chosen])
+            extra[part.chosen] += variance
+    level = np.abs(mean)
+    if discrepancy and not model.is_repeated:
+        extra += model.discrepancy.independent_variance(values)
     if noise:
-        extra += np.reshape(model.noise_variance(values), (-1, 1))
+        extra += model.noise_variance(values, level)
     return mean, extra + (root**2).sum(axis=2)
 
 
@@ -101,11 +134,11 @@ def _condition(
     Returns its mean (N, g), the sensitivity (N, g, k) of minus that mean to b, and its variance (N, g) given b.
     """
     data = model.experiment
-    cross = model.discrepancy.correlation(stretch, data.stretch, part.shape)
+    cross = model.correlation(stretch, data.stretch, part.shape) / part.scale
     vectors = part.correlation.vectors
     inside = cross @ vectors
     gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
-    columns = np.column_stack([model.design, data.stress])
+    columns = np.column_stack([part.design, data.stress]) / part.scale[:, None]
     smoothed = np.einsum("gr,nr,rk->ngk", inside, gain, vectors.T @ columns)
     pull, of_data = smoothed[:, :, :-1], smoothed[:, :, -1]
     explained = gain @ (inside**2).T

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.solution import Solution
-from tissuq.prediction.moments import correlated_parts
+from tissuq.prediction.moments import correlated_parts, mean_stress
 
 __all__ = ["pointwise_log_likelihood", "replicate_data", "stride"]
 
@@ -32,15 +32,15 @@ def replicate_data(solution: Solution, seed: int) -> FloatArray:
     """
     generator = np.random.default_rng([seed, 3])
     mean, settings, white = _given_draws(solution)
-    replicate = mean + np.sqrt(white)[:, None] * generator.standard_normal(mean.shape)
-    if solution.model.discrepancy.is_correlated:
+    replicate = mean + np.sqrt(white) * generator.standard_normal(mean.shape)
+    if solution.model.is_correlated:
         residual = solution.model.experiment.stress - mean
         for part in correlated_parts(solution.model, settings):
             share = part.kernel / (part.kernel + part.white[:, None])
             score = generator.standard_normal(share.shape)
-            along = share * (residual[part.chosen] @ part.correlation.vectors)
+            along = share * ((residual[part.chosen] / part.scale) @ part.correlation.vectors)
             along += np.sqrt(share * part.white[:, None]) * score
-            replicate[part.chosen] += along @ part.correlation.vectors.T
+            replicate[part.chosen] += (along @ part.correlation.vectors.T) * part.scale
     return replicate.reshape(solution.shape[0], -1, mean.shape[1])
 
 
@@ -52,26 +52,32 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
     """
     mean, settings, white = _given_draws(solution)
     residual = solution.model.experiment.stress - mean
-    variance = np.broadcast_to(white[:, None], residual.shape).copy()
-    if solution.model.discrepancy.is_correlated:
+    variance = np.broadcast_to(white, residual.shape).copy()
+    if solution.model.is_correlated:
         for part in correlated_parts(solution.model, settings):
             vectors = part.correlation.vectors
-            own, inverse = residual[part.chosen], 1 / (part.kernel + part.white[:, None])
+            own, inverse = residual[part.chosen] / part.scale, 1 / (part.kernel + part.white[:, None])
             inside = own @ vectors
             solved = (inside * inverse) @ vectors.T + (own - inside @ vectors.T) / part.white[:, None]
             rest = np.maximum(1 - (vectors**2).sum(axis=1), 0.0)
             diagonal = inverse @ (vectors**2).T + rest / part.white[:, None]
-            residual[part.chosen], variance[part.chosen] = solved / diagonal, 1 / diagonal
+            residual[part.chosen] = part.scale * solved / diagonal
+            variance[part.chosen] = part.scale**2 / diagonal
     density = -0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi))
     return density.reshape(solution.shape[0], -1, mean.shape[1])
 
 
 def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return mean stress (D, n), nonlinear parameters (D, d) and white variance (D,) of every `stride`-th draw."""
+    """Return mean stress (D, n), nonlinear parameters (D, d) and white variance (D, 1 or n) of every `stride`-th draw.
+
+    D draws in all.
+    """
     model, step = solution.model, stride(solution)
     values = {symbol: drawn[:, ::step].ravel() for symbol, drawn in solution.draws.items()}
     count = len(next(iter(values.values())))
     columns = np.column_stack([values[symbol] for symbol in model.column_symbols])
     settings = np.array([values[symbol] for symbol in model.nonlinear]).reshape(-1, count).T
-    white = np.broadcast_to(model.white_variance(values), count).astype(float)
-    return columns @ model.design.T, settings, white
+    column_values = {symbol: drawn[:, None] for symbol, drawn in values.items()}
+    levels = model.levels if model.noise.depends_on_level else 0.0
+    white = np.atleast_2d(model.white_variance(column_values, levels))
+    return mean_stress(model, columns, settings), settings, np.broadcast_to(white, (count, white.shape[1]))

@@ -8,6 +8,7 @@ from typing import Any
 
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
+from tissuq.report.tables import headline_of
 
 __all__ = ["readable_parameters", "readable_summary", "significant"]
 
@@ -31,10 +32,12 @@ def interval(low: float, high: float, sd: float) -> tuple[str, str]:
 
 
 def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
-    """Return the rows of a summary as text, C10 in the given unit."""
+    """Return the rows of a summary as text, C10 (or the material's first parameter) in the given unit."""
     readable = []
     for row in rows:
-        mean, sd, low, high = (row[f"C10_{key}"] / unit.to_mpa for key in ("mean", "sd", "hdi_low", "hdi_high"))
+        mean, sd, low, high = (
+            row[f"{headline_of(row)}_{key}"] / unit.to_mpa for key in ("mean", "sd", "hdi_low", "hdi_high")
+        )
         ends = interval(low, high, sd)
         readable.append(
             {

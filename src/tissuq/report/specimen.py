@@ -58,15 +58,17 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
     from tissuq.report.figures import marginal_figure, predictive_figure
 
     return {
-        "marginals": marginal_figure(study.posteriors, "C10", study.unit),
+        "marginals": marginal_figure(study.posteriors, study.headline, study.unit),
         "with_discrepancy": predictive_figure(study.posteriors, discrepancy=True, unit=study.unit),
         "model_alone": predictive_figure(study.posteriors, discrepancy=False, unit=study.unit),
     }
 
 
 def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
-    noise = study.settings.noise_sd
+    noise = next(iter(study.posteriors.values())).model.noise
+    known = f"sd {study.settings.noise_sd:g} {study.unit.name}" if not noise.parameters else ""
     return {
+        "headline": study.headline,
         "settings": study.settings,
         "experiment": study.experiment,
         "unit": study.unit.name,
@@ -81,7 +83,7 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
             if each.model.discrepancy.caution
         },
         "parameters": readable_parameters(study.posteriors, study.unit),
-        "noise": "unknown, a parameter" if noise == "unknown" else f"sd {noise:g} {study.unit.name}",
+        "noise": known or noise.description,
         "skipped": study.skipped,
         "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
@@ -93,23 +95,24 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
     if len(summary) > 1:
         summary = [row for row in summary if not study.is_cut_by_prior(row["formulation"])] or summary
     left_out = len(study.posteriors) - len(summary)
-    means = [row["C10_mean"] / scale for row in summary]
+    name = study.headline
+    means = [row[f"{name}_mean"] / scale for row in summary]
     if len(summary) == 1:
         row = summary[0]
-        low, high = (significant(row[f"C10_hdi_{end}"] / scale) for end in ("low", "high"))
+        low, high = (significant(row[f"{name}_hdi_{end}"] / scale) for end in ("low", "high"))
         return (
-            f"With the discrepancy '{row['formulation']}', C10 is {significant(means[0])} {unit}, "
+            f"With the discrepancy '{row['formulation']}', {name} is {significant(means[0])} {unit}, "
             f"95 % HPD {low} to {high} {unit}."
         )
     low, high = (min(means), max(means))
-    overlap = max(row["C10_hdi_low"] for row in summary) <= min(row["C10_hdi_high"] for row in summary)
+    overlap = max(row[f"{name}_hdi_low"] for row in summary) <= min(row[f"{name}_hdi_high"] for row in summary)
     verdict = (
         "all 95 % intervals overlap"
         if overlap
         else "the 95 % intervals contradict each other: the choice of discrepancy matters more than the noise"
     )
     return (
-        f"With {len(summary)} ways to account for model uncertainty, the mean of C10 ranges from {significant(low)} to "
+        f"With {len(summary)} ways to account for model uncertainty, the mean of {name} ranges from {significant(low)} to "
         f"{significant(high)} {unit}; {verdict}."
         + (f" ({left_out} more left out here, because a bound of a prior decides part of them.)" if left_out else "")
     )

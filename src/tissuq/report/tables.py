@@ -10,29 +10,35 @@ from typing import Any
 
 from tissuq.posterior import Posterior
 
-__all__ = ["parameter_rows", "summary_row", "write_csv", "write_json"]
+__all__ = ["headline_of", "parameter_rows", "summary_row", "write_csv", "write_json"]
 
 Row = dict[str, Any]
 
 
 def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: float | None = None) -> Row:
-    """Return the row of one formulation; C10 in MPa, empty where a route has no such number."""
-    c10 = posterior.summary().to_dict("index")["C10"]
-    low, high = float(c10["hdi_low"]), float(c10["hdi_high"])
+    """Return the row of one formulation, C10 (or the material's first parameter) in MPa; empty what it has not."""
+    symbol = posterior.model.headline
+    found = posterior.summary().to_dict("index")[symbol]
+    low, high = float(found["hdi_low"]), float(found["hdi_high"])
     return {
         "formulation": formulation,
-        "C10_mean": float(c10["mean"]),
-        "C10_sd": float(c10["sd"]),
-        "C10_hdi_low": low,
-        "C10_hdi_high": high,
+        f"{symbol}_mean": float(found["mean"]),
+        f"{symbol}_sd": float(found["sd"]),
+        f"{symbol}_hdi_low": low,
+        f"{symbol}_hdi_high": high,
         "contains_truth": None if truth is None else low <= truth <= high,
         "log_evidence": posterior.log_evidence,
         "predictive_coverage": posterior.predictive_coverage(),
         "predictive_coverage_model_only": posterior.predictive_coverage(discrepancy=False),
-        "rhat": float(c10["rhat"]) if "rhat" in c10 else None,
-        "ess": float(c10["ess"]) if "ess" in c10 else None,
+        "rhat": float(found["rhat"]) if "rhat" in found else None,
+        "ess": float(found["ess"]) if "ess" in found else None,
         "seconds": seconds,
     }
+
+
+def headline_of(row: Row) -> str:
+    """Return the parameter whose posterior the row of a formulation gives."""
+    return next(name.removesuffix("_mean") for name in row if name.endswith("_mean"))
 
 
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.discrepancy import discrepancies, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import read_experiment
 from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.fitting import Sampler, fit
+from tissuq.fitting import Method, fit
 from tissuq.mechanics import material_named
-from tissuq.model import NOISE
+from tissuq.noise import Noise, noise_named
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
@@ -45,8 +45,9 @@ class SpecimenSettings(BaseModel):
     material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((ALL,), min_length=1)
     noise_sd: float | Literal["unknown"] = "unknown"
+    noise: Literal["unknown", "proportional", "repeats"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
-    sampler: Sampler = "auto"
+    method: Method = "auto"
     seed: int = Field(0, ge=0)
 
     @field_validator("discrepancies")
@@ -66,6 +67,18 @@ class SpecimenSettings(BaseModel):
                 "would make every measurement exact"
             )
         return given
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> Self:
+        if self.noise is not None and self.noise_sd != "unknown":
+            raise ValueError(f"give noise_sd or noise, not both (noise_sd is {self.noise_sd}, noise is '{self.noise}')")
+        return self
+
+    def noise_in(self, unit: StressUnit) -> Noise:
+        """Return the noise, a known standard deviation converted from a unit to MPa."""
+        if self.noise_sd == "unknown":
+            return noise_named(self.noise or "unknown")
+        return noise_named(self.noise_sd * unit.to_mpa)
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements; a relative file lies in ``folder``."""
@@ -110,6 +123,11 @@ class SpecimenStudy:
             )
         return found
 
+    @property
+    def headline(self) -> str:
+        """The parameter that summaries put first."""
+        return next(iter(self.posteriors.values())).model.headline
+
     def is_cut_by_prior(self, name: str) -> bool:
         """Whether a bound of a prior, not the data, decides part of a fit."""
         return any("cut by a bound" in text for text in self.posteriors[name].warnings)
@@ -149,9 +167,9 @@ def run_specimen(
                 experiment,
                 material=settings.material,
                 discrepancy=name,
-                noise_sd=settings.noise_sd if settings.noise_sd == "unknown" else settings.noise_sd * unit.to_mpa,
+                noise=settings.noise_in(unit),
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
-                sampler=settings.sampler,
+                method=settings.method,
                 seed=settings.seed,
             )
             seconds[name] = perf_counter() - start
@@ -166,7 +184,7 @@ def run_specimen(
 
 
 def _parameters(settings: SpecimenSettings, discrepancy: str) -> tuple[Parameter, ...]:
-    noise = (NOISE,) if settings.noise_sd == "unknown" else ()
+    noise = settings.noise_in(stress_unit("MPa")).parameters
     return (*material_named(settings.material).parameters, *discrepancy_named(discrepancy).parameters, *noise)
 
 

@@ -64,7 +64,7 @@ def _fitted(settings: PaperSettings, formulation: str, bound: float | None) -> C
             discrepancy=formulation,
             noise_sd=settings.noise_sd,
             priors=priors,
-            sampler="exact",
+            method="exact",
         )
         low, high = posterior.solution.marginals["C10"].hdi()
         held += low <= settings.truth["C10"] <= high

@@ -95,7 +95,7 @@ def _fit_all(
             discrepancy=name,
             noise_sd=settings.noise_sd,
             priors=settings.priors_of(name),
-            sampler=sampler,
+            method="joint" if sampler == "nuts" else "exact",
             seed=settings.seed,
         )
         seconds = perf_counter() - start

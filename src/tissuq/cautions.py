@@ -1,0 +1,70 @@
+"""What a reader of a posterior must know before using it, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.solution import Solution
+
+__all__ = ["warnings_about"]
+
+INSEPARABLE = -0.8
+"""Correlation of two variances below which the data hold only their sum."""
+HIGH = 0.1
+"""Density at a bound, relative to the largest, above which the bound decides."""
+
+
+def warnings_about(solution: Solution) -> Iterator[str]:
+    """Yield the warnings that a posterior carries, the gravest first."""
+    if solution.is_approximate and solution.diagnostics is not None:
+        yield solution.diagnostics.verdict
+    if solution.model.confounds_noise:
+        yield (
+            "noise_sd and S are both unknown, and only noise_sd^2 + S^2 is in the data: read neither alone, or give "
+            "the noise (repeated measurements at one stretch tell it: noise 'repeats')."
+        )
+    elif _noise_is_inseparable(solution):
+        yield (
+            "the data do not tell noise from discrepancy: the more there is of one, the less of the other. Read neither "
+            "alone, or give the noise (repeated measurements at one stretch tell it)."
+        )
+    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
+    if cut:
+        yield (
+            f"the posterior is cut by a bound of the prior of {', '.join(cut)}: there the bound, not the data, "
+            "decides. Give a wider prior, unless the bound is meant."
+        )
+
+
+def _noise_is_inseparable(solution: Solution) -> bool:
+    """Return whether draws of the noise's and the discrepancy's variances fall and rise against each other."""
+    model = solution.model
+    is_free = any(symbol in model.nonlinear for symbol in (p.symbol for p in model.discrepancy.parameters))
+    if not model.noise.parameters or not is_free:
+        return False
+    values = {symbol: drawn.ravel() for symbol, drawn in solution.draws.items()}
+    level = float(model.levels.mean()) if model.noise.depends_on_level else 0.0
+    noise = np.broadcast_to(model.noise_variance(values, level), solution.draws[model.symbols[0]].size)
+    own = model.discrepancy.independent_variance(values) + model.discrepancy.correlated_variance(values)
+    return _correlation(noise, np.broadcast_to(own, noise.shape)) < INSEPARABLE
+
+
+def _correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    if not np.ptp(first) or not np.ptp(second):
+        return 0.0
+    ranks = (values.argsort().argsort() for values in (first, second))
+    return float(np.corrcoef(*ranks)[0, 1])
+
+
+def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
+    """Yield the parameters whose posterior is still high at a bound that only the prior sets, and which bound."""
+    for parameter in solution.model.parameters:
+        marginal = solution.marginals[parameter.symbol]
+        ends = zip(("lower", "upper"), solution.model.priors[parameter.symbol].support, parameter.support, strict=True)
+        for name, chosen, natural in ends:
+            inside = chosen + (1e-3 if name == "lower" else -1e-3) * marginal.sd
+            if chosen != natural and marginal.pdf(inside) > HIGH * marginal.density.max():
+                yield parameter.symbol, name

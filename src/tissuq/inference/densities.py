@@ -1,0 +1,164 @@
+"""A model's densities for samplers: of all parameters, or of the nonlinear ones with the others integrated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache, partial
+from math import log, pi
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.scipy.linalg import solve_triangular
+
+from tissuq.inference.reduction import Reducer
+from tissuq.mechanics import traced_stress_basis
+from tissuq.model import StatisticalModel
+
+__all__ = ["Density", "given_density", "joint_density"]
+
+Density = Callable[[Any, Any], Any]
+"""Maps a parameter vector and data to what is known there; one function for all models with the same parts."""
+
+
+def joint_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
+    """Return the log of p(y | parameters) p(parameters) as a JAX function of all parameters, and its data.
+
+    The paper's density (eq. 15 with eq. 20 to 26): a dense multivariate normal for correlated discrepancies, nothing
+    integrated.
+    """
+    data = _measurements(model)
+    if not model.bent_symbols:
+        data["design"] = model.design
+    return _remembered(_joint, model), data
+
+
+def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
+    """Return what is known given the nonlinear parameters h, as a JAX function of h, and its data.
+
+    It returns log p(y | h), linear parameters integrated over their priors as if these had no bounds; the log prior
+    density of h; and the mean and a root of the covariance of the linear parameters given y and h.
+    """
+    gaussians = np.array([model.priors[s].gaussian for s in model.linear], dtype=np.float64).reshape(-1, 3)
+    data: dict[str, Any] = {"mean": gaussians[:, 0], "precision": gaussians[:, 1], "constant": gaussians[:, 2].sum()}
+    if _has_fixed_directions(model):
+        (reduced,) = (jax.tree.map(np.squeeze, vars(Reducer([model])(np.zeros((1, 0))))),)
+        p, q = len(model.linear), len(model.column_symbols) + 1
+        data |= {name: reduced[name].reshape(-1) for name in ("counts", "values", "levels")}
+        data |= {"inverse": reduced["inverse"].reshape(p, p), "centre": reduced["centre"].reshape(p)}
+        data |= {"log_size": reduced["log_size"], "squares": reduced["squares"].reshape(-1, q * q)}
+        data["count"] = float(len(model.experiment))
+    else:
+        columns = model.design[:, [model.column_symbols.index(symbol) for symbol in model.linear]]
+        inverse = np.linalg.inv(np.linalg.qr(columns, mode="r"))
+        data |= _measurements(model) | {"inverse": inverse, "centre": np.zeros(len(inverse))}
+        data["log_size"] = -np.linalg.slogdet(inverse)[1]
+        if not model.bent_symbols:
+            data["design"] = model.design
+    return _remembered(_given, model), data
+
+
+def _measurements(model: StatisticalModel) -> dict[str, Any]:
+    data: dict[str, Any] = {"stretch": model.experiment.stretch, "stress": model.experiment.stress}
+    data["other"] = model.discrepancy.mean_basis(model.experiment.mode, model.experiment.stretch)
+    return data | {"levels": model.levels if model.noise.depends_on_level else np.zeros(1)}
+
+
+def _has_fixed_directions(model: StatisticalModel) -> bool:
+    """Return whether errors are independent along directions that no parameter changes."""
+    return not model.structure and not (model.is_correlated and model.noise.depends_on_level)
+
+
+def _remembered(density: Callable[..., Any], model: StatisticalModel) -> Density:
+    """Return one function object for all models that differ only in their data, so that JAX compiles it once."""
+    parts = model.material, model.discrepancy, model.noise, model.experiment.mode
+    return _shared(density, _Key((*parts, tuple(model.priors.items())), model))
+
+
+class _Key:
+    """A model, equal to every other that has the same parts and priors."""
+
+    def __init__(self, identity: tuple[Any, ...], model: StatisticalModel) -> None:
+        self.identity, self.model = identity, model
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and self.identity == other.identity
+
+    def __hash__(self) -> int:
+        return hash(self.identity)
+
+
+@lru_cache(maxsize=64)
+def _shared(density: Callable[..., Any], key: _Key) -> Density:
+    return partial(density, key.model)
+
+
+def _log_prior(model: StatisticalModel, values: Mapping[str, Any]) -> Any:
+    return sum((model.priors[symbol].log_density(value) for symbol, value in values.items()), jnp.zeros(()))
+
+
+def _design(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> Any:
+    """Return the (n, k) mean stresses of unit parameters."""
+    if not model.bent_symbols:
+        return data["design"]
+    bent = jnp.stack([values[symbol] for symbol in model.bent_symbols])
+    own = traced_stress_basis(model.material, model.experiment.mode, data["stretch"], bent)
+    return jnp.hstack([own, data["other"]])
+
+
+def _whitened(
+    model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any], columns: Any
+) -> tuple[Any, Any]:
+    """Return V^-1/2 times columns (n, k), and log |V|."""
+    n = len(columns)
+    white = jnp.broadcast_to(model.white_variance(values, data["levels"]), n)
+    if not model.is_correlated:
+        return columns / jnp.sqrt(white)[:, None], jnp.log(white).sum()
+    correlation = model.correlation(data["stretch"], data["stretch"], values)
+    root = jnp.linalg.cholesky(model.correlated_variance(values) * correlation + jnp.diag(white))
+    return solve_triangular(root, columns, lower=True), 2 * jnp.log(jnp.diag(root)).sum()
+
+
+def _joint(model: StatisticalModel, vector: Any, data: Mapping[str, Any]) -> Any:
+    values = dict(zip(model.symbols, vector, strict=True))
+    columns = jnp.asarray([model.symbols.index(symbol) for symbol in model.column_symbols])
+    residual = data["stress"] - _design(model, values, data) @ vector[columns]
+    (whitened, log_determinant) = _whitened(model, values, data, residual[:, None])
+    exponent = (whitened**2).sum() + log_determinant + len(residual) * log(2 * pi)
+    return _log_prior(model, values) - 0.5 * exponent
+
+
+def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
+    values = dict(zip(model.nonlinear, h, strict=True))
+    p, inverse = len(model.linear), data["inverse"]
+    moments, log_determinant, count = _moments(model, values, data)
+    fixed = [values[symbol] for symbol in model.column_symbols if symbol not in model.linear]
+    rest = jnp.stack([*(-value for value in fixed), jnp.ones(())])
+    offset, weight = data["mean"] - data["centre"], data["precision"]
+    precision = moments[:p, :p] + inverse.T @ (weight[:, None] * inverse)
+    pull = moments[:p, p:] @ rest + inverse.T @ (weight * offset)
+    misfit = rest @ moments[p:, p:] @ rest + weight @ offset**2
+    cholesky = jnp.linalg.cholesky(precision)
+    whitened = solve_triangular(cholesky, pull, lower=True)
+    root = inverse @ solve_triangular(cholesky, jnp.eye(p), lower=True).T
+    exponent = misfit - whitened @ whitened + log_determinant + (count - p) * log(2 * pi)
+    log_volume = -jnp.log(jnp.diag(cholesky)).sum() - data["log_size"]
+    log_likelihood = data["constant"] + log_volume - 0.5 * exponent
+    return log_likelihood, _log_prior(model, values), data["centre"] + root @ whitened, root
+
+
+def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+    """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, and the number of measurements."""
+    p, q = len(model.linear), len(model.column_symbols) + 1
+    if _has_fixed_directions(model):
+        variances = model.white_variance(values, data["levels"]) + model.correlated_variance(values) * data["values"]
+        variances = jnp.broadcast_to(variances, data["counts"].shape)
+        moments = ((1 / variances) @ data["squares"]).reshape(q, q)
+        return moments, data["counts"] @ jnp.log(variances), data["count"]
+    design = _design(model, values, data)
+    free = [model.column_symbols.index(symbol) for symbol in model.linear]
+    fixed = [place for place in range(q - 1) if place not in free]
+    columns = jnp.hstack([design[:, free] @ data["inverse"], design[:, fixed], data["stress"][:, None]])
+    whitened, log_determinant = _whitened(model, values, data, columns)
+    return whitened.T @ whitened, log_determinant, len(columns)

@@ -1,0 +1,167 @@
+"""The data in the directions in which their errors are independent: what a likelihood is computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.lowrank import correlation_spectrum
+from tissuq.model import StatisticalModel
+from tissuq.statistics import CHUNK
+
+__all__ = ["Reducer", "Reductions"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """B data sets on the same stretches, for one setting of the structure.
+
+    The data matrix of a data set is D = [Q, F, e]: the orthonormal basis of its p linear columns, the columns of
+    parameters that are linear but have no Gaussian prior, and the residual of least squares. Along r directions
+    its errors are independent, with variances that are simple functions of the nonlinear parameters.
+
+    Attributes
+    ----------
+    inverse : (p, p) array
+        Inverse of the triangle that turns Q into the linear columns.
+    log_size : float
+        Log of the absolute determinant of that triangle.
+    centre : (B, p) array
+        The least-squares solutions.
+    squares : (B, r, q^2) array
+        Sums of squares and products of D's columns along each direction.
+    counts : (r,) array
+        How many dimensions share a direction's variance.
+    values : (r,) array
+        Eigenvalues of the correlation of the discrepancy; zero where it has none.
+    levels : (r,) array
+        Levels of the stress, for noise that depends on them.
+    """
+
+    inverse: FloatArray
+    log_size: float
+    centre: FloatArray
+    squares: FloatArray
+    counts: FloatArray
+    values: FloatArray
+    levels: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Reductions:
+    """K reductions one beside the other: all arrays begin with that dimension, those of directions padded with zeros."""
+
+    inverse: FloatArray
+    log_size: FloatArray
+    centre: FloatArray
+    squares: FloatArray
+    counts: FloatArray
+    values: FloatArray
+    levels: FloatArray
+
+    @classmethod
+    def of(cls, parts: Sequence[Reduction]) -> Reductions:
+        """Stack reductions of the same data."""
+        rank = max(len(part.counts) for part in parts)
+        directions = [
+            np.array([np.pad(getattr(part, name), (0, rank - len(part.counts))) for part in parts])
+            for name in ("counts", "values", "levels")
+        ]
+        squares = np.zeros((len(parts), len(parts[0].squares), rank, parts[0].squares.shape[2]))
+        for row, part in zip(squares, parts, strict=True):
+            row[:, : len(part.counts)] = part.squares
+        alike = [np.array([getattr(part, name) for part in parts]) for name in ("inverse", "log_size", "centre")]
+        return cls(*alike, squares, *directions)
+
+
+class Reducer:
+    """Reduces the data of models with the same parts and stretches, given the structure; remembers what it did."""
+
+    def __init__(self, models: Sequence[StatisticalModel]) -> None:
+        self._models = models
+        self._known: dict[tuple[float, ...], Reduction] = {}
+
+    def __call__(self, settings: FloatArray) -> Reductions:
+        """Return the reductions at K settings (K, s) of the structure."""
+        return Reductions.of([self._at(tuple(map(float, setting))) for setting in settings])
+
+    def _at(self, setting: tuple[float, ...]) -> Reduction:
+        if setting not in self._known:
+            model = self._models[0]
+            is_plain = not model.structure and not model.is_correlated and not model.noise.depends_on_level
+            is_alone = len(self._models) == 1 or len(model.experiment) > CHUNK
+            reduce = _from_statistics if is_plain and is_alone else _from_rows
+            self._known[setting] = reduce(self._models, setting)
+        return self._known[setting]
+
+
+def _from_statistics(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -> Reduction:
+    """Reduce by the data's triangles alone, at a cost that does not depend on their number."""
+    free, fixed = _columns(models[0])
+    p = len(free)
+    centres, squares = [], []
+    for model in models:
+        triangle = np.linalg.qr(model.statistics.triangle[:, [*free, *fixed, -1]], mode="r")
+        inverse = np.linalg.inv(triangle[:p, :p])
+        data = triangle.copy()
+        data[:p, :p] = np.eye(p)
+        data[:p, -1] = 0.0
+        centres.append(inverse @ triangle[:p, -1])
+        squares.append((data.T @ data).reshape(1, -1))
+    one = np.ones(1)
+    return Reduction(
+        inverse,
+        float(np.log(np.abs(np.diag(triangle)[:p])).sum()),
+        np.array(centres),
+        np.array(squares),
+        len(models[0].experiment) * one,
+        0 * one,
+        0 * one,
+    )
+
+
+def _from_rows(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -> Reduction:
+    """Reduce by all measurements, in the directions in which their errors are independent."""
+    model = models[0]
+    free, fixed = _columns(model)
+    bent = len(model.bent_symbols)
+    design = model.design if not bent else model.basis(model.experiment.stretch, np.array(setting[:bent]))
+    basis, triangle = np.linalg.qr(design[:, free])
+    inverse = np.linalg.inv(triangle)
+    stresses = np.array([each.experiment.stress for each in models])
+    centre = (stresses @ basis) @ inverse.T
+    residual = stresses - centre @ design[:, free].T
+    shared = np.hstack([basis, design[:, fixed]])
+    n, count, q = len(design), len(models), shared.shape[1] + 1
+    if model.is_correlated:
+        spectrum = correlation_spectrum(model, setting[bent:])
+        shared_part, residual_part = spectrum.vectors.T @ shared, residual @ spectrum.vectors
+        outside = shared - spectrum.vectors @ shared_part, residual - residual_part @ spectrum.vectors.T
+        squares = np.empty((count, len(spectrum.values) + 1, q * q))
+        squares[:, :-1] = _products(shared_part, residual_part)
+        squares[:, -1] = _products(*outside).sum(axis=1)
+        counts = np.append(np.ones(len(spectrum.values)), n - len(spectrum.values))
+        values, levels = np.append(spectrum.values, 0.0), np.zeros(len(counts))
+    elif model.noise.depends_on_level:
+        squares, counts, values, levels = _products(shared, residual), np.ones(n), np.zeros(n), model.levels
+    else:
+        squares = _products(shared, residual).sum(axis=1, keepdims=True)
+        counts, values, levels = np.array([float(n)]), np.zeros(1), np.zeros(1)
+    return Reduction(inverse, float(np.log(np.abs(np.diag(triangle))).sum()), centre, squares, counts, values, levels)
+
+
+def _products(shared: FloatArray, own: FloatArray) -> FloatArray:
+    """Return, along r directions, the products (B, r, q^2) of q - 1 shared columns (r, q - 1) and one own (B, r)."""
+    columns = np.concatenate([np.broadcast_to(shared, (len(own), *shared.shape)), own[:, :, None]], axis=2)
+    return np.asarray((columns[:, :, :, None] * columns[:, :, None, :]).reshape(*own.shape, -1))
+
+
+def _columns(model: StatisticalModel) -> tuple[list[int], list[int]]:
+    """Return the places of the columns that are integrated in closed form, and of the others."""
+    free = [model.column_symbols.index(symbol) for symbol in model.linear]
+    return free, [place for place in range(len(model.column_symbols)) if place not in free]

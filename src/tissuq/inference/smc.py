@@ -1,0 +1,500 @@
+"""Tempered sequential Monte Carlo: draws and the log evidence of any bounded posterior, with an honest error."""
+
+# BlackJAX supplies the Markov kernels, not the tempering loop. Its tempered SMC compiles the number of moves in,
+# keeps one population, and returns a weighted one; here the number of moves follows what the particles do, and
+# several populations run at once, because their spread is the only error of the evidence that can be trusted.
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import blackjax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from blackjax.mcmc.random_walk import RWState
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import logsumexp, ndtr, stdtrit
+
+from tissuq.errors import ConvergenceError, InputError
+from tissuq.inference.coordinates import Box, LogDensity
+
+__all__ = ["SmcDraws", "SmcSettings", "sample_smc"]
+
+Floats = NDArray[np.float64]
+Sweep = Callable[..., tuple[Any, Any, Any]]
+
+MAX_RHAT = 1.01
+MIN_ESS = 400
+MAX_LOG_EVIDENCE_ERROR = 0.5
+MAX_STUCK_SHARE = 0.2
+"""Share of the temperatures at which the particles may run out of sweeps before they have forgotten their start."""
+MAX_TEMPERATURES = 1000
+MORE = "more particles"
+FORGOTTEN = 0.3
+"""Correlation with the start of a mutation, in any direction, at which the particles count as moved."""
+FORGOTTEN_AT_LAST = 0.1
+"""The same at temperature one, where the particles are the draws."""
+TARGET_ACCEPTANCE = 0.8
+LONGEST_STEP = 1.5
+"""Leapfrog steps, in standard deviations, stay below this; the dynamics of a normal density break up at two."""
+LENGTH = 2.0
+"""Longest trajectory in standard deviations: steps are jittered, so that the mean is near a quarter period."""
+MAX_LEAPFROGS = 16
+SHORTEST = 0.1
+"""Shortest jump along the difference of two particles, as a share of the best length for a normal density."""
+
+
+@dataclass(frozen=True)
+class SmcSettings:
+    """How many particles and how carefully they are led from the prior to the posterior.
+
+    Parameters
+    ----------
+    particles : int
+        Particles in all, a multiple of ``runs``.
+    runs : int
+        Independent populations that share the particles: their spread is the error of the evidence.
+    ess_fraction : float
+        Share of the particles that must stay effective from one temperature to the next.
+    max_sweeps : int
+        Sweeps per temperature after which a mutation ends even though the particles remember its start.
+    seed : int
+        Fixes every random number.
+    """
+
+    particles: int = 2000
+    runs: int = 8
+    ess_fraction: float = 0.7
+    max_sweeps: int = 40
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, least in (("runs", 4), ("particles", 50 * self.runs), ("max_sweeps", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(f"SMC {name}: {getattr(self, name)} is too few; use at least {least}.")
+        if self.particles % self.runs:
+            raise InputError(f"SMC particles: {self.particles} is not a multiple of the {self.runs} runs.")
+        if not 0.5 <= self.ess_fraction <= 0.9:
+            raise InputError(f"SMC ess_fraction: {self.ess_fraction} is not between 0.5 and 0.9.")
+
+
+@dataclass(frozen=True)
+class SmcDraws:
+    r"""Draws from a posterior and its evidence, with the diagnostics of their quality.
+
+    The draws of a run stand in genealogical order: particles that descend from the same ancestor are neighbours.
+    What relatives still have in common, exact duplicates included, therefore shows as autocorrelation along the
+    draws, and the effective sample sizes of ArviZ discount it as they do for a Markov chain; differences between
+    the runs lower them further.
+
+    Parameters
+    ----------
+    values : (runs, draws, d) array
+        Parameter values, in the unit of each; all have the same weight.
+    increments : (temperatures, runs) array
+        What each temperature added to the log evidence of each run.
+    temperatures : (temperatures,) array
+        The powers of the likelihood, rising to one.
+    sweeps : (temperatures,) array
+        Mutation sweeps at each temperature.
+    moved : (temperatures,) array
+        Whether the particles forgot where their mutation started.
+    acceptance : (temperatures, 2) array
+        Mean acceptance of the trajectories and of the jumps.
+    names : tuple of str
+        What the messages call the d parameters.
+
+    References
+    ----------
+    Del Moral, Doucet & Jasra (2006), Journal of the Royal Statistical Society B 68, 411-436.
+    Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021), Bayesian Analysis 16, 667-718 (R-hat, effective
+    sample sizes).
+    """
+
+    values: Floats
+    increments: Floats
+    temperatures: Floats
+    sweeps: NDArray[np.int64]
+    moved: NDArray[np.bool_]
+    acceptance: Floats
+    names: tuple[str, ...]
+
+    @property
+    def log_evidences(self) -> Floats:
+        """Log evidence of each run: (runs,) array."""
+        return np.asarray(self.increments.sum(0))
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the mean of the runs' evidences, each of which is unbiased but for the adaptation."""
+        return _log_mean(self.log_evidences)
+
+    @cached_property
+    def log_evidence_error(self) -> float:
+        """Standard error of the log evidence, the larger of two estimates.
+
+        The first is the jackknife over the runs, times the factor by which Student's t with as many degrees of
+        freedom exceeds the normal at one standard error, because a spread estimated from a few runs may be small
+        by luck. The second adds the variances between runs temperature by temperature: it has many more degrees
+        of freedom, but misses what the temperatures have in common (a mode that one run keeps overweight).
+        """
+        runs = len(self.log_evidences)
+        without = np.array([_log_mean(np.delete(self.log_evidences, run)) for run in range(runs)])
+        jackknife = np.sqrt((runs - 1) * without.var())
+        by_temperature = np.sqrt(self.increments.var(axis=1, ddof=1).sum() / runs)
+        return float(max(jackknife * stdtrit(runs - 1, ndtr(1.0)), by_temperature))
+
+    @cached_property
+    def rhat(self) -> Floats:
+        """Rank-normalised split R-hat between runs of each parameter, the larger of bulk and tail: (d,) array."""
+        return _diagnostic("rhat", self.values)
+
+    @cached_property
+    def ess_bulk(self) -> Floats:
+        """Effective sample size for the centre of each marginal, relatives discounted: (d,) array."""
+        return _diagnostic("ess", self.values, method="bulk")
+
+    @cached_property
+    def ess_tail(self) -> Floats:
+        """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
+        return _diagnostic("ess", self.values, method="tail", prob=0.05)
+
+    def of(self, values: Floats, names: tuple[str, ...]) -> SmcDraws:
+        """Return the same runs with other quantities (runs, draws, k) that follow from their draws."""
+        return replace(self, values=values, names=names)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every diagnostic passes its threshold."""
+        return not self._failures()
+
+    @property
+    def verdict(self) -> str:
+        """One sentence that says so, or what failed, and then what to try."""
+        failures = self._failures()
+        if failures:
+            found, remedies = zip(*failures, strict=True)
+            return f"Not converged: {'; '.join(found)}. Try {', or '.join(dict.fromkeys(remedies))}."
+        return (
+            f"Converged: R-hat at most {self.rhat.max():.4f}, effective sample sizes at least "
+            f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), log evidence "
+            f"{self.log_evidence:.2f} with standard error {self.log_evidence_error:.2f} from {len(self.values)} runs."
+        )
+
+    def _failures(self) -> list[tuple[str, str]]:
+        """Return what failed and its remedy; a diagnostic that is not a number fails."""
+        failures = []
+        worst = int(np.argmax(self.rhat))
+        if not self.rhat[worst] < MAX_RHAT:
+            found = f"R-hat between runs is {self.rhat[worst]:.3f} for {self.names[worst]}"
+            failures.append((f"{found} and must be below {MAX_RHAT}", MORE))
+        for part, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
+            worst = int(np.argmin(sizes))
+            if not sizes[worst] > MIN_ESS:
+                found = f"the {part} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
+                failures.append((f"{found} and must exceed {MIN_ESS}", MORE))
+        if not self.log_evidence_error < MAX_LOG_EVIDENCE_ERROR:
+            found = f"the standard error of the log evidence is {self.log_evidence_error:.2f}"
+            failures.append((f"{found} and must be below {MAX_LOG_EVIDENCE_ERROR}", MORE))
+        stuck = np.count_nonzero(~self.moved)
+        if stuck > MAX_STUCK_SHARE * len(self.moved) or not self.moved[-1]:
+            found = f"at {stuck} of {len(self.moved)} temperatures the particles hardly moved"
+            failures.append((f"{found} in {self.sweeps.max()} sweeps", "more sweeps (max_sweeps)"))
+        return failures
+
+
+def sample_smc(
+    log_likelihood: LogDensity,
+    log_prior: LogDensity,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    prior_draws: ArrayLike,
+    settings: SmcSettings | None = None,
+    names: Sequence[str] | None = None,
+) -> SmcDraws:
+    r"""Lead particles from the prior to the posterior through powers of the likelihood.
+
+    The particles pass through :math:`p_t(x) \propto p(x)\, L(x)^t` with :math:`t` rising from 0 to 1. Each
+    temperature weights them by :math:`L^{\Delta t}`, where :math:`\Delta t` leaves a set share of them
+    effective; the mean weights multiply to the evidence :math:`\int p L`. They are then resampled and mutated by
+    sweeps that leave :math:`p_t` unchanged, on the real line (`tissuq.inference.coordinates`): one Hamiltonian
+    trajectory with the particles' covariance as metric, which follows correlated and curved posteriors, and d
+    jumps along differences of particles, which fit separated modes and need no gradient. The step size follows
+    the acceptance; the sweeps go on until the particles have forgotten where they started.
+
+    Several populations run side by side. They share temperatures, covariance and step size but no particle.
+
+    Parameters
+    ----------
+    log_likelihood : callable
+        Log likelihood of a (d,) JAX array inside the box; ``-inf`` or NaN where the likelihood is zero.
+    log_prior : callable
+        Log prior density, likewise, up to a constant.
+    lower, upper : (d,) array
+        Bounds of the box; infinite where there is none.
+    prior_draws : (particles, d) array
+        Independent draws from the normalised prior: they, not ``log_prior``, fix the constant of the evidence.
+    settings : SmcSettings, optional
+        Numbers of particles and runs, care and seed.
+    names : sequence of str, optional
+        What to call the parameters in messages.
+
+    Returns
+    -------
+    SmcDraws
+        The draws and the evidence; look at ``converged`` before use. The same seed and prior draws give the same
+        bits.
+
+    Raises
+    ------
+    InputError
+        When the bounds, the draws or the names do not fit, a prior draw is outside the box or has no finite
+        prior density, or the likelihood is infinite at one.
+    ConvergenceError
+        When a run has no prior draw with a positive likelihood, or the temperatures do not reach one.
+
+    References
+    ----------
+    Del Moral, Doucet & Jasra (2006), Journal of the Royal Statistical Society B 68, 411-436.
+    Buchholz, Chopin & Jacob (2021), Bayesian Analysis 16, 745-771 (Hamiltonian mutation, its tuning and when to
+    stop it). ter Braak (2006), Statistics and Computing 16, 239-249 (differences of particles as jumps).
+
+    Examples
+    --------
+    A normal likelihood of standard deviation 0.01 under a uniform prior on (0, 2) has the evidence 1/2:
+
+    >>> import jax.scipy.stats as jss
+    >>> draws = sample_smc(
+    ...     lambda x: jss.norm.logpdf(x[0], 1.0, 0.01),
+    ...     lambda x: 0.0,
+    ...     [0.0],
+    ...     [2.0],
+    ...     2 * np.random.default_rng(0).random((2000, 1)),
+    ... )
+    >>> bool(abs(draws.log_evidence - np.log(0.5)) < 5 * draws.log_evidence_error)
+    True
+    """
+    settings = settings or SmcSettings()
+    box = Box(lower, upper)
+    dimension = box.is_bounded.size
+    labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
+    if len(labels) != dimension:
+        raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
+    lines = _starting_lines(box, prior_draws, settings)
+    likelihood, prior = _densities_on_line(log_likelihood, log_prior, box)
+    log_likelihoods = _log_likelihoods_at_start(likelihood, prior, lines)
+    mutation = _Mutation(_compile_sweep(likelihood, prior), settings)
+    generator = np.random.default_rng(settings.seed)
+
+    temperature, steps = 0.0, []
+    while temperature < 1:
+        if len(steps) == MAX_TEMPERATURES:
+            raise ConvergenceError(
+                f"after {MAX_TEMPERATURES} temperatures the likelihood is raised to the power {temperature:.3g} only; "
+                "check that it is smooth, or give more particles."
+            )
+        rise = _rise(log_likelihoods, 1 - temperature, settings.ess_fraction)
+        # The last rise ends on one exactly, whatever the rounding of the sum.
+        temperature = 1.0 if rise == 1 - temperature else temperature + rise
+        weights = rise * log_likelihoods
+        chosen = _resample(weights, generator)
+        lines = np.take_along_axis(lines, chosen[:, :, None], axis=1)
+        lines, log_likelihoods, *moves = mutation(lines, temperature)
+        steps.append((logsumexp(weights, axis=1) - np.log(weights.shape[1]), temperature, *moves))
+    values = np.asarray(jax.jit(jax.vmap(jax.vmap(box.from_line)))(lines))
+    return SmcDraws(values, *map(np.array, zip(*steps, strict=True)), labels)  # type: ignore[arg-type]
+
+
+def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> Floats:
+    """Return the prior draws on the real line: (runs, draws, d) array."""
+    points = np.asarray(prior_draws, dtype=np.float64)
+    expected = (settings.particles, box.is_bounded.size)
+    if points.shape != expected:
+        raise InputError(f"the prior draws have the shape {points.shape}; {expected} (particles, d) is expected.")
+    inside = ((box.lower < points) & (points < box.upper)).all(1)
+    if not inside.all():
+        index = int(np.argmin(inside))
+        raise InputError(f"prior draw {index} is {points[index]}; it must lie inside the box.")
+    return np.stack([box.to_line(point) for point in points]).reshape(settings.runs, -1, expected[1])
+
+
+def _densities_on_line(log_likelihood: LogDensity, log_prior: LogDensity, box: Box) -> tuple[LogDensity, LogDensity]:
+    """Return the log likelihood, ``-inf`` where it is not finite, and the log prior with the Jacobian."""
+
+    def likelihood(line: Any) -> Any:
+        value = log_likelihood(box.from_line(line))
+        return jnp.where(jnp.isfinite(value), value, -jnp.inf)
+
+    return likelihood, lambda line: log_prior(box.from_line(line)) + box.log_jacobian(line)
+
+
+def _log_likelihoods_at_start(likelihood: LogDensity, prior: LogDensity, lines: Floats) -> Floats:
+    """Return the log likelihoods of the prior draws, (runs, draws) array, checked together with their prior."""
+    evaluate = jax.jit(jax.vmap(jax.vmap(lambda line: (likelihood(line), prior(line)))))
+    log_likelihoods, log_priors = (np.asarray(array) for array in evaluate(lines))
+    if not np.isfinite(log_priors).all():
+        index = int(np.argmin(np.isfinite(log_priors)))
+        raise InputError(f"the log prior is {log_priors.ravel()[index]} at prior draw {index}; it must be finite.")
+    positive = np.isfinite(log_likelihoods).sum(1)
+    if not positive.all():
+        raise ConvergenceError(
+            f"the likelihood is zero at all {log_likelihoods.shape[1]} prior draws of a run; give more particles or a "
+            "narrower prior."
+        )
+    return log_likelihoods
+
+
+def _rise(log_likelihoods: Floats, most: float, ess_fraction: float) -> float:
+    """Return the rise in temperature that leaves a share of the particles effective, on average over the runs.
+
+    The share is of the particles with a positive likelihood: no rise brings back the others.
+    """
+    positive = np.isfinite(log_likelihoods)
+
+    def is_small(rise: float) -> bool:
+        weights = rise * np.where(positive, log_likelihoods, -np.inf)
+        log_ess = 2 * logsumexp(weights, axis=1) - logsumexp(2 * weights, axis=1)
+        return bool(np.mean(np.exp(log_ess) / positive.sum(1)) >= ess_fraction)
+
+    if is_small(most):
+        return most
+    finite = log_likelihoods[positive]
+    low, high = np.log(min(most, 1e-3 / np.ptp(finite))), np.log(most)
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_small(np.exp(middle)) else (low, middle)
+    return float(np.exp(low))
+
+
+def _resample(log_weights: Floats, generator: np.random.Generator) -> NDArray[np.int64]:
+    """Return the indices of a systematic resampling of each run, in ascending order: relatives stay neighbours."""
+    weights = np.exp(log_weights - log_weights.max(1, keepdims=True))
+    edges = np.cumsum(weights, axis=1)
+    draws = weights.shape[1]
+    ticks = (np.arange(draws) + generator.random((len(weights), 1))) / draws * edges[:, -1:]
+    return np.stack([np.searchsorted(edge, tick, side="right") for edge, tick in zip(edges, ticks, strict=True)])
+
+
+class _Mutation:
+    """Moves the particles by sweeps until they have forgotten their start; keeps the step size between calls."""
+
+    def __init__(self, sweep: Sweep, settings: SmcSettings) -> None:
+        self.sweep = sweep
+        self.settings = settings
+        self.step_size = 1.0
+        self.key = jax.random.key(settings.seed)
+        self.count = 0
+
+    def __call__(self, lines: Floats, temperature: float) -> tuple[Floats, Floats, int, bool, Floats]:
+        """Return the moved particles, their log likelihoods, sweeps, whether they moved, and the acceptance."""
+        covariance = _covariance(lines)
+        root = np.linalg.cholesky(covariance)
+        start, moved = lines, False
+        correlation = FORGOTTEN if temperature < 1 else FORGOTTEN_AT_LAST
+        distances: list[Floats] = []
+        accepted: list[Floats] = []
+        while not moved and len(distances) < self.settings.max_sweeps:
+            self.count += 1
+            key = jax.random.fold_in(self.key, self.count)
+            leapfrogs = int(np.clip(np.ceil(LENGTH / self.step_size), 1, MAX_LEAPFROGS))
+            moves = self.sweep(key, lines, start, temperature, covariance, self.step_size, leapfrogs)
+            lines, log_likelihoods, acceptance = (np.asarray(array) for array in moves)
+            # Pooled over all particles the acceptance is nearly exact, so its steps need no decay.
+            self.step_size *= float(np.exp(acceptance[0] - TARGET_ACCEPTANCE))
+            self.step_size = min(self.step_size, LONGEST_STEP)
+            accepted.append(acceptance)
+            whitened = (np.linalg.solve(root, array.reshape(-1, len(root)).T) for array in (start, lines))
+            moved = _has_moved(*whitened, distances, correlation)
+        return lines, log_likelihoods, len(distances), moved, np.mean(accepted, axis=0)
+
+
+def _covariance(lines: Floats) -> Floats:
+    """Return the covariance of all particles, kept invertible should a coordinate have collapsed."""
+    covariance = np.atleast_2d(np.cov(lines.reshape(-1, lines.shape[-1]).T))
+    return covariance + 1e-10 * np.diag(np.diag(covariance) + np.finfo(float).tiny)
+
+
+def _has_moved(start: Floats, now: Floats, distances: list[Floats], correlation: float) -> bool:
+    """Return whether the particles have forgotten their start in every whitened direction, (d, particles) arrays.
+
+    Either they are uncorrelated with it, or the median distance from it has stopped to grow: for a particle that
+    wanders, doubling the sweeps doubles its square. In separated modes, where all remember their mode, only the
+    second can happen.
+    """
+    distances.append(np.median(np.abs(now - start), axis=1) ** 2)
+    both = np.array([np.corrcoef(*pair)[0, 1] for pair in zip(start, now, strict=True)])
+    sweeps = len(distances)
+    if sweeps < 4:
+        return bool(np.all(np.abs(both) < correlation))
+    has_stopped = distances[-1] < (1 + correlation) * distances[(sweeps + 1) // 2 - 1]
+    return bool(np.all((np.abs(both) < correlation) | has_stopped))
+
+
+def _compile_sweep(likelihood: LogDensity, prior: LogDensity) -> Sweep:
+    """Return the compiled sweep of all particles; whatever changes with the temperature is an argument."""
+    trajectory = blackjax.hmc.build_kernel()
+    jump = blackjax.additive_step_random_walk.build_kernel()
+
+    # At XLA's usual level the kernels' random numbers take three times as long to compile and run no faster.
+    @partial(jax.jit, compiler_options={"xla_backend_optimization_level": 1})
+    def sweep(
+        key: Any, lines: Any, clouds: Any, temperature: Any, covariance: Any, step_size: Any, leapfrogs: Any
+    ) -> tuple[Any, Any, Any]:
+        def tempered(line: Any) -> Any:
+            return prior(line) + temperature * likelihood(line)
+
+        def jump_once(state: Any, drawn: tuple[Any, Any]) -> tuple[Any, Any]:
+            key, offset = drawn
+            state, info = jump(key, state, tempered, lambda key, line: offset)
+            return state, info.acceptance_rate
+
+        def move(key: Any, line: Any, size: Any, offsets: Any) -> tuple[Any, Any, Any]:
+            key_trajectory, key_jumps = jax.random.split(key)
+            start = blackjax.hmc.init(line, tempered)
+            state, info = trajectory(key_trajectory, start, tempered, size, covariance, leapfrogs)
+            keys = jax.random.split(key_jumps, len(offsets))
+            state, accepted = jax.lax.scan(jump_once, RWState(state.position, state.logdensity), (keys, offsets))
+            return state.position, likelihood(state.position), jnp.stack([info.acceptance_rate, accepted.mean()])
+
+        key_moves, key_sizes, key_jumps = jax.random.split(key, 3)
+        keys = jax.random.split(key_moves, lines.shape[:2])
+        # Jittered steps: no period of the dynamics resonates, and short ones enter narrow places.
+        sizes = step_size * jax.random.uniform(key_sizes, lines.shape[:2], minval=0.2)
+        offsets = _differences(key_jumps, clouds, lines.shape[-1])
+        moved, log_likelihoods, acceptance = jax.vmap(jax.vmap(move))(keys, lines, sizes, offsets)
+        return moved, log_likelihoods, acceptance.mean((0, 1))
+
+    return sweep
+
+
+def _differences(key: Any, clouds: Any, jumps: int) -> Any:
+    """Return jumps along lines between two particles of the same run, (runs, draws, jumps, d) array.
+
+    Now and then a jump has the full length, which changes the mode. Half of them move only some coordinates,
+    which enters the narrow places of a funnel.
+    """
+    runs, draws, dimension = clouds.shape
+    shape = (runs, draws, jumps)
+    key_pair, key_size, key_whole, key_some, key_each = jax.random.split(key, 5)
+    pairs = jax.random.randint(key_pair, (2, *shape), 0, draws)
+    one, other = (jax.vmap(lambda cloud, index: cloud[index])(clouds, pair) for pair in pairs)
+    shortened = 2.38 / jnp.sqrt(2 * dimension) * jnp.exp(jnp.log(SHORTEST) * jax.random.uniform(key_size, shape))
+    sizes = jnp.where(jax.random.uniform(key_whole, shape) < 0.1, 1.0, shortened)[..., None]
+    all_move = jax.random.bernoulli(key_some, 0.5, (*shape, 1))
+    return (one - other) * sizes * (all_move | jax.random.bernoulli(key_each, 0.5, one.shape))
+
+
+def _log_mean(logarithms: Floats) -> float:
+    return float(logsumexp(logarithms) - np.log(len(logarithms)))
+
+
+def _diagnostic(statistic: str, draws: Floats, **options: Any) -> Floats:
+    """Return one of ArviZ's diagnostics, imported when first needed, of a (runs, draws, d) array."""
+    from arviz_stats.base import array_stats
+
+    values = getattr(array_stats, statistic)(draws, chain_axis=0, draw_axis=1, **options)
+    return np.asarray(values, dtype=np.float64)

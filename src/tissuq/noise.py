@@ -1,0 +1,152 @@
+"""The measurement noise: independent and Gaussian, of a size that is known, unknown, or grows with the stress."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from numbers import Real
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.parameters import Parameter
+from tissuq.priors import Uniform
+from tissuq.registry import find, variants
+
+__all__ = ["KnownNoise", "Noise", "ProportionalNoise", "RepeatNoise", "UnknownNoise", "noise_named", "stress_level"]
+
+FloatArray = NDArray[np.float64]
+
+NOISE_SD = Parameter.scale("noise_sd", "standard deviation of the measurement noise")
+NOISE_SHARE = Parameter(
+    "noise_share", "noise per measured stress", "number", (0.0, inf), is_linear=False, relative_prior=Uniform(0.0, 1.0)
+)
+SMOOTHED = 2000
+"""Stretches at most between which the stress is smoothed."""
+
+
+@dataclass(frozen=True)
+class Noise(ABC):
+    """Independent Gaussian errors of measurement.
+
+    A new noise is one subclass: its parameters and its standard deviation, which may depend on the level of the
+    stress. Arithmetic only, so that NumPy and JAX values both pass through.
+    """
+
+    name: ClassVar[str]
+    description: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    depends_on_level: ClassVar[bool] = False
+    shares_discrepancy: ClassVar[bool] = False
+    """Whether measurements at one stretch share the independent part of the discrepancy (S), too."""
+
+    @abstractmethod
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        """Return the standard deviation (MPa) for parameter values, at absolute stresses (MPa)."""
+
+
+@dataclass(frozen=True)
+class KnownNoise(Noise):
+    """The same known standard deviation everywhere."""
+
+    value: float
+
+    name = "known"
+    description = "known standard deviation"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.value, Real) or self.value is True or not 0 < self.value < inf:
+            raise InputError(
+                f"noise_sd must be a positive number of MPa or 'unknown', not {self.value!r}. "
+                "Noise of zero would make every measurement exact; if you do not know it, say 'unknown'."
+            )
+
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        return self.value
+
+    def __str__(self) -> str:
+        return str(self.value)
+
+
+class UnknownNoise(Noise):
+    """The same standard deviation everywhere, a parameter."""
+
+    name = "unknown"
+    description = "unknown standard deviation"
+    parameters = (NOISE_SD,)
+
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        return values["noise_sd"]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class ProportionalNoise(UnknownNoise):
+    """Standard deviation noise_sd + noise_share |stress|, both parameters.
+
+    The stress is that of a smoothing spline through the data, so that it is the same for every model and for
+    repeated measurements: a plug-in, which leaves the stress linear in its parameters.
+    """
+
+    name = "proportional"
+    description = "noise_sd + noise_share |stress|"
+    parameters = (NOISE_SD, NOISE_SHARE)
+    depends_on_level = True
+
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        return values["noise_sd"] + values["noise_share"] * level
+
+
+class RepeatNoise(UnknownNoise):
+    """Unknown standard deviation, told by the scatter of repeated measurements at the same stretch.
+
+    The discrepancy is a function of the stretch (eq. 15), so repeated measurements share all of it, its
+    independent error S included: what differs between them is noise. It separates the two, which `unknown` cannot.
+    """
+
+    name = "repeats"
+    description = "unknown, told by repeated measurements at the same stretch"
+    shares_discrepancy = True
+
+
+def noise_named(noise: float | str | Noise) -> Noise:
+    """Return the noise of that name or known standard deviation (MPa); a noise is returned as it is.
+
+    Raises
+    ------
+    InputError
+        When no noise has that name, or the number is not positive.
+    """
+    if isinstance(noise, Noise):
+        return noise
+    if not isinstance(noise, str):
+        return KnownNoise(noise)
+    options = [name for name, kind in variants(Noise).items() if kind is not KnownNoise]
+    if noise not in options:
+        raise InputError(f"noise must be a positive number of MPa or one of {', '.join(options)}; not '{noise}'.")
+    return find(Noise, "noise", noise, InputError)()
+
+
+def stress_level(experiment: Experiment) -> FloatArray:
+    """Return the size (n,) of the stress at every measurement, MPa: a smoothing spline through the data.
+
+    Generalised cross-validation chooses how smooth (SciPy); with fewer than five stretches it is the mean
+    measured stress at each.
+    """
+    stretch, place, count = np.unique(experiment.stretch, return_inverse=True, return_counts=True)
+    if len(stretch) > SMOOTHED:
+        edges = np.linspace(stretch[0], stretch[-1], SMOOTHED + 1)[1:-1]
+        _, place, count = np.unique(np.searchsorted(edges, experiment.stretch), return_inverse=True, return_counts=True)
+        stretch = np.bincount(place, experiment.stretch) / count
+    stress = np.bincount(place, experiment.stress) / count
+    if len(stretch) < 5:
+        return np.asarray(np.abs(stress)[place])
+    from scipy.interpolate import make_smoothing_spline
+
+    return np.asarray(np.abs(make_smoothing_spline(stretch, stress, w=count)(experiment.stretch)))

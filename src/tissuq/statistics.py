@@ -1,0 +1,57 @@
+"""What a linear model needs of its data: a triangle that measurements can be added to, whatever their number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CHUNK", "Statistics"]
+
+FloatArray = NDArray[np.float64]
+
+CHUNK = 16_384
+"""Measurements taken in at once: what bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """The triangular factor R of the rows [X y]: all that a least-squares problem needs of n measurements.
+
+    R'R is the matrix of their sums of squares and products, but R keeps the digits that squaring loses (Golub & Van
+    Loan, Matrix Computations, 5.3). Statistics of two sets of measurements join into those of both.
+
+    Attributes
+    ----------
+    count : int
+        Number of measurements.
+    triangle : (k + 1, k + 1) array
+        R, the last column that of the stress.
+    """
+
+    count: int
+    triangle: FloatArray
+
+    @classmethod
+    def of_rows(cls, blocks: Iterable[FloatArray]) -> Statistics:
+        """Return the statistics of rows (m, k + 1), block by block."""
+        found: Statistics | None = None
+        for block in blocks:
+            new = cls(len(block), _triangle(block))
+            found = new if found is None else found.joined(new)
+        if found is None:
+            raise ValueError("no measurements")
+        return found
+
+    def joined(self, other: Statistics) -> Statistics:
+        """Return the statistics of both sets of measurements."""
+        return Statistics(self.count + other.count, _triangle(np.vstack([self.triangle, other.triangle])))
+
+
+def _triangle(rows: FloatArray) -> FloatArray:
+    """Return R of the QR factorisation, square even where there are few rows."""
+    factor = np.linalg.qr(rows, mode="r")
+    missing = rows.shape[1] - len(factor)
+    return np.vstack([factor, np.zeros((missing, rows.shape[1]))]) if missing else factor
