@@ -28,8 +28,8 @@ def warnings_about(solution: Solution) -> Iterator[str]:
         )
     elif _noise_is_inseparable(solution):
         yield (
-            "the data do not tell noise from discrepancy: the more there is of one, the less of the other. Read neither "
-            "alone, or give the noise (repeated measurements at one stretch tell it)."
+            "the data do not tell noise from discrepancy: the more there is of one, the less of the other. Read "
+            "neither alone, or give the noise (repeated measurements at one stretch tell it)."
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:
@@ -55,8 +55,7 @@ def _noise_is_inseparable(solution: Solution) -> bool:
 def _correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
     if not np.ptp(first) or not np.ptp(second):
         return 0.0
-    ranks = (values.argsort().argsort() for values in (first, second))
-    return float(np.corrcoef(*ranks)[0, 1])
+    return float(np.corrcoef(first.argsort().argsort(), second.argsort().argsort())[0, 1])
 
 
 def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:

@@ -206,8 +206,8 @@ class _Recipe:
             return sampled.sample_joint(model, self.seed)
         if not model.nonlinear and self.method in ("nuts", "smc"):
             raise ModelError(
-                f"the method '{self.method}' does not apply: every parameter is linear with a flat, uniform or Gaussian "
-                "prior, so nothing is left to sample. Use 'exact', or 'joint' to sample all of them."
+                f"the method '{self.method}' does not apply: every parameter is linear with a flat, uniform or "
+                "Gaussian prior, so nothing is left to sample. Use 'exact', or 'joint' to sample all of them."
             )
         if self.method == "smc":
             return sampled.sample_smc_given(model, self.seed)

@@ -78,7 +78,7 @@ class UnknownNoise(Noise):
 
     name = "unknown"
     description = "unknown standard deviation"
-    parameters = (NOISE_SD,)
+    parameters: ClassVar[tuple[Parameter, ...]] = (NOISE_SD,)
 
     def sd(self, values: Mapping[str, Any], level: Any) -> Any:
         return values["noise_sd"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CHUNK", "Statistics"]
+__all__ = ["CHUNK", "Statistics", "upper_triangle"]
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Statistics:
         """Return the statistics of rows (m, k + 1), block by block."""
         found: Statistics | None = None
         for block in blocks:
-            new = cls(len(block), _triangle(block))
+            new = cls(len(block), upper_triangle(block))
             found = new if found is None else found.joined(new)
         if found is None:
             raise ValueError("no measurements")
@@ -47,11 +47,11 @@ class Statistics:
 
     def joined(self, other: Statistics) -> Statistics:
         """Return the statistics of both sets of measurements."""
-        return Statistics(self.count + other.count, _triangle(np.vstack([self.triangle, other.triangle])))
+        return Statistics(self.count + other.count, upper_triangle(np.vstack([self.triangle, other.triangle])))
 
 
-def _triangle(rows: FloatArray) -> FloatArray:
+def upper_triangle(rows: FloatArray) -> FloatArray:
     """Return R of the QR factorisation, square even where there are few rows."""
-    factor = np.linalg.qr(rows, mode="r")
+    factor = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
     missing = rows.shape[1] - len(factor)
     return np.vstack([factor, np.zeros((missing, rows.shape[1]))]) if missing else factor

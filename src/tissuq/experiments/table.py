@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from io import StringIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,11 @@ from tissuq.experiments.text_file import read_lines
 __all__ = ["Table", "read_table"]
 
 Lines = list[tuple[int, str]]
+
+LONG = 10_000
+"""Lines from which a file is first tried on a fast parser."""
+HEAD = 1000
+"""Lines of it that tell its layout."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +40,10 @@ class Table:
         What stands between two cells; a space means any run of whitespace.
     rows : list of str
         The rows of data as text.
-    lines : list of int
+    lines : sequence of int
         The line in the file of every row, counted from 1.
+    block : (rows, columns) array, optional
+        All cells, where they have been read as numbers already.
     """
 
     file: str
@@ -43,7 +51,8 @@ class Table:
     units: tuple[str, ...]
     separator: str
     rows: list[str]
-    lines: list[int]
+    lines: Sequence[int]
+    block: NDArray[np.float64] | None = None
 
     def label(self, column: int) -> str:
         """Return how messages name a column (counted from 0)."""
@@ -62,6 +71,8 @@ class Table:
         InputError
             When a cell is empty, not a number or not finite, naming its line and column.
         """
+        if self.block is not None and max(columns) < self.block.shape[1]:
+            return [np.ascontiguousarray(self.block[:, column]) for column in columns]
         for converter in (None, _from_decimal_comma):
             try:
                 block = np.loadtxt(
@@ -120,7 +131,47 @@ def read_table(path: str | os.PathLike[str], skip_rows: int = 0) -> Table:
     file = str(path)
     if not isinstance(skip_rows, int) or skip_rows < 0:
         raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
-    every_line = list(enumerate(read_lines(path), start=1))[skip_rows:]
+    lines = read_lines(path)
+    return _read_long(file, lines, skip_rows) or _read_every_line(file, lines, skip_rows)
+
+
+def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
+    """Return the table of a long and regular file, whose cells a fast parser takes; None for any other.
+
+    The layout is found in the first lines, and all below the first row must be numbers in as many columns.
+    """
+    if len(lines) < LONG:
+        return None
+    try:
+        head = _read_every_line(file, lines[:HEAD], skip_rows)
+    except InputError:
+        return None
+    rows = lines[head.lines[0] - 1 :]
+    while rows and not rows[-1].strip():
+        rows.pop()
+    text = "\n".join(rows)
+    if "#" in text or '"' in text:
+        return None
+    import pandas as pd
+
+    separator = r"\s+" if head.separator == WHITESPACE else head.separator
+    try:
+        table = pd.read_csv(
+            StringIO(text), sep=separator, header=None, dtype=np.float64, skip_blank_lines=False, na_filter=False,
+            float_precision="round_trip",
+        )  # fmt: skip
+    except (ValueError, pd.errors.ParserError):
+        return None
+    block = table.to_numpy()
+    if block.shape != (len(rows), len(head.names)) or not np.isfinite(block).all():
+        return None
+    numbers = range(head.lines[0], head.lines[0] + len(rows))
+    return replace(head, rows=rows, lines=numbers, block=block)
+
+
+def _read_every_line(file: str, lines: list[str], skip_rows: int) -> Table:
+    """Return the table of any file, looking at every line."""
+    every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
     content = [(line, text) for line, text in filled if not text.lstrip().startswith("#")]
     texts = [text for _, text in content]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.box import NEGLIGIBLE, Boxes, Inside
+from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes
 from tissuq.inference.marginal import (
     Marginal,
     blended,
@@ -72,6 +72,8 @@ class Bounded:
             marginal = marginal_of_mixture(self.free.weights, self.free.mean[:, place], sds)
             parts.append((self.free.weights.sum(), marginal))
         for which, each in self.cut.items():
+            if each.weights.sum() < NEGLIGIBLE * 100:
+                continue
             ends = float(self.box.lower[0, which]), float(self.box.upper[0, which])
             covariance = each.root @ each.root.swapaxes(1, 2)
             marginal = marginal_of_cut_mixture(each.weights, each.mean, covariance, place, which, ends)
@@ -96,15 +98,25 @@ class Bounded:
         return Components(weights, settings, points.reshape(-1, p)[kept], np.zeros((len(weights), p, p)))
 
 
-def bounded(components: Components, inside: Inside, box: Boxes) -> Bounded:
-    """Return a posterior's components sorted by what bounds (1, p) do to them."""
-    loss = components.weights * inside.outside
+def bounded(components: Components, beyond: FloatArray, box: Boxes) -> Bounded:
+    """Return a posterior's components sorted by what bounds (1, p) do to them.
+
+    Parameters
+    ----------
+    components : Components
+        Gaussian before the bounds; weights after them.
+    beyond : (M, p) array
+        The mass of each parameter beyond its bounds.
+    box : Boxes
+    """
+    loss = components.weights * beyond.sum(axis=1)
     order = np.argsort(loss)
     is_cut = np.zeros(len(loss), dtype=bool)
     is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE]] = True
-    alone = is_cut & (inside.active.sum(axis=1) == 1)
-    which = inside.active.argmax(axis=1)
-    cut = {int(place): components[alone & (which == place)] for place in np.unique(which[alone])}
+    active = beyond > TOUCHED
+    alone = is_cut & (active.sum(axis=1) == 1)
+    cut = {place: components[alone & active[:, place]] for place in range(beyond.shape[1])}
+    cut = {place: each for place, each in cut.items() if len(each.weights)}
     return Bounded(components[~is_cut], cut, components[is_cut & ~alone], box)
 
 

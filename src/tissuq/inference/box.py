@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.gaussian import interval_quantile, log_interval
 
-__all__ = ["NEGLIGIBLE", "Boxes", "Inside"]
+__all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes"]
 
 FloatArray = NDArray[np.float64]
 
@@ -31,19 +31,6 @@ SHIFTS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Inside:
-    """For M Gaussians (M,): log mass inside the bounds, its error, an upper bound on the mass outside.
-
-    And (M, p) which parameters come near their bounds.
-    """
-
-    log_mass: FloatArray
-    error: FloatArray
-    outside: FloatArray
-    active: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
 class Boxes:
     """Lower and upper bounds (B, p) of p jointly Gaussian parameters, for each of B data sets."""
 
@@ -58,27 +45,35 @@ class Boxes:
         if not np.isfinite(self.lower).any() and not np.isfinite(self.upper).any():
             return np.zeros(len(mean))
         low, high = self._scores(mean, root)
-        return np.minimum(log_interval(low, high).min(axis=1, initial=0.0), 0.0)
+        return np.asarray(np.minimum(log_interval(low, high).min(axis=1, initial=0.0), 0.0))
 
-    def inside(self, mean: FloatArray, root: FloatArray) -> Inside:
-        """Return the mass of M Gaussians inside the bounds (M, p).
+    def beyond(self, mean: FloatArray, root: FloatArray) -> FloatArray:
+        """Return the mass (M, p) of each parameter of M Gaussians beyond its bounds.
 
-        The mass outside is at most the sum over parameters (Boole), and the mass inside is at least one less that
-        sum, which is near enough where it is small. Elsewhere it is computed over the parameters that come near
-        their bounds: exactly for one, and by Genz's sequential conditioning on quasi-random points for more
-        (Genz 1992, J. Comput. Graph. Stat. 1:141).
+        Their sum over the parameters bounds the mass outside from above (Boole).
         """
         from scipy.special import ndtr
 
         low, high = self._scores(mean, root)
-        beyond = ndtr(low) + ndtr(-high)
+        return np.asarray(ndtr(low) + ndtr(-high))
+
+    def log_mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the log mass (M,) of M Gaussians inside the bounds (M, p), and its error (M,).
+
+        It is at least one less the sum of the masses beyond single bounds, which is near enough where that is small.
+        Elsewhere it is computed over the parameters that come near their bounds: exactly for one, and by Genz's
+        sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
+        """
+        low, high = self._scores(mean, root)
+        beyond = self.beyond(mean, root)
         outside = beyond.sum(axis=1)
         log_mass, error = np.log1p(-np.minimum(outside, 0.5)), np.minimum(outside, SMALL)
         active = beyond > TOUCHED
         alone = active.sum(axis=1) == 1
-        only = active[alone].argmax(axis=1)[:, None]
-        log_mass[alone] = log_interval(*(np.take_along_axis(s[alone], only, 1)[:, 0] for s in (low, high)))
-        error[alone] = 0.0
+        if alone.any():
+            only = active[alone].argmax(axis=1)[:, None]
+            log_mass[alone] = log_interval(*(np.take_along_axis(s[alone], only, 1)[:, 0] for s in (low, high)))
+            error[alone] = 0.0
         several = (active.sum(axis=1) > 1) & (outside > SMALL)
         effort = np.column_stack([outside < NEARLY_ALL, active])
         for pattern in np.unique(effort[several], axis=0):
@@ -94,7 +89,7 @@ class Boxes:
             mass = shares.mean(axis=1)
             log_mass[crossed] = top[:, 0] + np.log(mass)
             error[crossed] = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / mass
-        return Inside(log_mass, error, outside, active)
+        return log_mass, error
 
     def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
         """Return log weights (M, P) and P = number points (M, P, p) inside the bounds (M, p).

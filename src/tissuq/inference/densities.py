@@ -150,7 +150,7 @@ def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[An
 
 def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Any]:
     """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, and the number of measurements."""
-    p, q = len(model.linear), len(model.column_symbols) + 1
+    q = len(model.column_symbols) + 1
     if _has_fixed_directions(model):
         variances = model.white_variance(values, data["levels"]) + model.correlated_variance(values) * data["values"]
         variances = jnp.broadcast_to(variances, data["counts"].shape)

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.inference.bounds import bounded
-from tissuq.inference.box import Inside
 from tissuq.inference.conditional import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_quadrature
 from tissuq.inference.quadrature import MAX_DIMENSION, Quadrature, integrate
-from tissuq.inference.solution import Components, Solution
+from tissuq.inference.solution import Components, Marginals, Solution
 from tissuq.inference.survey import log_prior_density, survey
 from tissuq.inference.threads import one_thread
 from tissuq.inference.warp import Warp, warp_along
@@ -28,8 +27,10 @@ FloatArray = NDArray[np.float64]
 CHAINS, DRAWS = 4, 1000
 TOGETHER = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
-IRRELEVANT = 40.0
-"""Log density below the largest at which the mass inside the bounds need not be known exactly."""
+IRRELEVANT = 14.0
+"""Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
+HEAVY = 1e-6
+"""Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
 
 def why_not_exact(model: StatisticalModel) -> str:
@@ -119,20 +120,15 @@ class _Integration:
         value = np.where(np.isnan(value), -np.inf, value)
         relevant = value > np.maximum(self._top, value.max(axis=1, keepdims=True)) - IRRELEVANT
         data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
-        inside = self.conditional.boxes[data_set].inside(given.mean[relevant], given.root[relevant])
-        value[relevant] += inside.log_mass - self._ceiling(given)[relevant]
+        log_mass, _ = self.conditional.boxes[data_set].log_mass(given.mean[relevant], given.root[relevant])
+        value[relevant] += log_mass - self._ceiling(given)[relevant]
         self._top = np.maximum(self._top, value.max(axis=1, keepdims=True))
         return value
 
     def _ceiling(self, given: Conditional) -> FloatArray:
-        shape, p = given.log_likelihood.shape, given.mean.shape[2]
+        shape, size, p = given.log_likelihood.shape, given.log_likelihood.size, given.mean.shape[2]
         every = self.conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
-        return every.ceiling(given.mean.reshape(-1, p), given.root.reshape(-1, p, p)).reshape(shape)
-
-    def inside(self, index: int) -> Inside:
-        """Return the mass of one data set's components inside their bounds."""
-        mean, root = self.given.mean[index], self.given.root[index]
-        return self.conditional.boxes[np.full(len(mean), index)].inside(mean, root)
+        return every.ceiling(given.mean.reshape(size, p), given.root.reshape(size, p, p)).reshape(shape)
 
 
 class ExactSolution(Solution):
@@ -143,14 +139,21 @@ class ExactSolution(Solution):
     def __init__(self, integration: _Integration, index: int, seed: int) -> None:
         self.model = integration.models[index]
         self._integration, self._index, self._seed = integration, index, seed
-        rule, given, inside = integration.rule, integration.given, integration.inside(index)
+        rule, given, box = integration.rule, integration.given, integration.conditional.boxes[[index]]
         weights = rule.weights[index] if rule else np.ones(1)
-        whole = Components(weights, integration.settings[index], given.mean[index], given.root[index])
-        self._bounded = bounded(whole, inside, integration.conditional.boxes[[index]])
-        if not any(isinstance(prior, Flat) for prior in self.model.priors.values()):
-            alone = given.log_likelihood[index, 0] + inside.log_mass[0]
-            self.log_evidence = float(rule.log_integral[index] if rule else alone)
-            self.log_evidence_error = float((rule.log_error[index] if rule else 0.0) + weights @ inside.error)
+        parts = Components(weights, integration.settings[index], given.mean[index], given.root[index])
+        beyond = box.beyond(parts.mean, parts.root)
+        self._bounded = bounded(parts, beyond, box)
+        if any(isinstance(prior, Flat) for prior in self.model.priors.values()):
+            return
+        heavy = np.flatnonzero((weights > HEAVY) & (beyond.sum(axis=1) > HEAVY))
+        log_mass, error = box[np.zeros(len(heavy), dtype=int)].log_mass(parts.mean[heavy], parts.root[heavy])
+        if rule:
+            self.log_evidence = float(rule.log_integral[index])
+            self.log_evidence_error = float(rule.log_error[index] + np.exp(-IRRELEVANT) + weights[heavy] @ error)
+        else:
+            self.log_evidence = float(given.log_likelihood[index, 0] + log_mass.sum())
+            self.log_evidence_error = float(error.sum())
 
     @cached_property
     def components(self) -> Components:  # type: ignore[override]  # a cached property
@@ -167,12 +170,12 @@ class ExactSolution(Solution):
         return f"{linear}; {rest}{cut}"
 
     @cached_property
-    def marginals(self) -> dict[str, Marginal]:  # type: ignore[override]  # a cached property
+    def marginals(self) -> Marginals:
         """The marginal posterior of every parameter."""
-        return {symbol: self._marginal(symbol) for symbol in self.model.symbols}
+        return Marginals(self.model.symbols, self._marginal)
 
     @cached_property
-    def draws(self) -> dict[str, FloatArray]:  # type: ignore[override]  # a cached property
+    def draws(self) -> dict[str, FloatArray]:
         """Independent draws of every parameter."""
         generator, parts = np.random.default_rng(self._seed), self.components
         chosen = generator.choice(len(parts.weights), size=(CHAINS, DRAWS), p=parts.weights)
@@ -186,7 +189,8 @@ class ExactSolution(Solution):
         rule, warp = self._integration.rule, self._integration.warp
         if symbol in self.model.linear:
             return self._bounded.marginal(self.model.linear.index(symbol))
-        assert rule is not None and warp is not None  # noqa: S101 (there is a nonlinear parameter)
+        assert rule is not None  # noqa: S101 (there is a nonlinear parameter)
+        assert warp is not None  # noqa: S101
         side = self.model.nonlinear.index(symbol)
         values = self._integration.settings[self._index, :, side]
         return marginal_of_quadrature(rule, warp, self._index, side, values)

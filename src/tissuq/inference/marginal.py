@@ -24,7 +24,11 @@ FloatArray = NDArray[np.float64]
 
 GRID = 1001
 COARSE = 101
-FEW = 40
+NODES = 160
+BETWEEN = 6
+FEW = 60
+FINE = 0.005
+"""Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MANY_LINES = 2000
 
 
@@ -67,7 +71,11 @@ class Marginal:
 
 
 def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray) -> Marginal:
-    """Return the marginal of a mixture of M Gaussians with weights, means and standard deviations (M,)."""
+    """Return the marginal of a mixture of M Gaussians with weights, means and standard deviations (M,).
+
+    Density and distribution are computed at few points, and between them by cubics that share their slopes.
+    """
+    from scipy.interpolate import CubicHermiteSpline
     from scipy.special import ndtr
 
     weights = weights / weights.sum()
@@ -76,10 +84,19 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
     weights, means, sds = _merged(weights, means, sds)
     scores = np.linspace(-8, 8, 65)
     spread, shares = means[:, None] + sds[:, None] * scores, weights[:, None] * np.exp(-0.5 * scores**2)
-    points = _grid(spread.ravel(), shares.ravel(), (spread.min(), spread.max()), GRID)
-    scores = (points - means[:, None]) / sds[:, None]
-    density = (weights / sds) @ np.exp(-0.5 * scores**2) / np.sqrt(2 * np.pi)
-    return Marginal(mean, sd, points, density, _proper(weights @ ndtr(scores)))
+    coarse = _grid(spread.ravel(), shares.ravel(), (spread.min(), spread.max()), NODES)
+    scores = (coarse - means[:, None]) / sds[:, None]
+    heights = (weights / sds)[:, None] * np.exp(-0.5 * scores**2) / np.sqrt(2 * np.pi)
+    slope = -(heights * scores / sds[:, None]).sum(axis=0)
+    points = _between(coarse)
+    density, cumulative = heights.sum(axis=0), weights @ ndtr(scores)
+    return Marginal(
+        mean,
+        sd,
+        points,
+        np.maximum(CubicHermiteSpline(coarse, density, slope)(points), 0.0),
+        _proper(CubicHermiteSpline(coarse, cumulative, density)(points)),
+    )
 
 
 def marginal_of_cut_mixture(
@@ -99,8 +116,9 @@ def marginal_of_cut_mixture(
     ends : tuple of float
         The bounds.
     """
-    heavy = weights > 1e-9 * weights.max()
-    weights, means, covariances = weights[heavy] / weights[heavy].sum(), means[heavy], covariances[heavy]
+    from scipy.interpolate import CubicSpline
+
+    weights, means, covariances = _alike(weights / weights.sum(), means, covariances, (place, which))
     sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (place, which))
     low, high = ((end - means[:, which]) / sd_cut for end in ends)
     log_mass = log_interval(low, high)
@@ -118,16 +136,17 @@ def marginal_of_cut_mixture(
     limits = ends if place == which else (-np.inf, np.inf)
     reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
     shares = weights[:, None] * np.exp(-0.5 * scores**2)
-    points = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, 2 * GRID)
-    scores = (points - means[:, place, None]) / sd[:, None]
+    coarse = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, 2 * NODES)
+    scores = (coarse - means[:, place, None]) / sd[:, None]
     log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
     if place != which:
         correlation = np.clip(along / sd, -1 + 1e-12, 1 - 1e-12)[:, None]
         rest = np.sqrt(1 - correlation**2)
         log_density += log_interval(*((end[:, None] - correlation * scores) / rest for end in (low, high)))
-    density = weights @ np.exp(log_density)
-    steps = 0.5 * (density[1:] + density[:-1]) * np.diff(points)
-    return Marginal(mean, float(np.sqrt(variance)), points, density, _proper(np.append(0.0, np.cumsum(steps))))
+    smooth = CubicSpline(coarse, weights @ np.exp(log_density))
+    points = _between(coarse)
+    cumulative = smooth.antiderivative()(points)
+    return Marginal(mean, float(np.sqrt(variance)), points, np.maximum(smooth(points), 0.0), _proper(cumulative))
 
 
 def marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, values: FloatArray) -> Marginal:
@@ -194,6 +213,35 @@ def _grid(values: FloatArray, weights: FloatArray, ends: tuple[float, float], co
     core = np.interp(np.array([1e-4, 1 - 1e-4]) * cumulative[-1], cumulative, values[order])
     even = np.linspace(max(ends[0], core[0]), min(ends[1], core[1]), count // 2)
     return np.unique(np.clip(np.concatenate([close, even, ends]), *ends))
+
+
+def _between(coarse: FloatArray) -> FloatArray:
+    """Return coarse points with others evenly between them."""
+    places = np.arange(BETWEEN * (len(coarse) - 1) + 1) / BETWEEN
+    return np.asarray(np.interp(places, np.arange(len(coarse)), coarse), dtype=np.float64)
+
+
+def _alike(
+    weights: FloatArray, means: FloatArray, covariances: FloatArray, places: tuple[int, int]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Merge Gaussians that are nearly the same in two of their dimensions, keeping moments."""
+    if len(weights) <= FEW:
+        return weights, means, covariances
+    seen = weights > 1e-9 * weights.max()
+    weights, means, covariances = weights[seen] / weights[seen].sum(), means[seen], covariances[seen]
+    sds = np.sqrt(covariances[:, places, places])
+    own = means[:, places]
+    bins = np.hstack([(own - own.min(axis=0)) / (FINE * sds), np.log(sds / sds.min(axis=0)) / FINE]).astype(int)
+    _, group = np.unique(bins, axis=0, return_inverse=True)
+    group = group.ravel()
+    total = np.asarray(np.bincount(group, weights), dtype=np.float64)
+    mean = np.zeros((len(total), means.shape[1]))
+    np.add.at(mean, group, weights[:, None] * means)
+    mean /= total[:, None]
+    away = means - mean[group]
+    covariance = np.zeros((len(total), *covariances.shape[1:]))
+    np.add.at(covariance, group, weights[:, None, None] * (covariances + away[:, :, None] * away[:, None, :]))
+    return total, mean, covariance / total[:, None, None]
 
 
 def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

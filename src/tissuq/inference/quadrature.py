@@ -112,9 +112,8 @@ class Quadrature:
         """Return one of the functions along one side, the sides after it integrated."""
         dimension = self.cells.lower.shape[1]
         order = ORDERS[dimension]
-        values = np.exp(self.cells.log_values[index] - self.log_integral[index]).reshape(-1, order**side, order, order ** (
-            dimension - side - 1
-        ))  # fmt: skip
+        values = np.exp(self.cells.log_values[index] - self.log_integral[index])
+        values = values.reshape(-1, order**side, order, order ** (dimension - side - 1))
         others = np.prod(np.delete(self.cells.width, side, axis=1), axis=1)
         weighted = (values @ _rule(order, dimension - side - 1)) * _rule(order, side)[:, None]
         series = (weighted * others[:, None, None]) @ _to_legendre(order).T

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.inference.lowrank import correlation_spectrum
 from tissuq.model import StatisticalModel
-from tissuq.statistics import CHUNK
+from tissuq.statistics import CHUNK, upper_triangle
 
 __all__ = ["Reducer", "Reductions"]
 
@@ -54,7 +54,7 @@ class Reduction:
 
 @dataclass(frozen=True, eq=False)
 class Reductions:
-    """K reductions one beside the other: all arrays begin with that dimension, those of directions padded with zeros."""
+    """K reductions: all arrays begin with that dimension, and those along directions are padded with zeros."""
 
     inverse: FloatArray
     log_size: FloatArray
@@ -75,8 +75,10 @@ class Reductions:
         squares = np.zeros((len(parts), len(parts[0].squares), rank, parts[0].squares.shape[2]))
         for row, part in zip(squares, parts, strict=True):
             row[:, : len(part.counts)] = part.squares
-        alike = [np.array([getattr(part, name) for part in parts]) for name in ("inverse", "log_size", "centre")]
-        return cls(*alike, squares, *directions)
+        inverse, log_size, centre = (
+            np.array([getattr(part, name) for part in parts]) for name in ("inverse", "log_size", "centre")
+        )
+        return cls(inverse, log_size, centre, squares, *directions)
 
 
 class Reducer:
@@ -106,8 +108,8 @@ def _from_statistics(models: Sequence[StatisticalModel], setting: tuple[float, .
     p = len(free)
     centres, squares = [], []
     for model in models:
-        triangle = np.linalg.qr(model.statistics.triangle[:, [*free, *fixed, -1]], mode="r")
-        inverse = np.linalg.inv(triangle[:p, :p])
+        triangle = upper_triangle(model.statistics.triangle[:, [*free, *fixed, -1]])
+        inverse = np.asarray(np.linalg.inv(triangle[:p, :p]), dtype=np.float64)
         data = triangle.copy()
         data[:p, :p] = np.eye(p)
         data[:p, -1] = 0.0
@@ -132,7 +134,7 @@ def _from_rows(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -
     bent = len(model.bent_symbols)
     design = model.design if not bent else model.basis(model.experiment.stretch, np.array(setting[:bent]))
     basis, triangle = np.linalg.qr(design[:, free])
-    inverse = np.linalg.inv(triangle)
+    inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
     stresses = np.array([each.experiment.stress for each in models])
     centre = (stresses @ basis) @ inverse.T
     residual = stresses - centre @ design[:, free].T

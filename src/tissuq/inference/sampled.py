@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -16,7 +17,7 @@ from tissuq.inference.densities import Density, given_density, joint_density
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points
 from tissuq.inference.nuts import NutsDraws, NutsSettings, sample_nuts
 from tissuq.inference.smc import SmcDraws, SmcSettings, sample_smc
-from tissuq.inference.solution import Components, Diagnostics, Solution
+from tissuq.inference.solution import Components, Diagnostics, Marginals, Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
 from tissuq.priors import Flat
@@ -134,7 +135,7 @@ class _Given:
         supports = np.array([model.priors[symbol].support for symbol in model.linear]).reshape(-1, 2)
         lower, upper = (np.broadcast_to(ends, mean.shape) for ends in supports.T)
         self._boxes = Boxes(lower, upper)
-        self._log_inside = self._boxes.inside(mean, root).log_mass
+        self._log_inside, _ = self._boxes.log_mass(mean, root)
         top = self._log_inside.max()
         self._inside = np.exp(self._log_inside - top)
         self.log_mean_inside = float(top + np.log(self._inside.mean()))
@@ -174,7 +175,8 @@ class _Given:
         edges = np.cumsum(weights, axis=1) / weights.sum(axis=1, keepdims=True)
         ticks = (np.arange(self.shape[1]) + generator.random((self.shape[0], 1))) / self.shape[1]
         chosen = [np.searchsorted(edge[:-1], tick) for edge, tick in zip(edges, ticks, strict=True)]
-        return (np.array(chosen) + self.shape[1] * np.arange(self.shape[0])[:, None]).ravel()
+        offsets = self.shape[1] * np.arange(self.shape[0])[:, None]
+        return np.asarray((np.array(chosen) + offsets).ravel(), dtype=np.intp)
 
     def _within(self, chosen: NDArray[np.intp], generator: np.random.Generator) -> FloatArray:
         """Return one draw within the bounds for each chosen Gaussian: the best of a few weighted points."""
@@ -225,9 +227,9 @@ class SampledSolution(Solution):
         return Components(np.full(count, 1 / count), settings, mean, np.zeros((count, mean.shape[1], mean.shape[1])))
 
     @cached_property
-    def marginals(self) -> dict[str, Marginal]:  # type: ignore[override]  # a cached property
+    def marginals(self) -> Marginals:
         """The marginal posterior of every parameter: of the Gaussians for a linear one, else of the draws."""
-        return {symbol: self._marginal(symbol) for symbol in self.model.symbols}
+        return Marginals(self.model.symbols, self._marginal)
 
     def _marginal(self, symbol: str) -> Marginal:
         model, parts = self.model, self.components
@@ -244,16 +246,10 @@ def _diagnostics(draws: Mapping[str, FloatArray], sampled: NutsDraws | SmcDraws)
     rhat, ess_bulk, ess_tail = (
         dict(zip(draws, map(float, column), strict=True)) for column in (whole.rhat, whole.ess_bulk, whole.ess_tail)
     )
-    is_nuts = isinstance(sampled, NutsDraws)
-    return Diagnostics(
-        whole.converged,
-        whole.verdict,
-        rhat,
-        ess_bulk,
-        ess_tail,
-        sampled.divergences if is_nuts else None,
-        float(sampled.bfmi.min()) if is_nuts else None,
-    )
+    found = Diagnostics(whole.converged, whole.verdict, rhat, ess_bulk, ess_tail)
+    if isinstance(sampled, SmcDraws):
+        return found
+    return replace(found, divergences=sampled.divergences, least_bfmi=float(sampled.bfmi.min()))
 
 
 def _acceptance(model: StatisticalModel) -> float:
@@ -268,8 +264,8 @@ def _check_size(model: StatisticalModel) -> None:
     n = len(model.experiment)
     if model.is_correlated and n > LARGEST_CORRELATED:
         raise ModelError(
-            f"sampling factorises a {n} x {n} covariance at every step; beyond {LARGEST_CORRELATED} measurements use the "
-            "method 'exact', or thin the data."
+            f"sampling factorises a {n} x {n} covariance at every step; beyond {LARGEST_CORRELATED} measurements use "
+            "the method 'exact', or thin the data."
         )
 
 
@@ -293,7 +289,8 @@ def _prior_points(model: StatisticalModel) -> FloatArray:
 def _best_prior_point(model: StatisticalModel, density: Density, data: Mapping[str, Any]) -> FloatArray:
     points = _prior_points(model)
     log_likelihood = np.asarray(_compiled(density)(points, data)[0])
-    return points[int(np.argmax(np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf)))]
+    best = int(np.argmax(np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf)))
+    return np.asarray(points[best], dtype=np.float64)
 
 
 def _start(model: StatisticalModel) -> FloatArray:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from tissuq.inference.marginal import Marginal
 from tissuq.model import StatisticalModel
 
-__all__ = ["Components", "Diagnostics", "Solution"]
+__all__ = ["Components", "Diagnostics", "Marginals", "Solution"]
 
 FloatArray = NDArray[np.float64]
 
@@ -53,7 +55,7 @@ class Components:
         their order, which keeps neighbours apart, picks equally weighted ones.
         """
         order = np.argsort(self.weights)
-        heavy = self[np.sort(order[np.cumsum(self.weights[order]) > 1e-7])]
+        heavy = self[np.sort(order[np.cumsum(self.weights[order]) > 1e-7 * self.weights.sum()])]
         total = heavy.weights.sum()
         if len(heavy.weights) <= count:
             return Components(heavy.weights / total, heavy.settings, heavy.mean, heavy.root)
@@ -75,6 +77,24 @@ class Diagnostics:
     least_bfmi: float | None = None
 
 
+class Marginals(Mapping[str, Marginal]):
+    """The marginal posterior of every parameter, each computed when it is first asked for."""
+
+    def __init__(self, symbols: Sequence[str], compute: Callable[[str], Marginal]) -> None:
+        self._symbols, self._compute = tuple(symbols), lru_cache(maxsize=None)(compute)
+
+    def __getitem__(self, symbol: str) -> Marginal:
+        if symbol not in self._symbols:
+            raise KeyError(symbol)
+        return self._compute(symbol)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._symbols)
+
+    def __len__(self) -> int:
+        return len(self._symbols)
+
+
 class Solution(ABC):
     """The posterior of one model; marginals and draws are computed when they are first asked for.
 
@@ -85,8 +105,8 @@ class Solution(ABC):
         Which method was used, and ``reason`` says why it was taken and what it did.
     components : Components
         The posterior as a mixture; predictions rest on it.
-    marginals : dict of str to Marginal
-        One for each parameter.
+    marginals : Marginals
+        One for each parameter, by its symbol.
     draws : dict of str to (chains, draws) array
         Draws of every parameter. On the exact route they are independent of each other, and those of nonlinear
         parameters take the values of the quadrature's points: for densities and intervals use the marginals.
@@ -106,7 +126,7 @@ class Solution(ABC):
 
     @property
     @abstractmethod
-    def marginals(self) -> dict[str, Marginal]:
+    def marginals(self) -> Marginals:
         """The marginal posterior of every parameter."""
 
     @property

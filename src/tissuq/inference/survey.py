@@ -71,7 +71,7 @@ def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: Lo
         Maps parameters (B, N, d), with a structure shared by the data sets, to (B, N) values.
     """
     supports = np.array([[prior.support for prior in own] for own in priors])
-    is_log = (supports[:, :, 0] >= 0).all(axis=0)
+    is_log = np.asarray((supports[:, :, 0] >= 0).all(axis=0), dtype=np.bool_)
     with np.errstate(divide="ignore"):
         bounds = np.where(is_log[:, None], np.log(np.maximum(supports, 0.0)), supports)
 
@@ -144,7 +144,7 @@ def _modes(
     margin = 1e-4 * np.minimum(inside[:, :, 1] - inside[:, :, 0], 1.0)
     low, high = (inside[:, :, 0] + margin)[:, None], (inside[:, :, 1] - margin)[:, None]
     point, value, curvature = _climb(at, np.clip(start, low, high), low, high)
-    covariance = np.linalg.inv(curvature)
+    covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
     return point, covariance, value + 0.5 * np.linalg.slogdet(covariance)[1]
 
 
@@ -199,6 +199,6 @@ def _derivatives(at: LogDensity, point: FloatArray) -> tuple[FloatArray, FloatAr
 
 def _positive(curvature: FloatArray) -> FloatArray:
     """Return curvatures with eigenvalues of at least a twenty-fifth: no scale beyond five e-folds or units."""
-    known = np.isfinite(curvature).all(axis=(-2, -1))[..., None, None]
+    known = np.asarray(np.isfinite(curvature).all(axis=(-2, -1)))[..., None, None]
     values, vectors = np.linalg.eigh(np.where(known, curvature, np.eye(curvature.shape[-1])))
     return np.asarray((vectors * np.maximum(values, 0.04)[..., None, :]) @ vectors.swapaxes(-1, -2))

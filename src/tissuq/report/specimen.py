@@ -112,7 +112,7 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
         else "the 95 % intervals contradict each other: the choice of discrepancy matters more than the noise"
     )
     return (
-        f"With {len(summary)} ways to account for model uncertainty, the mean of {name} ranges from {significant(low)} to "
-        f"{significant(high)} {unit}; {verdict}."
+        f"With {len(summary)} ways to account for model uncertainty, the mean of {name} ranges from {significant(low)} "
+        f"to {significant(high)} {unit}; {verdict}."
         + (f" ({left_out} more left out here, because a bound of a prior decides part of them.)" if left_out else "")
     )
