@@ -58,8 +58,7 @@ class ConditionalGaussian:
 
     def __call__(self, h: FloatArray) -> Conditional:
         """Evaluate at settings h (B, N, d) of the nonlinear parameters; all data sets share those of the structure."""
-        distinct, group = np.unique(h[0, :, : len(self.model.structure)], axis=0, return_inverse=True)
-        group = group.ravel()
+        distinct, group = _grouped(h[0, :, : len(self.model.structure)])
         reduced = self._reduce(distinct)
         moments, log_determinant = self._moments(reduced, group, h)
         p, each = len(self.model.linear), group if len(distinct) > 1 else slice(None)
@@ -101,3 +100,11 @@ class ConditionalGaussian:
             moments[:, chosen] = precisions[:, chosen] @ squares
         log_determinant = (-np.log(precisions) * reduced.counts[group]).sum(axis=2)
         return moments.reshape(*h.shape[:2], q, q), log_determinant
+
+
+def _grouped(settings: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return the distinct rows of settings (N, s), and for every row which of them it is."""
+    if not settings.shape[1]:
+        return settings[:1], np.zeros(len(settings), dtype=np.intp)
+    distinct, group = np.unique(settings, axis=0, return_inverse=True)
+    return distinct, group.ravel()

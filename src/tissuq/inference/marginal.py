@@ -82,7 +82,7 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
     mean = float(weights @ means)
     sd = float(np.sqrt(weights @ (sds**2 + (means - mean) ** 2)))
     weights, means, sds = _merged(weights, means, sds)
-    scores = np.linspace(-8, 8, 65)
+    scores = np.linspace(-8, 8, 25)
     spread, shares = means[:, None] + sds[:, None] * scores, weights[:, None] * np.exp(-0.5 * scores**2)
     coarse = _grid(spread.ravel(), shares.ravel(), (spread.min(), spread.max()), NODES)
     scores = (coarse - means[:, None]) / sds[:, None]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,13 +69,12 @@ class Reductions:
     def of(cls, parts: Sequence[Reduction]) -> Reductions:
         """Stack reductions of the same data."""
         rank = max(len(part.counts) for part in parts)
-        directions = [
-            np.array([np.pad(getattr(part, name), (0, rank - len(part.counts))) for part in parts])
-            for name in ("counts", "values", "levels")
-        ]
+        directions = np.zeros((3, len(parts), rank))
         squares = np.zeros((len(parts), len(parts[0].squares), rank, parts[0].squares.shape[2]))
-        for row, part in zip(squares, parts, strict=True):
-            row[:, : len(part.counts)] = part.squares
+        for place, part in enumerate(parts):
+            own = slice(len(part.counts))
+            directions[:, place, own] = part.counts, part.values, part.levels
+            squares[place, :, own] = part.squares
         inverse, log_size, centre = (
             np.array([getattr(part, name) for part in parts]) for name in ("inverse", "log_size", "centre")
         )
@@ -90,7 +90,13 @@ class Reducer:
 
     def __call__(self, settings: FloatArray) -> Reductions:
         """Return the reductions at K settings (K, s) of the structure."""
+        if not settings.shape[1]:
+            return self._only
         return Reductions.of([self._at(tuple(map(float, setting))) for setting in settings])
+
+    @cached_property
+    def _only(self) -> Reductions:
+        return Reductions.of([self._at(())])
 
     def _at(self, setting: tuple[float, ...]) -> Reduction:
         if setting not in self._known:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from tissuq.fitting import fit
+from tissuq.fitting import fit_many
 from tissuq.priors import Uniform
 from tissuq.studies.paper.findings import Findings
 from tissuq.studies.paper.settings import FORMULATIONS, PaperSettings
@@ -57,15 +57,13 @@ def ranges_of(settings: PaperSettings) -> list[tuple[float, float]]:
 
 def _fitted(settings: PaperSettings, formulation: str, bound: float | None) -> Cell:
     priors = settings.priors_of(formulation) | ({} if bound is None else {"c": Uniform(0, bound)})
-    held = 0
-    for replicate in range(settings.replicates):
-        posterior = fit(
-            settings.experiment(replicate),
-            discrepancy=formulation,
-            noise_sd=settings.noise_sd,
-            priors=priors,
-            method="exact",
-        )
-        low, high = posterior.solution.marginals["C10"].hdi()
-        held += low <= settings.truth["C10"] <= high
+    posteriors = fit_many(
+        [settings.experiment(replicate) for replicate in range(settings.replicates)],
+        discrepancy=formulation,
+        noise_sd=settings.noise_sd,
+        priors=priors,
+        method="exact",
+    )
+    intervals = [posterior.solution.marginals["C10"].hdi() for posterior in posteriors]
+    held = sum(low <= settings.truth["C10"] <= high for low, high in intervals)
     return Cell(settings.stretch_low, settings.stretch_high, formulation, bound, held, settings.replicates)

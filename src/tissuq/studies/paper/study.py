@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Literal
 
 from tissuq.experiments.experiment import Experiment
-from tissuq.fitting import fit
+from tissuq.fitting import fit, fit_many
 from tissuq.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.studies.paper.claims import Verdict, judge
@@ -56,7 +56,8 @@ class PaperStudy:
 def steps_of(settings: PaperSettings) -> int:
     """Return how many steps a run announces."""
     fits = len(FORMULATIONS) * (2 if settings.sampler == "both" else 1)
-    return fits + settings.replicates - 1 + len(ranges_of(settings)) + 1
+    more = len(FORMULATIONS) if settings.replicates > 1 else 0
+    return fits + more + len(ranges_of(settings)) + 1
 
 
 def run_paper(settings: PaperSettings, step: Callable[[str], None] = lambda text: None) -> PaperStudy:
@@ -72,11 +73,31 @@ def run_paper(settings: PaperSettings, step: Callable[[str], None] = lambda text
     main = _fit_all(settings, experiment, "nuts" if settings.sampler == "nuts" else "exact", step)
     sampled = _fit_all(settings, experiment, "nuts", step) if settings.sampler == "both" else {}
     data_sets: list[Findings] = [{name: fitted.finding for name, fitted in main.items()}]
-    for replicate in range(1, settings.replicates):
-        step(f"replicate {replicate + 1} of {settings.replicates}")
-        again = _fit_all(settings, settings.experiment(replicate), "exact", lambda text: None)
-        data_sets.append({name: fitted.finding for name, fitted in again.items()})
+    if settings.replicates > 1:
+        data_sets += _find_in_replicates(settings, step)
     return PaperStudy(settings, experiment, main, sampled, judge(data_sets), sensitivity(settings, data_sets, step))
+
+
+def _find_in_replicates(settings: PaperSettings, step: Callable[[str], None]) -> list[dict[str, Finding]]:
+    """Return the findings for every further data set, fitted together formulation by formulation."""
+    experiments = [settings.experiment(replicate) for replicate in range(1, settings.replicates)]
+    found: list[dict[str, Finding]] = [{} for _ in experiments]
+    bases: list[Band] = []
+    for name in FORMULATIONS:
+        step(f"{settings.replicates - 1} more data sets: {name}")
+        posteriors = fit_many(
+            experiments,
+            discrepancy=name,
+            noise_sd=settings.noise_sd,
+            priors=settings.priors_of(name),
+            method="exact",
+            seed=settings.seed,
+        )
+        if not bases:
+            bases = [predict_band(each.solution, each.model.experiment.stretch) for each in posteriors]
+        for findings, posterior, base in zip(found, posteriors, bases, strict=True):
+            findings[name] = find(posterior, settings.truth["C10"], base)
+    return found
 
 
 def _fit_all(
