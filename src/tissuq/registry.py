@@ -37,10 +37,10 @@ def variants(base: type[T]) -> dict[str, type[T]]:
 
 
 def _descendants(base: type[T]) -> Iterator[type[T]]:
-    for subclass in base.__subclasses__():
-        if not isabstract(subclass) and "name" in vars(subclass):
-            yield subclass
-        yield from _descendants(subclass)
+    level = base.__subclasses__()
+    while level:
+        yield from (kind for kind in level if not isabstract(kind) and "name" in vars(kind))
+        level = [child for kind in level for child in kind.__subclasses__()]
 
 
 def _origin(kind: type) -> str:

@@ -55,7 +55,7 @@ def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy]]
     for kind in kinds:
         print(f"{kind.name}\n    {kind.formula}   ({kind.source})")
         for p in kind.parameters:
-            print(f"    {p.symbol:<4} {p.unit or '-':<4} {p.description}; prior {_default(p)}")
+            print(f"    {p.symbol:<6} {p.unit or '-':<4} {p.description}; prior {_default(p)}")
         if kind.caution:
             print(fill(kind.caution, 96, initial_indent="    Note: ", subsequent_indent="    "))
         print()
@@ -66,5 +66,5 @@ def _default(parameter: Parameter) -> str:
     if parameter.relative_prior is None:
         side = "positive, " if parameter.support[0] == 0 else ""
         return f"uniform, {side}to 10 times beyond least squares"
-    of_what = {"stress": "the largest stress", "stretch": "the stretch range", "number": "1"}[parameter.dimension]
-    return f"{parameter.relative_prior} x {of_what}"
+    of_what = {"stress": " x the largest stress", "stretch": " x the stretch range", "number": ""}
+    return f"{parameter.relative_prior}{of_what[parameter.dimension]}"

@@ -31,7 +31,7 @@ def simulate(
     material : str or Material
         The true material.
     parameters : mapping of str to float
-        One value (MPa) for each of its parameters.
+        One value for each of its parameters (MPa; exponents have no unit).
     stretch : (n,) array, dimensionless
         Where to measure.
     noise_sd : float, MPa
@@ -68,6 +68,8 @@ def simulate(
     values = [parameters[symbol] for symbol in symbols]
     stress = engineering_stress(true_material, true_mode, exact.stretch, values)
     noise = noise_sd * np.random.default_rng(seed).standard_normal(len(exact))
-    recipe = ", ".join(f"{symbol} = {value:g} MPa" for symbol, value in zip(symbols, values, strict=True))
+    recipe = ", ".join(
+        f"{p.symbol} = {value:g} {p.unit}".strip() for p, value in zip(true_material.parameters, values, strict=True)
+    )
     source = f"synthetic: {true_material.name} ({recipe}), noise sd {noise_sd:g} MPa, seed {seed}"
     return Experiment(true_mode, exact.stretch, stress + noise, name=f"synthetic {true_material.name}", source=source)
