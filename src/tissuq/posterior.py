@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
 from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
@@ -63,6 +63,16 @@ class Posterior:
     def log_evidence_error(self) -> float | None:
         """Estimated error of `log_evidence`."""
         return self.solution.log_evidence_error
+
+    @property
+    def method(self) -> str:
+        """The method that gave it; ``solution.reason`` says why it was taken and what it did."""
+        return self.solution.route
+
+    @property
+    def diagnostics(self) -> Diagnostics | None:
+        """R-hat, effective sample sizes, divergences, BFMI and a verdict; None where nothing was sampled."""
+        return self.solution.diagnostics
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -210,6 +220,11 @@ class Posterior:
             "seed": self.seed,
         }
         labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
+        if solution.diagnostics is not None:
+            found = solution.diagnostics
+            labels |= {"converged": str(found.converged), "verdict": found.verdict}
+            labels |= {} if found.divergences is None else {"divergences": found.divergences}
+            labels |= {} if found.least_bfmi is None else {"least_bfmi": found.least_bfmi}
         evidence = {"log_evidence": solution.log_evidence, "log_evidence_error": solution.log_evidence_error}
         return labels | {name: value for name, value in evidence.items() if value is not None}
 

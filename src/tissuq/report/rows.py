@@ -10,7 +10,7 @@ from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
 from tissuq.report.tables import headline_of
 
-__all__ = ["readable_parameters", "readable_summary", "significant"]
+__all__ = ["readable_methods", "readable_parameters", "readable_summary", "significant"]
 
 Row = dict[str, Any]
 
@@ -56,6 +56,17 @@ def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
             }
         )
     return readable
+
+
+def readable_methods(posteriors: Mapping[str, Posterior]) -> list[list[str]]:
+    """Return rows of formulation, method, what it did, error of the log evidence and convergence as text."""
+    rows = []
+    for formulation, posterior in posteriors.items():
+        found, error = posterior.diagnostics, posterior.log_evidence_error
+        convergence = "nothing sampled" if found is None else found.verdict
+        row = [formulation, posterior.method, posterior.solution.reason, "" if error is None else f"{error:.0e}"]
+        rows.append([*row, convergence])
+    return rows
 
 
 def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -> list[list[str]]:

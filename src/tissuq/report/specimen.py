@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import readable_parameters, readable_summary, significant
+from tissuq.report.rows import readable_methods, readable_parameters, readable_summary, significant
 from tissuq.report.run_folder import RECIPE
 from tissuq.report.tables import Row, summary_row
 from tissuq.studies.specimen import SpecimenStudy
@@ -83,6 +83,7 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
             if each.model.discrepancy.caution
         },
         "parameters": readable_parameters(study.posteriors, study.unit),
+        "methods": readable_methods(study.posteriors),
         "noise": known or noise.description,
         "skipped": study.skipped,
         "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
