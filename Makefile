@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RUNS ?= runs
+BENCH := .venv-bench
 
 .PHONY: demo test lint types check lock bench clean help
 
@@ -30,8 +31,18 @@ types: $(VENV)/.installed-dev  ## Check types
 
 check: lint types test  ## Everything that CI checks
 
-bench: $(VENV)/.installed  ## Time the exact route as whole processes
-	$(BIN)/python benchmarks/cold_start.py
+bench: $(BENCH)/.installed  ## Time tissuq by itself and beside other libraries; writes benchmarks/RESULTS.md (half an hour)
+	$(BENCH)/bin/python benchmarks/cold_start.py
+	$(BENCH)/bin/python benchmarks/engine.py
+	$(BENCH)/bin/python benchmarks/nonlinear.py
+	$(BENCH)/bin/python benchmarks/compare.py
+
+$(BENCH)/.installed: pyproject.toml benchmarks/constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 12) <= sys.version_info[:2] <= (3, 13))' || \
+	  { echo "the other libraries' newest releases need Python 3.12 or 3.13. Try: make bench PYTHON=python3.13"; exit 1; }
+	$(PYTHON) -m venv $(BENCH)
+	$(BENCH)/bin/python -m pip install --quiet --constraint benchmarks/constraints.txt --editable '.[bench]'
+	touch $@
 
 lock: $(VENV)/.installed-dev  ## Write the installed versions to constraints.txt
 	{ sed -n 1p constraints.txt; $(BIN)/python -m pip list --format=freeze --exclude tissuq --exclude pip --exclude setuptools; } > constraints.new
@@ -49,4 +60,4 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	touch $@
 
 clean:  ## Remove the environment and caches
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .coverage build dist
+	rm -rf $(VENV) $(BENCH) .pytest_cache .mypy_cache .ruff_cache .coverage build dist

@@ -102,11 +102,13 @@ class Posterior:
         """
         return self._solve([self.model.with_more(more)])[0]
 
-    def summary(self, prob: float = 0.95) -> pd.DataFrame:
+    def summary(self, prob: float = 0.95, parameters: Sequence[str] | None = None) -> pd.DataFrame:
         """Return mean, sd and the highest-density interval of every parameter (MPa; psi in stretch).
 
         Parameters
         ----------
+        parameters : sequence of str, optional
+            Only these; what is not asked for is not computed.
         prob : float
             Probability inside the interval; 0.95 gives the paper's 95 % HPD.
 
@@ -120,8 +122,13 @@ class Posterior:
 
         if not 0 < prob < 1:
             raise InputError(f"prob must be between 0 and 1, not {prob}.")
+        wanted = self.model.symbols if parameters is None else tuple(parameters)
+        unknown = [symbol for symbol in wanted if symbol not in self.model.symbols]
+        if unknown:
+            raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(self.model.symbols)}.")
         rows = {}
-        for symbol, marginal in self.solution.marginals.items():
+        for symbol in wanted:
+            marginal = self.solution.marginals[symbol]
             low, high = marginal.hdi(prob)
             rows[symbol] = {"mean": marginal.mean, "sd": marginal.sd, "hdi_low": low, "hdi_high": high}
         table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")

@@ -9,6 +9,9 @@ from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial, loading_mode
 from tissuq.mechanics import (
     MooneyRivlin,
     NeoHookean,
+    Ogden1,
+    Ogden2,
+    Ogden3,
     Yeoh,
     engineering_stress,
     initial_shear_modulus,
@@ -27,14 +30,29 @@ UNIAXIAL = {  # the paper's eq. 7, 9 and 11, as corrected
     "C01": lambda x: 2 * (1 - x**-3),
     "C20": lambda x: 4 * (x**3 - 3 * x + 1 + 3 * x**-2 - 2 * x**-3),
     "C30": lambda x: 6 * (x**5 - 6 * x**3 + 3 * x**2 + 9 * x - 6 - 9 * x**-2 + 12 * x**-3 - 4 * x**-4),
-}
+} | dict.fromkeys(("mu1", "mu2", "mu3"), lambda x, alpha: 2 / alpha * (x ** (alpha - 1) - x ** (-alpha / 2 - 1)))
+
+
+def some_values(material, seed):
+    """Return values for every parameter: linear ones of size one, the others drawn from their default prior."""
+    rng = np.random.default_rng(seed)
+    return np.array(
+        [rng.normal() if p.is_linear else p.relative_prior.quantile(rng.random()) for p in material.parameters]
+    )
+
+
+def is_linear(material):
+    return np.array([parameter.is_linear for parameter in material.parameters])
 
 
 @EVERY_MATERIAL
-def test_uniaxial_stress_is_the_papers_closed_form(material):
-    basis = stress_basis(material, Uniaxial(), STRETCH)
-    for column, parameter in zip(basis.T, material.parameters, strict=True):
-        closed = UNIAXIAL[parameter.symbol](STRETCH)  # loses a few digits itself where its terms cancel
+def test_uniaxial_stress_is_its_closed_form(material):
+    nonlinear = some_values(material, seed=4)[~is_linear(material)]
+    basis = stress_basis(material, Uniaxial(), STRETCH, nonlinear)
+    symbols = [parameter.symbol for parameter in material.parameters if parameter.is_linear]
+    exponents = [[alpha] for alpha in nonlinear] or [[]] * len(symbols)
+    for column, symbol, own in zip(basis.T, symbols, exponents, strict=True):
+        closed = UNIAXIAL[symbol](STRETCH, *own)  # loses a few digits itself where its terms cancel
         np.testing.assert_allclose(column, closed, rtol=1e-12, atol=1e-13)
 
 
@@ -55,7 +73,7 @@ def test_mooney_rivlin_stress_in_other_modes_is_its_closed_form(mode, first, sec
 @EVERY_MODE
 @EVERY_MATERIAL
 def test_stress_is_the_finite_difference_of_the_energy(material, mode):
-    values = np.random.default_rng(0).normal(size=len(material.parameters))
+    values = some_values(material, seed=0)
     step = 1e-6
     energy = [path_energy(material, mode, STRETCH + shift, values) for shift in (-step, step)]
     slope = (energy[1] - energy[0]) / (2 * step) / mode.loaded_axes
@@ -66,7 +84,7 @@ def test_stress_is_the_finite_difference_of_the_energy(material, mode):
 @EVERY_MODE
 @EVERY_MATERIAL
 def test_energy_and_stress_vanish_at_the_reference(material, mode):
-    values = np.random.default_rng(1).normal(size=len(material.parameters))
+    values = some_values(material, seed=1)
     assert path_energy(material, mode, 1.0, values) == pytest.approx(0.0, abs=1e-14)
     assert engineering_stress(material, mode, [1.0], values) == pytest.approx(0.0, abs=1e-14)
 
@@ -91,20 +109,37 @@ def test_the_invariants_are_those_of_the_deformation_gradient(mode):
     assert seen["I2"] == pytest.approx(0.5 * (np.trace(C) ** 2 - np.trace(C @ C)), rel=1e-13)
 
 
+@EVERY_MODE
 @EVERY_MATERIAL
-def test_declared_linear_parameters_really_are_linear(material):
-    assert all(parameter.is_linear for parameter in material.parameters)
-    rng = np.random.default_rng(2)
-    first, second = rng.normal(size=(2, len(material.parameters)))
-    both = engineering_stress(material, Uniaxial(), STRETCH, 2 * first - 3 * second)
-    apart = engineering_stress(material, Uniaxial(), STRETCH, np.stack([first, second]))
-    np.testing.assert_allclose(both, 2 * apart[0] - 3 * apart[1], rtol=1e-10, atol=1e-10 * np.abs(both).max())
+def test_declared_linear_parameters_really_are_linear(material, mode):
+    first, second, both = (some_values(material, seed=2) for _ in range(3))
+    linear = is_linear(material)
+    second[linear] = np.random.default_rng(5).normal(size=linear.sum())
+    both[linear] = 2 * first[linear] - 3 * second[linear]
+    first, second, both = engineering_stress(material, mode, STRETCH, np.stack([first, second, both]))
+    np.testing.assert_allclose(both, 2 * first - 3 * second, rtol=1e-10, atol=1e-10 * np.abs(both).max())
+
+
+@EVERY_MODE
+@EVERY_MATERIAL
+def test_the_basis_times_the_linear_parameters_is_the_stress(material, mode):
+    values, linear = some_values(material, seed=6), is_linear(material)
+    expected = engineering_stress(material, mode, STRETCH, values)
+    found = stress_basis(material, mode, STRETCH, values[~linear]) @ values[linear]
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(
     ("material", "values", "modulus"),
-    [(NeoHookean(), [1.2], 2.4), (MooneyRivlin(), [1.2, 0.3], 3.0), (Yeoh(), [1.2, -0.057, 0.004], 2.4)],
-    ids=["neo-hookean", "mooney-rivlin", "yeoh"],
+    [
+        (NeoHookean(), [1.2], 2.4),
+        (MooneyRivlin(), [1.2, 0.3], 3.0),
+        (Yeoh(), [1.2, -0.057, 0.004], 2.4),
+        (Ogden1(), [0.7, -20.0], 0.7),
+        (Ogden2(), [0.7, -0.2, 3.7, -11.0], 0.5),
+        (Ogden3(), [0.7, 0.4, -0.2, 1.3, 5.0, -2.0], 0.9),
+    ],
+    ids=str,
 )
 def test_initial_shear_modulus_is_the_sum_of_the_first_order_terms(material, values, modulus):
     assert initial_shear_modulus(material, values) == pytest.approx(modulus, rel=1e-14)
@@ -112,7 +147,8 @@ def test_initial_shear_modulus_is_the_sum_of_the_first_order_terms(material, val
 
 @EVERY_MATERIAL
 def test_initial_slope_in_tension_is_three_times_the_shear_modulus(material):
-    values = np.abs(np.random.default_rng(3).normal(size=len(material.parameters)))
+    values = some_values(material, seed=3)
+    values[is_linear(material)] = np.abs(values[is_linear(material)])
     step = 1e-5
     below, above = engineering_stress(material, Uniaxial(), [1 - step, 1 + step], values)
     slope = (above - below) / (2 * step)

@@ -157,9 +157,8 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
     separator = r"\s+" if head.separator == WHITESPACE else head.separator
     try:
         table = pd.read_csv(
-            StringIO(text), sep=separator, header=None, dtype=np.float64, skip_blank_lines=False, na_filter=False,
-            float_precision="round_trip",
-        )  # fmt: skip
+            StringIO(text), sep=separator, header=None, dtype=np.float64, skip_blank_lines=False, na_filter=False
+        )
     except (ValueError, pd.errors.ParserError):
         return None
     block = table.to_numpy()

@@ -1,0 +1,1 @@
+"""The same seven posteriors through tissuq and through what a user would pick instead, one library a file."""

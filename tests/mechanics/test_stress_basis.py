@@ -1,0 +1,98 @@
+"""The stresses of unit linear parameters, given the others: shapes, derivatives, compilations, words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial, loading_modes
+from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3, StretchMaterial, stress_basis, traced_stress_basis
+from tissuq.mechanics.stress import differentiator
+
+jax = differentiator()
+
+STRETCH = np.linspace(0.6, 2.0, 15)
+EVERY_MODE = pytest.mark.parametrize("mode", [kind() for kind in loading_modes().values()], ids=str)
+
+
+def test_several_settings_give_several_bases():
+    settings = np.array([[1.3, -2.0], [5.0, -0.7], [20.0, -20.0]])
+    bases = stress_basis(Ogden2(), Uniaxial(), STRETCH, settings)
+    assert bases.shape == (3, 15, 2)
+    for basis, setting in zip(bases, settings, strict=True):
+        np.testing.assert_allclose(stress_basis(Ogden2(), Uniaxial(), STRETCH, setting), basis, rtol=1e-14)
+
+
+def test_a_material_without_nonlinear_parameters_needs_no_setting():
+    assert stress_basis(NeoHookean(), Planar(), STRETCH).shape == (15, 1)
+    assert stress_basis(NeoHookean(), Planar(), STRETCH, np.empty((4, 0))).shape == (4, 15, 1)
+
+
+@EVERY_MODE
+def test_the_derivative_in_the_exponents_is_the_finite_difference(mode):
+    alpha, step = np.array([1.3, 5.0, -2.0]), 1e-5
+    found = jax.jacobian(lambda h: traced_stress_basis(Ogden3(), mode, STRETCH, h))(alpha)
+    moved = alpha + step * np.stack([np.eye(3), -np.eye(3)])
+    above, below = (stress_basis(Ogden3(), mode, STRETCH, settings) for settings in moved)
+    expected = np.moveaxis((above - below) / (2 * step), 0, -1)
+    np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-8)
+
+
+def test_the_gradient_of_a_compiled_density_is_its_finite_difference():
+    stress = stress_basis(Ogden1(), Equibiaxial(), STRETCH, [4.0])[:, 0]
+
+    @jax.jit
+    def misfit(alpha):
+        return ((traced_stress_basis(Ogden1(), Equibiaxial(), STRETCH, alpha)[:, 0] - stress) ** 2).sum()
+
+    alpha, step = np.array([3.0]), 1e-6
+    slope = (misfit(alpha + step) - misfit(alpha - step)) / (2 * step)
+    np.testing.assert_allclose(jax.grad(misfit)(alpha), slope, rtol=1e-7)
+
+
+def test_new_values_compile_nothing_new():
+    traced = []
+
+    class Counted(Ogden1):
+        """Ogden's one term; it counts how often it is traced."""
+
+        def energy(self, stretches, values):
+            traced.append(values)
+            return super().energy(stretches, values)
+
+    for alpha in (2.0, 3.0, 4.0):
+        stress_basis(Counted(), Uniaxial(), STRETCH, [alpha])
+    assert len(traced) == 1
+
+
+@pytest.mark.parametrize(
+    ("material", "nonlinear", "words"),
+    [
+        (Ogden2(), (), "'ogden-2' is linear in its parameters only at given values of alpha1, alpha2"),
+        (Ogden2(), [2.0], "needs 2 of them"),
+        (Ogden1(), np.ones((3, 2)), "needs 1 of them"),
+        (NeoHookean(), [2.0], "needs 0 of them"),
+    ],
+)
+def test_a_wrong_number_of_values_is_refused_in_words(material, nonlinear, words):
+    with pytest.raises(tq.ModelError, match=words):
+        stress_basis(material, Uniaxial(), STRETCH, nonlinear)
+
+
+def test_an_energy_of_stretches_that_jax_cannot_differentiate_is_refused_in_words():
+    class WithNumpy(StretchMaterial):
+        """W = mu (ln l1)^2 + ..., written with the wrong library."""
+
+        parameters = (tq.Parameter("mu", "shear modulus"),)
+        name = "logarithmic-with-numpy"
+        formula = "mu (ln(l1)^2 + ln(l2)^2 + ln(l3)^2)"
+        source = "this test"
+
+        def energy(self, stretches, values):
+            return values[0] * sum(np.log(stretch) ** 2 for stretch in stretches)
+
+    with pytest.raises(tq.ModelError, match=r"jax\.numpy"):
+        stress_basis(WithNumpy(), Uniaxial(), STRETCH)
+    with pytest.raises(tq.ModelError, match=r"jax\.numpy"):
+        tq.initial_shear_modulus(WithNumpy(), [1.0])
