@@ -9,11 +9,13 @@ from pathlib import Path
 import pytest
 
 import tissuq
+from tissuq import Discrepancy, Material, Noise, StretchMaterial
+from tissuq.registry import variants
 
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
-    "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "model",
-    "inference", "prediction", "posterior", "fitting", "studies", "report", "cli",
+    "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "noise",
+    "statistics", "model", "inference", "prediction", "cautions", "posterior", "fitting", "studies", "report", "cli",
 ]  # fmt: skip
 
 
@@ -37,8 +39,14 @@ def test_a_stage_imports_only_stages_to_its_left(file):
     assert not imports_of(file) & set(later)
 
 
-def test_inference_knows_no_particular_material_or_discrepancy():
-    names = {"NeoHookean", "MooneyRivlin", "Yeoh", "GaussianProcess", "Constant", "Quadratic", "YeohTerms"}
+def test_the_statistics_of_the_data_know_nothing_of_the_rest():
+    assert not imports_of(ROOT / "statistics.py")
+
+
+def test_inference_knows_no_particular_material_discrepancy_or_noise():
+    kinds = (Material, StretchMaterial, Discrepancy, Noise)
+    names = {variant.__name__ for kind in kinds for variant in variants(kind).values()}
+    assert {"NeoHookean", "Ogden1", "GaussianProcess", "Constant", "RepeatNoise"} <= names
     for file in (ROOT / "inference").glob("*.py"):
         assert not names & {node.id for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Name)}
 

@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.discrepancy import discrepancies, discrepancy_named
-from tissuq.mechanics import NeoHookean, Yeoh
+from tissuq.mechanics import NeoHookean, Yeoh, material_named
 from tissuq.mechanics.material import materials
 from tissuq.model import StatisticalModel
 
@@ -36,10 +36,24 @@ def test_default_boxes_hold_least_squares_with_a_margin(name, material):
             model(name, material)
         return
     fitted = model(name, material)
-    best = np.linalg.lstsq(fitted.design, DATA.stress, rcond=None)[0]
-    for symbol, value in zip(fitted.column_symbols, best, strict=True):
+    own = sum(parameter.is_linear for parameter in material.parameters)
+    of_material, of_all = (np.linalg.lstsq(X, DATA.stress)[0] for X in (fitted.design[:, :own], fitted.design))
+    for symbol, value in zip(fitted.column_symbols, [*of_material, *of_all[own:]], strict=True):
         low, high = fitted.priors[symbol].support
         assert max(abs(low), high) >= 5 * abs(value)
+
+
+@pytest.mark.parametrize(
+    ("name", "exponents"),
+    [("ogden-1", [1.5]), ("ogden-1", [5.0]), ("ogden-1", [30.0]), ("ogden-2", [3.0, -2.0]), ("ogden-3", [1.3, 5, -2])],
+    ids=str,
+)
+def test_default_boxes_of_moduli_hold_the_truth_whatever_the_exponents(name, exponents):
+    moduli = {f"mu{i}": 0.5 for i in range(1, len(exponents) + 1)}
+    truth = moduli | {f"alpha{i}": alpha for i, alpha in enumerate(exponents, start=1)}
+    data = tq.simulate(name, truth, STRETCH)
+    priors = StatisticalModel(data, material_named(name), discrepancy_named("none"), 0.1).priors
+    assert all(priors[symbol].support[0] < value < priors[symbol].support[1] for symbol, value in truth.items())
 
 
 def test_the_default_prior_of_c10_is_the_same_for_every_discrepancy():
@@ -59,7 +73,7 @@ def test_chosen_priors_replace_defaults():
         (lambda: model(noise_sd=0.0), "noise_sd must be a positive number"),
         (lambda: model(noise_sd=-1.0), "noise_sd must be a positive number"),
         (lambda: model(noise_sd=float("nan")), "noise_sd must be a positive number"),
-        (lambda: model(noise_sd="big"), "or 'unknown', not 'big'"),
+        (lambda: model(noise_sd="big"), "one of unknown, proportional, repeats; not 'big'"),
         (lambda: model("yeoh", Yeoh()), "adds C20, C30, which material 'yeoh' has already"),
         (lambda: model(chosen_priors={"mu": tq.Uniform(0, 1)}), "a prior for 'mu'"),
         (lambda: model(chosen_priors={"C10": tq.Uniform(-1, 1)}), "C10: .* reaches beyond"),
@@ -98,7 +112,7 @@ def test_unknown_noise_beside_a_free_independent_error_is_said_to_be_confounded(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"sampler": "hmc"}, "no sampler 'hmc'"),
+        ({"method": "hmc"}, "no method 'hmc'"),
         ({"seed": -1}, "whole number"),
         ({"material": "neohooke"}, "Did you mean 'neo-hookean'"),
         ({"discrepancy": "gauss"}, "no discrepancy named 'gauss'"),
@@ -124,13 +138,30 @@ def test_a_natural_bound_is_no_cause_for_a_warning():
 
 
 def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch):
-    def fails(model, seed):
+    def fails(models, seed):
         raise tq.ConvergenceError("quadrature did not reach its tolerance")
 
+    exact = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
     monkeypatch.setattr("tissuq.fitting.solve_exactly", fails)
-    assert tq.fit(DATA, discrepancy="none", noise_sd=0.1).solution.route == "nuts"
+    sampled = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
+    assert sampled.solution.route == "nuts"
+    assert "quadrature did not reach its tolerance" in sampled.solution.reason
+    assert sampled.log_evidence == pytest.approx(exact.log_evidence, abs=5 * sampled.log_evidence_error)
+    assert 0 < sampled.log_evidence_error < 0.2
     with pytest.raises(tq.ConvergenceError):
-        tq.fit(DATA, discrepancy="none", noise_sd=0.1, sampler="exact")
+        tq.fit(DATA, discrepancy="constant", noise_sd=0.1, method="exact")
+
+
+def test_auto_samples_all_parameters_where_none_is_left_to_sample_alone(monkeypatch):
+    def fails(models, seed):
+        raise tq.ConvergenceError("this fails")
+
+    monkeypatch.setattr("tissuq.fitting.solve_exactly", fails)
+    solution = tq.fit(DATA, discrepancy="none", noise_sd=0.1).solution
+    assert solution.route == "joint"
+    assert "this fails" in solution.reason
+    with pytest.raises(tq.ModelError, match="nothing is left to sample"):
+        tq.fit(DATA, discrepancy="none", noise_sd=0.1, method="nuts")
 
 
 def test_a_material_that_is_not_linear_in_its_parameters_is_refused():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from tissuq import Exponential, HalfCauchy, HalfNormal, InputError, LogNormal, Normal, Uniform
+from tissuq import Exponential, Flat, HalfCauchy, HalfNormal, InputError, LogNormal, Normal, Uniform
 from tissuq.mechanics.stress import differentiator
 from tissuq.priors import Prior, prior_from
 from tissuq.registry import variants
@@ -26,7 +26,29 @@ PROBABILITIES = np.array([0.01, 0.2, 0.5, 0.9, 0.999])
 
 
 def test_every_distribution_is_among_the_cases():
-    assert {type(prior) for prior, _ in CASES} == set(variants(Prior).values())
+    assert {type(prior) for prior, _ in CASES} | {Flat} == set(variants(Prior).values())
+
+
+@pytest.mark.parametrize("flat", [Flat(), Flat(0.0), Flat(-1.0, 2.0)], ids=str)
+def test_a_flat_prior_has_density_one_and_no_quantiles(flat):
+    assert flat.log_density(np.array([0.1, 1.9])) == pytest.approx([0.0, 0.0])
+    assert flat.gaussian == (0.0, 0.0, 0.0)
+    assert flat.within((0.5, 1.0)).support == (0.5, 1.0)
+    assert flat.scaled(1000.0).support == tuple(1000.0 * end for end in flat.support)
+    assert prior_from(flat.as_dict()) == flat
+    with pytest.raises(InputError, match="improper"):
+        flat.quantile(0.5)
+
+
+@EVERY
+def test_a_gaussian_form_is_the_density_within_the_support(prior, law):
+    if prior.gaussian is None:
+        assert not isinstance(prior, Normal | Uniform)
+        return
+    mean, precision, log_constant = prior.gaussian
+    values = law.ppf(PROBABILITIES)
+    found = log_constant - 0.5 * precision * (values - mean) ** 2
+    np.testing.assert_allclose(found, law.logpdf(values), rtol=1e-10, atol=1e-12)
 
 
 @EVERY
@@ -66,6 +88,7 @@ def test_jax_sees_the_same_density(prior, law):
     ("make", "words"),
     [
         (lambda: Uniform(1, 1), "low must be less"),
+        (lambda: Flat(1, 1), "low must be less"),
         (lambda: Normal(0, -1), "sd must be positive"),
         (lambda: Normal(0, 1, low=2, high=1), "low must be less"),
         (lambda: HalfNormal(float("nan")), "must be a finite number"),

@@ -163,6 +163,39 @@ def test_an_option_prevails_over_the_config(cli, here, specimen):
     assert_closed_form(summary_of(here / "second")[0], 2.5, width_kpa=100)
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [(["--noise-sd", 1], ["--noise", "proportional"]), (["--noise", "proportional"], ["--noise-sd", 2.5])],
+    ids=["known, then proportional", "proportional, then known"],
+)
+def test_an_option_of_the_noise_prevails_over_any_noise_of_the_config(cli, here, specimen, first, second):
+    assert cli("fit", specimen, *first, *ALONE, "--out", "first").status == 0
+    said = cli("fit", "--config", "first/run.toml", *second, "--no-figures", "--out", "second")
+    assert said.status == 0, said.err
+    kinds = [line.split(",")[1] for line in (here / "second" / "parameters.csv").read_text().splitlines()[1:]]
+    assert kinds == (["C10"] if "--noise-sd" in second else ["C10", "noise_sd", "noise_share"])
+
+
+def test_proportional_noise_and_repeats_can_be_chosen(cli, here, specimen):
+    assert cli("fit", specimen, "--noise", "proportional", *ALONE).status == 0
+    lines = (here / "runs" / "specimen" / "parameters.csv").read_text().splitlines()
+    assert [line.split(",")[1] for line in lines[1:]] == ["C10", "noise_sd", "noise_share"]
+    twice = written(here / "twice.csv", stretch=np.repeat(stretch, 2), stress=np.repeat(stress, 2) + [0.5, -0.5] * 6)
+    said = cli("fit", twice, "--stress-unit", "kPa", "--noise", "repeats", "--discrepancy", "constant", "--no-figures")
+    assert said.status == 0, said.err
+    lines = (here / "runs" / "twice" / "parameters.csv").read_text().splitlines()
+    assert [line.split(",")[1] for line in lines[1:]] == ["C10", "m0", "S", "noise_sd"]
+
+
+def test_a_material_of_other_parameters_is_summarised_by_its_first_one(cli, here, specimen):
+    said = cli("fit", specimen, "--material", "ogden-1", "--noise-sd", 1, "--prior", "mu1=uniform(-500,500)", *ALONE)
+    assert said.status == 0, said.err
+    (row,) = summary_of(here / "runs" / "specimen")
+    # the measurements are neo-Hookean with C10 = 50 kPa: mu1 = 2 C10
+    assert float(row["mu1_mean"]) == pytest.approx(0.1, abs=4 * float(row["mu1_sd"]))
+    assert "mu1, kPa" in said.out
+
+
 def test_a_name_with_markup_and_spaces_is_shown_as_it_is(cli, here):
     file = written(here / "<b>pig & cow</b>".replace("/", "_"), stretch=stretch, stress=stress)
     said = cli("fit", file, "--stress-unit", "kPa", "--noise-sd", 1, *ALONE)

@@ -1,12 +1,11 @@
 """A sampler that has not converged: exit status 3, and the result says so wherever it is read."""
 
 import json
-from dataclasses import replace
 from math import nan
 
 import pytest
 
-from tissuq import fitting
+from tissuq.inference import sampled
 from tissuq.inference.exact import solve_exactly
 from tissuq.inference.solution import Diagnostics
 
@@ -18,15 +17,14 @@ def stuck(monkeypatch):
     """Make every sampled fit one that has not converged; ``rhat`` may be nan, as of chains that never move."""
 
     def install(rhat=1.73):
-        def solve(model, sampler, seed):
-            solution = solve_exactly(model, seed)
-            if sampler != "nuts":
-                return solution
+        def sample(model, seed):
+            (solution,) = solve_exactly([model], seed)
             rhats, sizes = dict.fromkeys(model.symbols, rhat), dict.fromkeys(model.symbols, 12.0)
-            found = Diagnostics(False, VERDICT, rhats, sizes, sizes, divergences=3)
-            return replace(solution, route="nuts", log_evidence=None, log_evidence_error=None, diagnostics=found)
+            solution.route, solution.log_evidence, solution.log_evidence_error = "joint", None, None
+            solution.diagnostics = Diagnostics(False, VERDICT, rhats, sizes, sizes, divergences=3)
+            return solution
 
-        monkeypatch.setattr(fitting, "_solve", solve)
+        monkeypatch.setattr(sampled, "sample_joint", sample)
 
     return install
 
@@ -34,7 +32,7 @@ def stuck(monkeypatch):
 @pytest.fixture
 def fitted(cli, stuck, specimen):
     stuck()
-    return cli("fit", specimen, "--sampler", "nuts", "--discrepancy", "none", "--noise-sd", 1, "--no-figures")
+    return cli("fit", specimen, "--method", "joint", "--discrepancy", "none", "--noise-sd", 1, "--no-figures")
 
 
 def test_the_exit_status_is_3_and_the_message_names_the_discrepancy(fitted):
@@ -60,7 +58,7 @@ def test_the_tables_and_the_terminal_hold_rhat_and_ess_and_no_evidence(fitted, c
 
 def test_an_rhat_that_is_not_a_number_is_null_in_json(cli, stuck, here, specimen):
     stuck(rhat=nan)
-    said = cli("fit", specimen, "--sampler", "nuts", "--discrepancy", "none", "--noise-sd", 1, "--no-figures")
+    said = cli("fit", specimen, "--method", "joint", "--discrepancy", "none", "--noise-sd", 1, "--no-figures")
     assert said.status == 3
     text = (here / "runs" / "specimen" / "summary.json").read_text()
     (row,) = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
@@ -73,9 +71,9 @@ def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_resul
     said = cli("paper", "--points", 6, "--sampler", "both", "--no-figures", "--out", "run")
     assert said.status == 3
     assert "NOT converged for none, constant, linear, quadratic, mooney-rivlin, yeoh, gp" in said.err
-    exact, sampled = (json.loads((here / "run" / f"summary{which}.json").read_text()) for which in ("", "-nuts"))
+    exact, nuts = (json.loads((here / "run" / f"summary{which}.json").read_text()) for which in ("", "-nuts"))
     assert all(row["rhat"] is None and row["log_evidence"] is not None for row in exact)
-    assert all(row["rhat"] == 1.73 and row["log_evidence"] is None for row in sampled)
+    assert all(row["rhat"] == 1.73 and row["log_evidence"] is None for row in nuts)
     assert len(list((here / "run" / "posterior").glob("*-nuts.nc"))) == 7
     report = (here / "run" / "report.html").read_text()
     assert report.count(VERDICT) == 7

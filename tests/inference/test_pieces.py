@@ -2,41 +2,68 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import expon, multivariate_normal, norm, truncnorm
 
-from tissuq.discrepancy import GaussianProcess
-from tissuq.inference.box import Box
+import tissuq as tq
+from tissuq.discrepancy import Constant, GaussianProcess
+from tissuq.inference.bounds import bounded
+from tissuq.inference.box import Boxes
 from tissuq.inference.lowrank import correlation_spectrum
 from tissuq.inference.marginal import blended, marginal_of_mixture, marginal_of_points
+from tissuq.inference.solution import Components
+from tissuq.mechanics import NeoHookean
+from tissuq.model import StatisticalModel
 
 ROOT = np.linalg.cholesky([[1.0, 0.6, 0.2], [0.6, 2.0, -0.3], [0.2, -0.3, 0.5]])
 
 
+def boxes(lower, upper):
+    """The bounds of one Gaussian."""
+    return Boxes(np.array([lower]), np.array([upper]))
+
+
 def test_the_mass_in_a_box_is_scipys():
-    box = Box(np.array([-0.5, -1.0, -np.inf]), np.array([1.0, 2.0, 0.3]))
-    outside, log_inside = box.mass(np.zeros((1, 3)), ROOT[None])
-    truth = multivariate_normal(np.zeros(3), ROOT @ ROOT.T).cdf(box.upper, lower_limit=np.array([-0.5, -1.0, -40]))
-    assert np.exp(log_inside[0]) == pytest.approx(truth, rel=2e-3)
-    assert outside[0] >= 1 - truth
+    box = boxes([-0.5, -1.0, -np.inf], [1.0, 2.0, 0.3])
+    (log_mass,), (error,) = box.log_mass(np.zeros((1, 3)), ROOT[None])
+    law = multivariate_normal(np.zeros(3), ROOT @ ROOT.T)
+    truth = law.cdf(box.upper[0], lower_limit=np.array([-0.5, -1.0, -40]))
+    assert np.exp(log_mass) == pytest.approx(truth, rel=2e-3)
+    assert abs(log_mass - np.log(truth)) < 5 * error + 1e-5  # SciPy's own error is 1e-5
+    assert box.beyond(np.zeros((1, 3)), ROOT[None]).sum() >= 1 - truth
+    assert box.ceiling(np.zeros((1, 3)), ROOT[None])[0] >= np.log(truth)
 
 
 def test_the_mass_far_in_the_tail_keeps_its_digits():
-    box = Box(np.array([0.0]), np.array([np.inf]))
+    box = boxes([0.0], [np.inf])
     for distance in (5.0, 15.0, 30.0):
-        _, log_inside = box.mass(np.array([[-distance]]), np.ones((1, 1, 1)))
-        assert log_inside[0] == pytest.approx(norm.logcdf(-distance), rel=1e-10)
+        gaussian = np.array([[-distance]]), np.ones((1, 1, 1))
+        assert box.log_mass(*gaussian)[0] == pytest.approx(norm.logcdf(-distance), rel=1e-10)
+        assert box.ceiling(*gaussian) == pytest.approx(norm.logcdf(-distance), rel=1e-10)
 
 
 def test_parameters_far_from_their_bounds_cost_no_accuracy():
-    box = Box(np.array([-50.0, 0.0, -50.0]), np.array([50.0, 50.0, 50.0]))
-    _, log_inside = box.mass(np.array([[0.0, -1.0, 0.0]]), ROOT[None])
-    assert log_inside[0] == pytest.approx(norm.logcdf(-1 / np.sqrt(2)), rel=1e-12)
+    box = boxes([-50.0, 0.0, -50.0], [50.0, 50.0, 50.0])
+    log_mass, error = box.log_mass(np.array([[0.0, -1.0, 0.0]]), ROOT[None])
+    assert log_mass[0] == pytest.approx(norm.logcdf(-1 / np.sqrt(2)), rel=1e-12)
+    assert error[0] == 0
+
+
+def test_every_gaussian_has_its_own_bounds():
+    lower, upper = np.array([[-1.0, -np.inf], [0.0, 0.0], [-9.0, 0.5]]), np.array([[1.0, 2.0], [np.inf, 3.0], [9, 9]])
+    means, root = np.array([[0.2, 0.1], [-0.5, 1.0], [0.0, -1.0]]), ROOT[:2, :2]
+    together, _ = Boxes(lower, upper).log_mass(means, np.repeat(root[None], 3, axis=0))
+    for low, high, mean, found in zip(lower, upper, means, together, strict=True):
+        law = multivariate_normal(mean, root @ root.T)
+        truth = law.cdf(np.minimum(high, 40.0), lower_limit=np.maximum(low, -40.0))
+        assert np.exp(found) == pytest.approx(truth, rel=2e-3)
 
 
 def test_points_in_a_box_have_the_moments_of_the_bounded_gaussian():
-    box = Box(np.array([0.0, -np.inf, -np.inf]), np.array([np.inf, np.inf, np.inf]))
+    box = boxes([0.0, -np.inf, -np.inf], [np.inf, np.inf, np.inf])
     log_weights, points = box.points(np.zeros((1, 3)), ROOT[None], 20_000)
     weights = np.exp(log_weights)
     law = truncnorm(0, np.inf)
@@ -45,25 +72,55 @@ def test_points_in_a_box_have_the_moments_of_the_bounded_gaussian():
     assert (points[0, :, 0] >= 0).all()
 
 
+def spectrum(points, psi):
+    """The spectrum of a squared exponential at any points, also at fewer than a whole model accepts."""
+    measured = SimpleNamespace(stretch=points)
+    return correlation_spectrum(
+        SimpleNamespace(experiment=measured, discrepancy=GaussianProcess(), is_repeated=False), (psi,)
+    )
+
+
+def test_a_part_that_bounds_cut_and_that_hardly_weighs_is_kept_without_harm():
+    box = boxes([0.0, 0.0], [np.inf, np.inf])
+    weights = np.array([1 - 7e-8, 7e-8])
+    mean, root = np.array([[9.0, 9.0], [0.5, 0.5]]), np.repeat(np.eye(2)[None], 2, axis=0)
+    parts = Components(weights, np.zeros((2, 0)), mean, root)
+    found = bounded(parts, box.beyond(mean, root), box)
+    assert len(found.crossed.weights) == 1
+    for place in range(2):
+        assert found.marginal(place).mean == pytest.approx(9.0, abs=1e-6)
+        assert found.marginal(place).sd == pytest.approx(1.0, abs=1e-5)
+    whole = found.components()
+    assert whole.weights.sum() == pytest.approx(1, abs=1e-12)
+    assert (whole.mean >= 0).all()
+
+
 @pytest.mark.parametrize("psi", [0.05, 0.3, 1.5, 8.0])
 @pytest.mark.parametrize("n", [1, 2, 30, 300])
 def test_the_spectrum_rebuilds_the_correlation(n, psi):
     points = np.linspace(0.5, 4, n)
-    found = correlation_spectrum(GaussianProcess(), points, (psi,))
+    found = spectrum(points, psi)
     dense = np.exp(-0.5 * ((points[:, None] - points) / psi) ** 2)
     np.testing.assert_allclose((found.vectors * found.values) @ found.vectors.T, dense, atol=1e-10)
     np.testing.assert_allclose(found.vectors.T @ found.vectors, np.eye(len(found.values)), atol=1e-12)
 
 
 def test_a_smooth_kernel_has_a_small_rank():
-    found = correlation_spectrum(GaussianProcess(), np.linspace(0.5, 4, 300), (1.5,))
-    assert len(found.values) < 20
+    assert len(spectrum(np.linspace(0.5, 4, 300), 1.5).values) < 20
 
 
 def test_repeated_points_do_not_break_the_spectrum():
     points = np.repeat([1.0, 1.5, 2.0], 3)
-    found = correlation_spectrum(GaussianProcess(), points, (0.5,))
-    assert (found.values > 1e-12).sum() == 3
+    assert (spectrum(points, 0.5).values > 1e-12).sum() == 3
+
+
+def test_measurements_at_one_stretch_share_their_error_where_repeats_tell_the_noise():
+    stretch = np.array([0.8, 1.2, 0.8, 1.5, 1.2, 0.8])
+    data = tq.Experiment("uniaxial", stretch, np.ones(6))
+    model = StatisticalModel(data, NeoHookean(), Constant(), "repeats")
+    found = correlation_spectrum(model, ())
+    dense = (found.vectors * found.values) @ found.vectors.T
+    np.testing.assert_allclose(dense, stretch[:, None] == stretch, atol=1e-14)
 
 
 def test_the_hpd_of_a_gaussian_is_its_central_interval():

@@ -128,7 +128,8 @@ def test_a_noise_that_is_not_a_positive_number_is_refused(noise):
 
 @pytest.mark.parametrize(
     "wrong", [{"discrepancies": ()}, {"discrepancies": ("all", "gp")}, {"seed": -1}, {"skip_rows": -1},
-              {"sampler": "gibbs"}, {"unknown": 1}, {"priors": {"C10": 5}}, {"priors": {"C10": {"low": [1]}}}],
+              {"method": "gibbs"}, {"sampler": "nuts"}, {"noise": "white"}, {"noise": "repeats", "noise_sd": 1.0},
+              {"unknown": 1}, {"priors": {"C10": 5}}, {"priors": {"C10": {"low": [1]}}}],
     ids=str,
 )  # fmt: skip
 def test_settings_that_mean_nothing_are_refused(wrong):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy import Discrepancy
+from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
 
 __all__ = ["Spectrum", "correlation_spectrum", "scaled_spectrum"]
@@ -77,7 +78,8 @@ def _remembered(discrepancy: Discrepancy, points: bytes, shape: tuple[float, ...
 def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
     values = dict(zip(discrepancy.shape_symbols, shape, strict=True))
     if len(points) <= FEW_POINTS:
-        spectrum, vectors = np.linalg.eigh(discrepancy.correlation(points, points, values))
+        with one_thread():
+            spectrum, vectors = np.linalg.eigh(discrepancy.correlation(points, points, values))
         kept = spectrum > ROUNDING * len(points)
         return Spectrum(vectors[:, kept], spectrum[kept])
     root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points)

@@ -38,6 +38,8 @@ FORGOTTEN = 0.1
 
 With an unknown noise, 0.3 halves the sweeps and doubles the error of the log evidence.
 """
+STOPPED = 1.2
+"""Growth of the squared distance from the start, over the second half of the sweeps, that counts as none."""
 TARGET_ACCEPTANCE = 0.8
 LONGEST_STEP = 1.5
 """Leapfrog steps, in standard deviations, stay below this; the dynamics of a normal density break up at two."""
@@ -436,7 +438,7 @@ def _has_moved(start: Floats, now: Floats, distances: list[Floats]) -> bool:
     correlations = np.array([np.corrcoef(*pair)[0, 1] for pair in zip(start, now, strict=True)])
     has_moved = np.abs(correlations) < FORGOTTEN
     if sweeps >= 4:
-        has_moved |= distances[-1] < (1 + FORGOTTEN) * distances[(sweeps + 1) // 2 - 1]
+        has_moved |= distances[-1] < STOPPED * distances[(sweeps + 1) // 2 - 1]
     return bool(has_moved.all())
 
 
