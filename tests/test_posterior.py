@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import arviz_stats
 import numpy as np
 import pytest
@@ -45,3 +47,10 @@ def test_the_file_holds_every_group_and_arviz_reads_it(posterior, tmp_path):
 def test_independent_draws_have_the_effective_size_of_their_number(posterior):
     ess = arviz_stats.ess(posterior.data["posterior"].dataset)
     assert all(float(ess[symbol]) > 3200 for symbol in ("C10", "c", "psi"))
+
+
+@pytest.mark.parametrize("method", ["exact", "nuts"])
+def test_a_posterior_survives_pickling(method):
+    before = tq.fit(DATA, discrepancy="constant", noise_sd=0.2, method=method)
+    table = before.summary()
+    assert pickle.loads(pickle.dumps(before)).summary().equals(table)

@@ -18,6 +18,9 @@ __all__ = ["Conditional", "ConditionalGaussian"]
 
 FloatArray = NDArray[np.float64]
 
+AT_ONCE = 4_000_000
+"""Variances computed at once: what bounds the memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class Conditional:
@@ -88,17 +91,20 @@ class ConditionalGaussian:
         return Conditional(log_volume - 0.5 * exponent + constant, mean, root)
 
     def _moments(self, reduced: Reductions, group: NDArray[np.intp], h: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D' V^-1 D for the data matrix D, and log |V|, for every setting."""
-        values = {symbol: h[:, :, place, None] for place, symbol in enumerate(self.model.nonlinear)}
-        white = self.model.white_variance(values, reduced.levels[group])
-        variances = white + self.model.correlated_variance(values) * reduced.values[group]
-        precisions = 1 / np.broadcast_to(variances, (*h.shape[:2], reduced.counts.shape[1]))
-        q = len(self.model.column_symbols) + 1
-        moments = np.empty((*h.shape[:2], q * q))
-        for index, squares in enumerate(reduced.squares):
-            chosen = group == index if len(reduced.squares) > 1 else slice(None)
-            moments[:, chosen] = precisions[:, chosen] @ squares
-        log_determinant = (-np.log(precisions) * reduced.counts[group]).sum(axis=2)
+        """Return D' V^-1 D for the data matrix D, and log |V|, for every setting; some settings at a time."""
+        q, directions = len(self.model.column_symbols) + 1, reduced.counts.shape[1]
+        moments, log_determinant = np.empty((*h.shape[:2], q * q)), np.empty(h.shape[:2])
+        for block in np.array_split(np.arange(h.shape[1]), 1 + h.shape[1] * len(h) * directions // AT_ONCE):
+            own = group[block]
+            values = {symbol: h[:, block, place, None] for place, symbol in enumerate(self.model.nonlinear)}
+            white = self.model.white_variance(values, reduced.levels[own])
+            variances = white + self.model.correlated_variance(values) * reduced.values[own]
+            variances = np.broadcast_to(variances, (len(h), len(block), directions))
+            log_determinant[:, block] = (np.log(variances) * reduced.counts[own]).sum(axis=2)
+            precisions = 1 / variances
+            for index, squares in enumerate(reduced.squares):
+                chosen = np.flatnonzero(own == index) if len(reduced.squares) > 1 else slice(None)
+                moments[:, block[chosen]] = precisions[:, chosen] @ squares
         return moments.reshape(*h.shape[:2], q, q), log_determinant
 
 

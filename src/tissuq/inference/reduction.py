@@ -156,7 +156,13 @@ def _from_rows(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -
         counts = np.append(np.ones(len(spectrum.values)), n - len(spectrum.values))
         values, levels = np.append(spectrum.values, 0.0), np.zeros(len(counts))
     elif model.noise.depends_on_level:
-        squares, counts, values, levels = _products(shared, residual), np.ones(n), np.zeros(n), model.levels
+        levels, place, number = np.unique(model.levels, return_inverse=True, return_counts=True)
+        by_level = np.zeros((len(levels), count, q * q))
+        for start in range(0, n, CHUNK):
+            block = slice(start, start + CHUNK)
+            np.add.at(by_level, place[block], _products(shared[block], residual[:, block]).swapaxes(0, 1))
+        squares = by_level.swapaxes(0, 1)
+        counts, values = number.astype(np.float64), np.zeros(len(levels))
     else:
         squares = _products(shared, residual).sum(axis=1, keepdims=True)
         counts, values, levels = np.array([float(n)]), np.zeros(1), np.zeros(1)

@@ -29,8 +29,6 @@ Floats = NDArray[np.float64]
 MAX_RHAT = 1.01
 MIN_ESS = 400
 MAX_LOG_EVIDENCE_ERROR = 0.3
-MAX_STUCK_SHARE = 0.2
-"""Share of the temperatures at which the particles may run out of sweeps before they have forgotten their start."""
 MAX_TEMPERATURES = 1000
 MORE = "more particles"
 FORGOTTEN = 0.1
@@ -38,7 +36,7 @@ FORGOTTEN = 0.1
 
 With an unknown noise, 0.3 halves the sweeps and doubles the error of the log evidence.
 """
-STOPPED = 1.2
+STOPPED = 1.1
 """Growth of the squared distance from the start, over the second half of the sweeps, that counts as none."""
 TARGET_ACCEPTANCE = 0.8
 LONGEST_STEP = 1.5
@@ -91,7 +89,7 @@ class SmcDraws:
     The draws of a run stand in genealogical order: particles that descend from the same ancestor are neighbours.
     What relatives still have in common, exact duplicates included, therefore shows as autocorrelation along the
     draws, and the effective sample sizes of ArviZ discount it as they do for a Markov chain; differences between
-    the runs lower them further.
+    the runs lower them further. They never exceed the number of distinct draws.
 
     Parameters
     ----------
@@ -165,12 +163,17 @@ class SmcDraws:
     @cached_property
     def ess_bulk(self) -> Floats:
         """Effective sample size for the centre of each marginal, relatives discounted: (d,) array."""
-        return _diagnostic("ess", self.values, method="bulk")
+        return np.minimum(_diagnostic("ess", self.values, method="bulk"), self.distinct)
 
     @cached_property
     def ess_tail(self) -> Floats:
         """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
-        return _diagnostic("ess", self.values, method="tail", prob=0.05)
+        return np.minimum(_diagnostic("ess", self.values, method="tail", prob=0.05), self.distinct)
+
+    @cached_property
+    def distinct(self) -> int:
+        """Number of distinct draws, which no effective sample size exceeds."""
+        return len(np.unique(self.values.reshape(-1, self.values.shape[-1]), axis=0))
 
     def of(self, values: Floats, names: tuple[str, ...]) -> SmcDraws:
         """Return the same runs with other quantities (runs, draws, k) that follow from their draws."""
@@ -209,10 +212,11 @@ class SmcDraws:
         if not self.log_evidence_error < MAX_LOG_EVIDENCE_ERROR:
             found = f"the standard error of the log evidence is {self.log_evidence_error:.2f}"
             failures.append((f"{found} and must be below {MAX_LOG_EVIDENCE_ERROR}", MORE))
+        # Particles that hardly moved show in the diagnostics above; on their own they are no failure.
         stuck = np.count_nonzero(~self.moved)
-        if stuck > MAX_STUCK_SHARE * len(self.moved) or not self.moved[-1]:
-            found = f"at {stuck} of {len(self.moved)} temperatures the particles hardly moved"
-            failures.append((f"{found} in {self.sweeps.max()} sweeps", "more sweeps (max_sweeps)"))
+        if failures and stuck:
+            found = f"at {stuck} of {len(self.moved)} temperatures the particles still remember their start"
+            failures.append((f"{found} after {self.sweeps.max()} sweeps", "more sweeps (max_sweeps)"))
         return failures
 
 
