@@ -91,7 +91,7 @@ def sample_nuts_given(model: StatisticalModel, seed: int = 0, refusal: str = "")
     if given.effective < EFFECTIVE:
         found = sample_joint(model, seed, because=f"{because}bounds cut deep into the linear parameters; ")
     else:
-        reason = f"{because}NUTS on {', '.join(model.nonlinear)}, {given.rest}"
+        reason = f"{because}NUTS on {', '.join(model.nonlinear)}; {given.rest}"
         found = SampledSolution(model, "nuts", reason, given.draws(seed), given, sampled)
     if refusal and not _is_improper(model):
         by_smc = sample_smc_given(model, seed)
@@ -116,7 +116,7 @@ def sample_smc_given(model: StatisticalModel, seed: int = 0) -> SampledSolution:
         lambda h: density(h, data)[0], lambda h: density(h, data)[1], lower, upper, points, settings, model.nonlinear
     )
     given = _Given(model, density, data, sampled.values)
-    reason = f"tempered SMC on {', '.join(model.nonlinear)}, {given.rest}"
+    reason = f"tempered SMC on {', '.join(model.nonlinear)}; {given.rest}"
     found = SampledSolution(model, "smc", reason, given.draws(seed), given, sampled)
     if not _is_improper(model):
         found.log_evidence = sampled.log_evidence + given.log_mean_inside
@@ -148,7 +148,7 @@ class _Given:
     def rest(self) -> str:
         """What happened to the linear parameters, in words."""
         linear = ", ".join(self.model.linear)
-        return f"{linear} integrated in closed form, then drawn" if linear else "which are all parameters"
+        return f"{linear} integrated in closed form, then drawn" if linear else "these are all parameters"
 
     def components(self) -> Components:
         """Return the posterior as one Gaussian for each draw; points where bounds cut."""

@@ -244,7 +244,8 @@ def sample_smc(
     Parameters
     ----------
     log_likelihood : callable
-        Log likelihood of a (d,) JAX array inside the box; ``-inf`` or NaN where the likelihood is zero.
+        Log likelihood of a (d,) JAX array inside the box; not finite, NaN for instance, where the likelihood is
+        zero.
     log_prior : callable
         Log prior density, likewise, up to a constant.
     lower, upper : (d,) array
@@ -265,8 +266,8 @@ def sample_smc(
     Raises
     ------
     InputError
-        When the bounds, the draws or the names do not fit, a prior draw is outside the box or has no finite
-        prior density, or the likelihood is infinite at one.
+        When the bounds, the draws or the names do not fit, or a prior draw is outside the box or has no finite
+        prior density.
     ConvergenceError
         When a run has no prior draw with a positive likelihood, or the temperatures do not reach one.
 
@@ -300,7 +301,8 @@ def sample_smc(
     program = _compile(log_likelihood, log_prior, box)
     lines = _starting_lines(box, prior_draws, settings)
     log_likelihoods = _log_likelihoods_at_start(program, lines)
-    generator = np.random.default_rng(settings.seed)
+    # Not the plain seed: the caller may have drawn the prior's particles from it.
+    generator = np.random.default_rng([settings.seed, 3])
     mutation = _Mutation(program, settings, generator)
 
     temperature = 0.0
@@ -410,8 +412,8 @@ class _Mutation:
             leapfrogs = int(np.clip(np.ceil(LENGTH / self.step_size), 1, MAX_LEAPFROGS))
             # Jittered steps: no period of the dynamics resonates, and short ones enter narrow places.
             sizes = self.step_size * self.generator.uniform(0.2, 1.0, lines.shape[:2])
-            # A run jumps along the differences of its neighbour: its own particles remember where each one
-            # started, so that jumps along theirs drift outwards (by 0.25 in the log evidence of 15 parameters).
+            # A run jumps along the differences of its neighbour. Its own particles depend on where each one started:
+            # jumps along theirs biased the log evidence of 15 parameters by 0.25.
             jumps = _jumps(np.roll(start, 1, axis=0), self.generator)
             moves = self.program.sweep(key, lines, temperature, covariance, sizes, leapfrogs, jumps)
             lines, log_likelihoods, acceptance = (np.asarray(array) for array in moves)

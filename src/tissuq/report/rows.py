@@ -58,15 +58,16 @@ def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
     return readable
 
 
-def readable_methods(posteriors: Mapping[str, Posterior]) -> list[list[str]]:
-    """Return rows of formulation, method, what it did, error of the log evidence and convergence as text."""
-    rows = []
+def readable_methods(posteriors: Mapping[str, Posterior]) -> dict[str, str]:
+    """Return, for every formulation, by which method it was computed, how accurately, and whether it converged."""
+    texts = {}
     for formulation, posterior in posteriors.items():
         found, error = posterior.diagnostics, posterior.log_evidence_error
-        convergence = "nothing sampled" if found is None else found.verdict
-        row = [formulation, posterior.method, posterior.solution.reason, "" if error is None else f"{error:.0e}"]
-        rows.append([*row, convergence])
-    return rows
+        text = f"method {posterior.method}. {posterior.solution.reason}."
+        if error is not None:
+            text += f" Error of the log evidence: {error:.0e}."
+        texts[formulation] = text if found is None else f"{text} {found.verdict}"
+    return texts
 
 
 def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -> list[list[str]]:
