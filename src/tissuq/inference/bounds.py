@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ FloatArray = NDArray[np.float64]
 RESAMPLED = 4000
 REPRESENTED = 200
 """Components, at most, that are represented by points."""
-FEW_POINTS, ALL_POINTS = 2000, 50_000
+FEW_POINTS, ALL_POINTS = 2000, 400_000
 """Points, at least, that represent all of them together: few where they are a small share of the posterior."""
 SMALL_SHARE = 0.05
 
@@ -60,8 +61,13 @@ class Bounded:
         cut = [each for each in (*self.cut.values(), self.crossed) if len(each.weights)]
         whole = self.free
         for each in cut:
-            whole = whole.joined(_resampled(self._points(each), RESAMPLED // len(cut)))
+            points = self._crossed_points if each is self.crossed else self._points(each)
+            whole = whole.joined(_resampled(points, RESAMPLED // len(cut)))
         return whole
+
+    @cached_property
+    def _crossed_points(self) -> Components:
+        return self._points(self.crossed)
 
     def marginal(self, place: int) -> Marginal:
         """Return the marginal of one linear parameter: in closed form unless several bounds cut."""
@@ -79,7 +85,7 @@ class Bounded:
             marginal = marginal_of_cut_mixture(each.weights, each.mean, covariance, place, which, ends)
             parts.append((each.weights.sum(), marginal))
         if len(self.crossed.weights):
-            points = self._points(self.crossed)
+            points = self._crossed_points
             parts.append((points.weights.sum(), marginal_of_points(points.mean[:, place], points.weights, bounds)))
         return blended(parts, bounds)
 

@@ -22,12 +22,13 @@ TOUCHED = 1e-3 * NEGLIGIBLE
 SMALL = 1e-6
 """Mass outside below which the sum over parameters is near enough."""
 POINTS = 512
-MANY_POINTS = 16_384
+MANY_POINTS = 262_144
+MOST_POINTS = 8192
 FEW_POINTS = 128
 NEARLY_ALL = 1e-2
 """Mass outside up to which few points compute the mass inside: their error is a share of the mass outside."""
 SHIFTS = 8
-"""Shifted copies of the quasi-random points, whose spread tells the error."""
+"""Shifted copies of the quasi-random points, whose spread tells the error (more, where few points count)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +65,8 @@ class Boxes:
         Elsewhere it is computed over the parameters that come near their bounds: exactly for one, and by Genz's
         sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
         """
+        from scipy.special import logsumexp
+
         low, high = self._scores(mean, root)
         beyond = self.beyond(mean, root)
         outside = beyond.sum(axis=1)
@@ -79,16 +82,18 @@ class Boxes:
         for pattern in np.unique(effort[several], axis=0):
             crossed = np.flatnonzero(several & (effort == pattern).all(axis=1))
             kept = np.flatnonzero(pattern[1:])
+            kept = kept[np.argsort(-beyond[crossed][:, kept].mean(axis=0))]  # the tightest bound first
             covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
             triangle = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
             part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
-            number = FEW_POINTS if pattern[0] else max(POINTS, MANY_POINTS // len(crossed))
+            number = FEW_POINTS if pattern[0] else max(POINTS, min(MANY_POINTS // len(crossed), MOST_POINTS))
             log_weights, _ = part.points(mean[crossed][:, kept], triangle, number)
             top = log_weights.max(axis=1, keepdims=True)
             shares = np.exp(log_weights - top).reshape(len(crossed), SHIFTS, -1).mean(axis=2)
             mass = shares.mean(axis=1)
             log_mass[crossed] = top[:, 0] + np.log(mass)
-            error[crossed] = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / mass
+            effective = np.exp(2 * logsumexp(log_weights, axis=1) - logsumexp(2 * log_weights, axis=1))
+            error[crossed] = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / mass + 10 / effective**1.5
         return log_mass, error
 
     def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:

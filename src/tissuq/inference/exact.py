@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.errors import ModelError
+from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.bounds import bounded
 from tissuq.inference.conditional import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_quadrature
@@ -29,6 +29,8 @@ TOGETHER = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
 IRRELEVANT = 14.0
 """Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
+MOST_ERROR = 0.1
+"""Error of the log mass within bounds from which the result is refused."""
 HEAVY = 1e-6
 """Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
@@ -148,12 +150,18 @@ class ExactSolution(Solution):
             return
         heavy = np.flatnonzero((weights > HEAVY) & (beyond.sum(axis=1) > HEAVY))
         log_mass, error = box[np.zeros(len(heavy), dtype=int)].log_mass(parts.mean[heavy], parts.root[heavy])
+        error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(beyond.sum(axis=1), HEAVY))
+        if error_of_mass > MOST_ERROR:
+            raise ConvergenceError(
+                f"bounds of several linear parameters ({', '.join(self.model.linear)}) cut so deep that the mass within "
+                "them is not known well enough; use the method 'joint', or wider priors."
+            )
         if rule:
             self.log_evidence = float(rule.log_integral[index])
-            self.log_evidence_error = float(rule.log_error[index] + np.exp(-IRRELEVANT) + weights[heavy] @ error)
+            self.log_evidence_error = float(rule.log_error[index] + np.exp(-IRRELEVANT) + error_of_mass)
         else:
             self.log_evidence = float(given.log_likelihood[index, 0] + log_mass.sum())
-            self.log_evidence_error = float(error.sum())
+            self.log_evidence_error = error_of_mass
 
     @cached_property
     def components(self) -> Components:  # type: ignore[override]  # a cached property

@@ -27,6 +27,9 @@ COARSE = 101
 NODES = 160
 BETWEEN = 6
 FEW = 60
+MANY_VALUES = 300_000
+FAR = 15.0
+"""Standard deviations beyond a bound from which a cut Gaussian's variance is taken from its expansion."""
 FINE = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MANY_LINES = 2000
@@ -116,34 +119,37 @@ def marginal_of_cut_mixture(
     ends : tuple of float
         The bounds.
     """
-    from scipy.interpolate import CubicSpline
+    from scipy.interpolate import CubicHermiteSpline
 
     weights, means, covariances = _alike(weights / weights.sum(), means, covariances, (place, which))
     sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (place, which))
     low, high = ((end - means[:, which]) / sd_cut for end in ends)
     log_mass = log_interval(low, high)
-    at_low, at_high = (np.exp(-0.5 * score**2 - log_mass) / np.sqrt(2 * np.pi) for score in (low, high))
-    shift = at_low - at_high
-    ends_pull = np.where(np.isfinite(low), low, 0) * at_low - np.where(np.isfinite(high), high, 0) * at_high
-    shrink = 1 + ends_pull - shift**2
+    shift, shrink = _cut_moments(low, high, log_mass)
     along = covariances[:, place, which] / sd_cut
     own_mean = means[:, place] + along * shift
     own_variance = np.maximum(sd**2 - along**2 * (1 - shrink), 0.0)
     mean = float(weights @ own_mean)
     variance = float(weights @ (own_variance + (own_mean - mean) ** 2))
-    scores = np.linspace(-8, 8, 33)
+    scores = np.linspace(-25, 25, 51)  # what a bound leaves may have an exponential tail
     spread = own_mean[:, None] + np.sqrt(own_variance)[:, None] * scores
     limits = ends if place == which else (-np.inf, np.inf)
     reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
-    shares = weights[:, None] * np.exp(-0.5 * scores**2)
-    coarse = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, 2 * NODES)
+    shares = weights[:, None] * np.exp(-np.abs(scores))
+    count = max(2 * NODES, min(8 * NODES, MANY_VALUES // len(weights)))
+    coarse = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, count)
     scores = (coarse - means[:, place, None]) / sd[:, None]
     log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
+    rise = -scores
     if place != which:
         correlation = np.clip(along / sd, -1 + 1e-12, 1 - 1e-12)[:, None]
         rest = np.sqrt(1 - correlation**2)
-        log_density += log_interval(*((end[:, None] - correlation * scores) / rest for end in (low, high)))
-    smooth = CubicSpline(coarse, weights @ np.exp(log_density))
+        low_given, high_given = ((end[:, None] - correlation * scores) / rest for end in (low, high))
+        log_given = log_interval(low_given, high_given)
+        log_density += log_given
+        rise += correlation / rest * (_height(low_given, log_given) - _height(high_given, log_given))
+    heights = weights[:, None] * np.exp(log_density)
+    smooth = CubicHermiteSpline(coarse, heights.sum(axis=0), (heights * rise / sd[:, None]).sum(axis=0))
     points = _between(coarse)
     cumulative = smooth.antiderivative()(points)
     return Marginal(mean, float(np.sqrt(variance)), points, np.maximum(smooth(points), 0.0), _proper(cumulative))
@@ -213,6 +219,25 @@ def _grid(values: FloatArray, weights: FloatArray, ends: tuple[float, float], co
     core = np.interp(np.array([1e-4, 1 - 1e-4]) * cumulative[-1], cumulative, values[order])
     even = np.linspace(max(ends[0], core[0]), min(ends[1], core[1]), count // 2)
     return np.unique(np.clip(np.concatenate([close, even, ends]), *ends))
+
+
+def _cut_moments(low: FloatArray, high: FloatArray, log_mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return means and variances of standard normal variables between bounds.
+
+    Far beyond a bound the usual formula cancels; what is left there is nearly exponential.
+    """
+    at_low, at_high = _height(low, log_mass), _height(high, log_mass)
+    mean = at_low - at_high
+    pull = np.where(np.isfinite(low), low, 0.0) * at_low - np.where(np.isfinite(high), high, 0.0) * at_high
+    nearest = np.maximum(low, -high)
+    far = np.maximum(nearest, FAR)
+    is_far = (nearest > FAR) & (far * (high - low) > 40)
+    return mean, np.where(is_far, far**-2 * (1 - 6 * far**-2 + 50 * far**-4), 1 + pull - mean**2)
+
+
+def _height(score: FloatArray, log_mass: FloatArray) -> FloatArray:
+    """Return the standard normal density over a mass."""
+    return np.asarray(np.exp(-0.5 * score**2 - log_mass) / np.sqrt(2 * np.pi))
 
 
 def _between(coarse: FloatArray) -> FloatArray:

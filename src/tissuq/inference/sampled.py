@@ -135,13 +135,14 @@ class _Given:
         supports = np.array([model.priors[symbol].support for symbol in model.linear]).reshape(-1, 2)
         lower, upper = (np.broadcast_to(ends, mean.shape) for ends in supports.T)
         self._boxes = Boxes(lower, upper)
-        self._log_inside, _ = self._boxes.log_mass(mean, root)
+        self._log_inside, error = self._boxes.log_mass(mean, root)
         top = self._log_inside.max()
         self._inside = np.exp(self._log_inside - top)
         self.log_mean_inside = float(top + np.log(self._inside.mean()))
         count = len(self._inside)
         self.effective = float(self._inside.sum() ** 2 / (self._inside @ self._inside) / count)
-        self.log_mean_inside_error = float(self._inside.std() / self._inside.mean() / np.sqrt(count))
+        own = float(self._inside.std() / self._inside.mean() / np.sqrt(count))
+        self.log_mean_inside_error = own + float(self._inside @ error / self._inside.sum())
         self.is_cut = bool((self._log_inside < -1e-8).any())
 
     @property
