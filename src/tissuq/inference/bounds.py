@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 RESAMPLED = 4000
 REPRESENTED = 200
 """Components, at most, that are represented by points."""
-FEW_POINTS, ALL_POINTS = 2000, 400_000
+FEW_POINTS, ALL_POINTS = 2000, 1_200_000
 """Points, at least, that represent all of them together: few where they are a small share of the posterior."""
 SMALL_SHARE = 0.05
 
@@ -94,7 +94,11 @@ class Bounded:
         share = components.weights.sum()
         total = ALL_POINTS if share > SMALL_SHARE else FEW_POINTS
         every = self.box[np.zeros(len(few.weights), dtype=int)]
-        log_shares, points = every.points(few.mean, few.root, max(64, total // len(few.weights)))
+        order = np.argsort(-(few.weights @ every.beyond(few.mean, few.root)))  # the tightest bound first
+        tight = Boxes(every.lower[:, order], every.upper[:, order])
+        number = max(64, total // len(few.weights))
+        log_shares, points = tight.points(few.mean[:, order], few.root[:, order], number)
+        points = points[:, :, np.argsort(order)]
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
         kept = weights > 1e-12 * weights.max()

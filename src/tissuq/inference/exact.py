@@ -120,11 +120,17 @@ class _Integration:
         given = self.conditional(h)
         value = given.log_likelihood + self._ceiling(given) + log_prior_density(self._priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
-        relevant = value > np.maximum(self._top, value.max(axis=1, keepdims=True)) - IRRELEVANT
-        data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
-        log_mass, _ = self.conditional.boxes[data_set].log_mass(given.mean[relevant], given.root[relevant])
-        value[relevant] += log_mass - self._ceiling(given)[relevant]
-        self._top = np.maximum(self._top, value.max(axis=1, keepdims=True))
+        surplus = self._ceiling(given)
+        known = np.zeros(value.shape, dtype=bool)
+        for margin in (0.0, IRRELEVANT):  # the best ones first, which tell what matters
+            floor = self._top if margin else value.max(axis=1, keepdims=True)
+            relevant = ~known & (value >= floor - margin) & np.isfinite(value)
+            data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
+            log_mass, _ = self.conditional.boxes[data_set].log_mass(given.mean[relevant], given.root[relevant])
+            value[relevant] += log_mass - surplus[relevant]
+            known |= relevant
+            exact = np.where(known, value, -np.inf)
+            self._top = np.maximum(self._top, exact.max(axis=1, keepdims=True))
         return value
 
     def _ceiling(self, given: Conditional) -> FloatArray:
@@ -153,8 +159,8 @@ class ExactSolution(Solution):
         error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(beyond.sum(axis=1), HEAVY))
         if error_of_mass > MOST_ERROR:
             raise ConvergenceError(
-                f"bounds of several linear parameters ({', '.join(self.model.linear)}) cut so deep that the mass within "
-                "them is not known well enough; use the method 'joint', or wider priors."
+                f"bounds of several linear parameters ({', '.join(self.model.linear)}) cut so deep that the mass "
+                "within them is not known well enough; use the method 'joint', or wider priors."
             )
         if rule:
             self.log_evidence = float(rule.log_integral[index])
