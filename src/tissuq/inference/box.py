@@ -22,8 +22,13 @@ TOUCHED = 1e-3 * NEGLIGIBLE
 SMALL = 1e-6
 """Mass outside below which the sum over parameters is near enough."""
 POINTS = 512
-MANY_POINTS = 262_144
-MOST_POINTS = 8192
+ACCURATE = 1e-3
+"""Error of the log mass from which more points are taken."""
+DEEP = 15.0
+"""Log of the mass within all bounds, relative to the least within one, below which the points may have missed it."""
+AT_ONCE = 500_000
+"""Points at once: what bounds the memory."""
+MOST_POINTS = 30_000
 FEW_POINTS = 128
 NEARLY_ALL = 1e-2
 """Mass outside up to which few points compute the mass inside: their error is a share of the mass outside."""
@@ -65,8 +70,6 @@ class Boxes:
         Elsewhere it is computed over the parameters that come near their bounds: exactly for one, and by Genz's
         sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
         """
-        from scipy.special import logsumexp
-
         low, high = self._scores(mean, root)
         beyond = self.beyond(mean, root)
         outside = beyond.sum(axis=1)
@@ -86,14 +89,29 @@ class Boxes:
             covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
             triangle = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
             part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
-            number = FEW_POINTS if pattern[0] else max(POINTS, min(MANY_POINTS // len(crossed), MOST_POINTS))
-            log_weights, _ = part.points(mean[crossed][:, kept], triangle, number)
+            found = part._by_points(mean[crossed][:, kept], triangle, FEW_POINTS if pattern[0] else POINTS)
+            log_mass[crossed], error[crossed] = found
+            # The error is not to be trusted where no bound alone tells how little is left.
+            ceiling = part.ceiling(mean[crossed][:, kept], triangle)
+            error[crossed] += np.where(ceiling - log_mass[crossed] > DEEP, 1.0, 0.0)
+        return log_mass, error
+
+    def _by_points(self, mean: FloatArray, root: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
+        """Return the log mass inside the bounds and its error by quasi-random points; more of them where needed."""
+        from scipy.special import logsumexp
+
+        log_mass, error = np.empty(len(mean)), np.empty(len(mean))
+        for block in np.array_split(np.arange(len(mean)), 1 + len(mean) * number // AT_ONCE):
+            log_weights, _ = self[block].points(mean[block], root[block], number)
             top = log_weights.max(axis=1, keepdims=True)
-            shares = np.exp(log_weights - top).reshape(len(crossed), SHIFTS, -1).mean(axis=2)
-            mass = shares.mean(axis=1)
-            log_mass[crossed] = top[:, 0] + np.log(mass)
+            shares = np.exp(log_weights - top).reshape(len(block), SHIFTS, -1).mean(axis=2)
+            log_mass[block] = top[:, 0] + np.log(shares.mean(axis=1))
             effective = np.exp(2 * logsumexp(log_weights, axis=1) - logsumexp(2 * log_weights, axis=1))
-            error[crossed] = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / mass + 10 / effective**1.5
+            spread = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / shares.mean(axis=1)
+            error[block] = spread + 10 / effective**1.5
+        rough = np.flatnonzero(error > ACCURATE)
+        if len(rough) and number < MOST_POINTS:
+            log_mass[rough], error[rough] = self[rough]._by_points(mean[rough], root[rough], 8 * number)
         return log_mass, error
 
     def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
