@@ -22,6 +22,8 @@ from tissuq.priors import Prior
 __all__ = ["METHODS", "Method", "fit", "fit_many"]
 
 Method = Literal["auto", "exact", "nuts", "smc", "joint"]
+FACTORISED = 3
+"""Parameters of the structure from which `auto` samples."""
 METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
 
 
@@ -189,7 +191,7 @@ class _Recipe:
         """Solve models on the same stretches: together by the exact route, one by one by the others."""
         if self.method != "auto":
             return solve_exactly(models, self.seed) if self.method == "exact" else [self._sample(m) for m in models]
-        refusal = why_not_exact(models[0])
+        refusal = why_not_exact(models[0]) or _why_not_soon(models[0])
         if not refusal:
             try:
                 return solve_exactly(models, self.seed)
@@ -212,3 +214,10 @@ class _Recipe:
         if self.method == "smc":
             return sampled.sample_smc_given(model, self.seed)
         return sampled.sample_nuts_given(model, self.seed, refusal)
+
+
+def _why_not_soon(model: StatisticalModel) -> str:
+    """Return why the exact route, which applies, would take minutes; or nothing."""
+    if len(model.structure) < FACTORISED:
+        return ""
+    return f"each of {', '.join(model.structure)} costs a factorisation to vary, which would take minutes"

@@ -24,6 +24,8 @@ __all__ = ["StatisticalModel"]
 
 FloatArray = NDArray[np.float64]
 
+BENT_QUANTILES = (0.001, 0.1, 0.5, 0.9, 0.999)
+"""Probabilities of the exponents' priors at which the size of a box is judged."""
 BOX_MARGIN = 10.0
 """Default boxes of linear parameters reach this many times further than least squares could."""
 
@@ -169,7 +171,7 @@ class StatisticalModel:
 
     def white_variance(self, values: Mapping[str, Any], level: Any = 0.0) -> Any:
         """Return the variance (MPa^2) of all that is independent from measurement to measurement."""
-        own = 0.0 if self.noise.shares_discrepancy else self.discrepancy.independent_variance(values)
+        own = 0.0 if self.is_repeated else self.discrepancy.independent_variance(values)
         return self.noise_variance(values, level) + own
 
     @cached_property
@@ -185,8 +187,8 @@ class StatisticalModel:
     @cached_property
     def is_repeated(self) -> bool:
         """Whether measurements at one stretch share an otherwise independent discrepancy."""
-        has_own = not self.discrepancy.is_correlated and "S" in self.symbols
-        return self.noise.shares_discrepancy and has_own
+        is_only_scattered = self.discrepancy.is_scattered and not self.discrepancy.is_correlated
+        return self.noise.shares_discrepancy and is_only_scattered
 
     def correlated_variance(self, values: Mapping[str, Any]) -> Any:
         """Return the variance (MPa^2) of the correlated part of the discrepancy."""
@@ -203,7 +205,7 @@ class StatisticalModel:
     def confounds_noise(self) -> bool:
         """Whether only the sum of noise and discrepancy variance is in the data, whatever they are."""
         is_one_level = not self.noise.depends_on_level and not self.noise.shares_discrepancy
-        return bool(self.noise.parameters) and is_one_level and "S" in self.symbols
+        return bool(self.noise.parameters) and is_one_level and self.discrepancy.is_scattered
 
     def _rows(self) -> Iterator[FloatArray]:
         """Yield the rows [X y], block by block; every block has one length, so that JAX compiles once."""
@@ -220,9 +222,19 @@ class StatisticalModel:
     @cached_property
     def _usual_bent(self) -> tuple[float, ...]:
         """The medians of the priors of `bent_symbols`."""
+        return tuple(float(prior.quantile(0.5)) for prior in self._bent_priors())
+
+    def _bent_priors(self) -> list[Prior]:
         own = {p.symbol: p for p in self.material.parameters}
-        priors = [self._chosen_prior(own[s]) or self._default_scale_prior(own[s]) for s in self.bent_symbols]
-        return tuple(float(prior.quantile(0.5)) for prior in priors)
+        return [self._chosen_prior(own[s]) or self._default_scale_prior(own[s]) for s in self.bent_symbols]
+
+    def _shortest_columns(self) -> FloatArray:
+        """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
+        stretch = self.experiment.stretch
+        some = stretch[:: max(1, len(stretch) // CHUNK)]
+        bent = np.array([[prior.quantile(q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
+        columns = stress_basis(self.material, self.experiment.mode, some, bent)
+        return np.asarray(np.linalg.norm(columns, axis=1).min(axis=0) * np.sqrt(len(stretch) / len(some)))
 
     def _chosen_prior(self, parameter: Parameter) -> Prior | None:
         prior = self.chosen_priors.get(parameter.symbol)
@@ -251,16 +263,20 @@ class StatisticalModel:
         """Return uniform priors that hold the least-squares solution with a margin, whatever the units.
 
         |b_j| <= ||row j of pinv(X)|| ||y|| bounds every least-squares coefficient. The material's boxes come from
-        its own columns alone, so that they are the same for every discrepancy.
+        its own columns alone, so that they are the same for every discrepancy. Where these depend on exponents, the
+        shortest column over the prior of the exponents takes the place of the row: 1 / ||x_j|| is its length when
+        the columns are orthogonal, and exponents that nearly agree would make it infinite.
         """
         triangle = self.statistics.triangle
         own = sum(p.is_linear for p in self.material.parameters)
         of_material, of_all = (np.linalg.inv(triangle[:k, :k]) for k in (own, len(self.column_symbols)))
-        rows = [*of_material, *of_all[own:]]
+        lengths = np.array([np.linalg.norm(row) for row in (*of_material, *of_all[own:])])
+        if self.bent_symbols:
+            lengths[:own] = 1 / self._shortest_columns()
         size = float(np.linalg.norm(triangle[:, -1]))
         boxes: dict[str, Prior] = {}
-        for parameter, row in zip((p for p in self.parameters if p.is_linear), rows, strict=True):
-            reach = BOX_MARGIN * float(np.linalg.norm(row)) * size
+        for parameter, length in zip((p for p in self.parameters if p.is_linear), lengths, strict=True):
+            reach = BOX_MARGIN * float(length) * size
             low, high = parameter.support
             boxes[parameter.symbol] = Uniform(max(low, -reach), min(high, reach))
         return boxes

@@ -74,7 +74,7 @@ def fit(
         options["columns"] = once_each("--column", map(_role, column))
     if not file and not config:
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
-    settings = load_settings(SpecimenSettings, config, options)
+    settings = load_settings(SpecimenSettings, config, options, rivals=("noise", "noise_sd"))
     beside = config.parent if config else Path()
     source = beside / settings.file
     if file and config:

@@ -24,11 +24,18 @@ Settings = TypeVar("Settings", bound="BaseModel")
 NOT_CONVERGED = 3
 
 
-def load_settings(kind: type[Settings], config: Path | None, options: dict[str, Any]) -> Settings:
-    """Return validated settings from a TOML file (or nothing) and the options of the command line, which prevail."""
+def load_settings(
+    kind: type[Settings], config: Path | None, options: dict[str, Any], rivals: tuple[str, ...] = ()
+) -> Settings:
+    """Return validated settings from a TOML file (or nothing) and the options of the command line, which prevail.
+
+    Of ``rivals`` only one can be set: an option for one of them puts the others in the file out of force.
+    """
     from pydantic import ValidationError
 
     given = _read_toml(config) if config else {}
+    if any(options.get(name) is not None for name in rivals):
+        given = {name: value for name, value in given.items() if name not in rivals}
     for name, value in options.items():
         both = isinstance(value, dict) and isinstance(given.get(name), dict)
         if value is not None:
@@ -58,7 +65,7 @@ def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
     symbol, distribution, numbers = match.groups()
     known = fields(find(Prior, "prior distribution", distribution, InputError))
     try:
-        values = [float(number) for number in numbers.split(",")]
+        values = [float(number) for number in numbers.split(",")] if numbers.strip() else []
     except ValueError as error:
         raise InputError(f"prior '{text}': its arguments must be numbers with a decimal point.") from error
     names, needed = [field.name for field in known], sum(field.default is MISSING for field in known)
@@ -95,7 +102,7 @@ def not_converged(names: list[str]) -> None:
     if names:
         typer.echo(
             f"tissuq: sampling has NOT converged for {', '.join(names)}; do not use these results. "
-            "Try another method (--method exact or smc), narrower priors or another seed.",
+            "Try another method, narrower priors or another seed.",
             err=True,
         )
         raise typer.Exit(NOT_CONVERGED)

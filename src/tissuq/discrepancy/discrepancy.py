@@ -54,6 +54,11 @@ class Discrepancy(ABC):
         raise NotImplementedError(f"discrepancy '{self.name}' has no correlated part")
 
     @property
+    def is_scattered(self) -> bool:
+        """Whether it has an independent part."""
+        return bool(self.independent_variance({p.symbol: 1.0 for p in self.parameters}))
+
+    @property
     def is_correlated(self) -> bool:
         """Whether the discrepancy at one stretch tells something about another."""
         return bool(self.shape_symbols)

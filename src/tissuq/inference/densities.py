@@ -7,7 +7,6 @@ from functools import lru_cache, partial
 from math import log, pi
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import solve_triangular
@@ -43,19 +42,14 @@ def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
     gaussians = np.array([model.priors[s].gaussian for s in model.linear], dtype=np.float64).reshape(-1, 3)
     data: dict[str, Any] = {"mean": gaussians[:, 0], "precision": gaussians[:, 1], "constant": gaussians[:, 2].sum()}
     if _has_fixed_directions(model):
-        (reduced,) = (jax.tree.map(np.squeeze, vars(Reducer([model])(np.zeros((1, 0))))),)
-        p, q = len(model.linear), len(model.column_symbols) + 1
-        data |= {name: reduced[name].reshape(-1) for name in ("counts", "values", "levels")}
-        data |= {"inverse": reduced["inverse"].reshape(p, p), "centre": reduced["centre"].reshape(p)}
-        data |= {"log_size": reduced["log_size"], "squares": reduced["squares"].reshape(-1, q * q)}
+        reduced = {name: array[0] for name, array in vars(Reducer([model])(np.zeros((1, 0)))).items()}
+        data |= {name: reduced[name] for name in ("counts", "values", "levels", "inverse", "log_size")}
+        data |= {"centre": reduced["centre"][0], "squares": reduced["squares"][0]}
         data["count"] = float(len(model.experiment))
     else:
-        columns = model.design[:, [model.column_symbols.index(symbol) for symbol in model.linear]]
-        inverse = np.linalg.inv(np.linalg.qr(columns, mode="r"))
-        data |= _measurements(model) | {"inverse": inverse, "centre": np.zeros(len(inverse))}
-        data["log_size"] = -np.linalg.slogdet(inverse)[1]
+        data |= _measurements(model)
         if not model.bent_symbols:
-            data["design"] = model.design
+            data["columns"] = tuple(np.asarray(part) for part in _orthogonal(model, model.design, data["stress"]))
     return _remembered(_given, model), data
 
 
@@ -129,13 +123,24 @@ def _joint(model: StatisticalModel, vector: Any, data: Mapping[str, Any]) -> Any
     return _log_prior(model, values) - 0.5 * exponent
 
 
+def _orthogonal(model: StatisticalModel, design: Any, stress: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the data matrix [Q, F, e], the inverse triangle of the linear columns, their centre and log size."""
+    free = [model.column_symbols.index(symbol) for symbol in model.linear]
+    fixed = [place for place in range(len(model.column_symbols)) if place not in free]
+    basis, triangle = jnp.linalg.qr(design[:, free])
+    inverse = solve_triangular(triangle, jnp.eye(len(free)))
+    centre = inverse @ (basis.T @ stress)
+    columns = jnp.hstack([basis, design[:, fixed], (stress - design[:, free] @ centre)[:, None]])
+    return columns, inverse, centre, jnp.log(jnp.abs(jnp.diag(triangle))).sum()
+
+
 def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
     values = dict(zip(model.nonlinear, h, strict=True))
-    p, inverse = len(model.linear), data["inverse"]
-    moments, log_determinant, count = _moments(model, values, data)
+    p = len(model.linear)
+    moments, log_determinant, count, (inverse, centre, log_size) = _moments(model, values, data)
     fixed = [values[symbol] for symbol in model.column_symbols if symbol not in model.linear]
     rest = jnp.stack([*(-value for value in fixed), jnp.ones(())])
-    offset, weight = data["mean"] - data["centre"], data["precision"]
+    offset, weight = data["mean"] - centre, data["precision"]
     precision = moments[:p, :p] + inverse.T @ (weight[:, None] * inverse)
     pull = moments[:p, p:] @ rest + inverse.T @ (weight * offset)
     misfit = rest @ moments[p:, p:] @ rest + weight @ offset**2
@@ -143,22 +148,22 @@ def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[An
     whitened = solve_triangular(cholesky, pull, lower=True)
     root = inverse @ solve_triangular(cholesky, jnp.eye(p), lower=True).T
     exponent = misfit - whitened @ whitened + log_determinant + (count - p) * log(2 * pi)
-    log_volume = -jnp.log(jnp.diag(cholesky)).sum() - data["log_size"]
-    log_likelihood = data["constant"] + log_volume - 0.5 * exponent
-    return log_likelihood, _log_prior(model, values), data["centre"] + root @ whitened, root
+    log_likelihood = data["constant"] - jnp.log(jnp.diag(cholesky)).sum() - log_size - 0.5 * exponent
+    return log_likelihood, _log_prior(model, values), centre + root @ whitened, root
 
 
-def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Any]:
-    """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, and the number of measurements."""
+def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
+    """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, the number of measurements, and what Q rests on."""
     q = len(model.column_symbols) + 1
     if _has_fixed_directions(model):
         variances = model.white_variance(values, data["levels"]) + model.correlated_variance(values) * data["values"]
         variances = jnp.broadcast_to(variances, data["counts"].shape)
         moments = ((1 / variances) @ data["squares"]).reshape(q, q)
-        return moments, data["counts"] @ jnp.log(variances), data["count"]
-    design = _design(model, values, data)
-    free = [model.column_symbols.index(symbol) for symbol in model.linear]
-    fixed = [place for place in range(q - 1) if place not in free]
-    columns = jnp.hstack([design[:, free] @ data["inverse"], design[:, fixed], data["stress"][:, None]])
+        rests_on = data["inverse"], data["centre"], data["log_size"]
+        return moments, data["counts"] @ jnp.log(variances), data["count"], rests_on
+    if model.bent_symbols:
+        columns, *rest = _orthogonal(model, _design(model, values, data), data["stress"])
+    else:
+        columns, *rest = data["columns"]
     whitened, log_determinant = _whitened(model, values, data, columns)
-    return whitened.T @ whitened, log_determinant, len(columns)
+    return whitened.T @ whitened, log_determinant, len(columns), rest

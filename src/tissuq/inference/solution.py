@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -81,12 +80,15 @@ class Marginals(Mapping[str, Marginal]):
     """The marginal posterior of every parameter, each computed when it is first asked for."""
 
     def __init__(self, symbols: Sequence[str], compute: Callable[[str], Marginal]) -> None:
-        self._symbols, self._compute = tuple(symbols), lru_cache(maxsize=None)(compute)
+        self._symbols, self._compute = tuple(symbols), compute
+        self._known: dict[str, Marginal] = {}
 
     def __getitem__(self, symbol: str) -> Marginal:
         if symbol not in self._symbols:
             raise KeyError(symbol)
-        return self._compute(symbol)
+        if symbol not in self._known:
+            self._known[symbol] = self._compute(symbol)
+        return self._known[symbol]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._symbols)

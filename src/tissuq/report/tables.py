@@ -38,7 +38,10 @@ def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: f
 
 def headline_of(row: Row) -> str:
     """Return the parameter whose posterior the row of a formulation gives."""
-    return next(name.removesuffix("_mean") for name in row if name.endswith("_mean"))
+    names = [name.removesuffix("_mean") for name in row if name.endswith("_mean")]
+    if not names:
+        raise KeyError("the row names no parameter")
+    return names[0]
 
 
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
