@@ -193,9 +193,7 @@ def integrate(problem: Problem, wanted: str = "", refine: float = 1.0, nodes: in
     )
     centre = float(steps @ (density * grid)) / float(steps @ density)
     sd = float(np.sqrt(steps @ (density * (grid - centre) ** 2) / (steps @ density)))
-    return Dense(
-        log_evidence, means, sds, centre, sd, shortest(grid, density), grid, density, weights, h
-    )
+    return Dense(log_evidence, means, sds, centre, sd, shortest(grid, density), grid, density, weights, h)
 
 
 def log_box_mass(mean: Array, covariance: Array, bounds: Array, order: int, log_weights: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def solution(statistics):
 def test_any_split_of_the_rows_has_the_same_sums_of_squares_and_products(seed, count, columns, cuts):
     rows = np.random.default_rng(seed).standard_normal((count, columns + 1))
     edges = [0, *sorted({cut for cut in cuts if cut < count}), count]
-    blocks = [rows[start:end] for start, end in zip(edges, edges[1:], strict=False)]
+    blocks = [rows[start:end] for start, end in pairwise(edges)]
     found = Statistics.of_rows(blocks)
     joined = Statistics.of_rows(blocks[:1])
     for block in blocks[1:]:

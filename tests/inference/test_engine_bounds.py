@@ -73,7 +73,7 @@ def test_noise_so_large_that_every_bound_cuts(discrepancy):
 
 def narrow(discrepancy):
     """Return a prior under which all linear parameters are positive."""
-    boxes = {symbol: (0.0, 5.0) for symbol in BOXES}
+    boxes = dict.fromkeys(BOXES, (0.0, 5.0))
     return parts(discrepancy, boxes, {"S": Axis(0, 3, 0.01), "c": Axis(0, 3, 0.01), "psi": Axis(0.05, 2, 0.05)})
 
 

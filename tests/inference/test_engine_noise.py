@@ -30,7 +30,8 @@ def growing(stretch, seed, floor=0.03, share=0.08):
 def test_unknown_noise(discrepancy):
     linear, axes = parts(discrepancy)
     stress = growing(STRETCH, 1)
-    posterior, problem = both(discrepancy, STRETCH, stress, None, linear, axes | {"noise_sd": NOISE_SD}, noise="unknown")
+    axes = axes | {"noise_sd": NOISE_SD}
+    posterior, problem = both(discrepancy, STRETCH, stress, None, linear, axes, noise="unknown")
     truth = assert_agrees(posterior, problem)
     found = posterior.solution.marginals["noise_sd"]
     assert abs(found.mean - truth.means["noise_sd"]) <= 1e-3 * truth.sds["noise_sd"]
@@ -44,7 +45,8 @@ def test_noise_that_grows_with_the_stress(discrepancy):
     stress = growing(STRETCH, 2)
     data = tq.Experiment("uniaxial", STRETCH, stress)
     model = tq.fit(data, discrepancy="none", noise="proportional").model
-    posterior, problem = both(discrepancy, STRETCH, stress, None, linear, axes, noise="proportional", level=model.levels)
+    options = {"noise": "proportional", "level": model.levels}
+    posterior, problem = both(discrepancy, STRETCH, stress, None, linear, axes, **options)
     truth = assert_agrees(posterior, problem, nodes=0 if discrepancy == "none" else 6)
     for symbol, mean in truth.means.items():
         found = posterior.solution.marginals[symbol]

@@ -121,7 +121,9 @@ def test_three_terms_with_everything_unknown_go_to_nuts_with_an_evidence_by_smc(
 
     from tissuq.inference import sampled
 
-    for name, short in (("SmcSettings", {"particles": 400, "max_sweeps": 2, "ess_fraction": 0.5}), ("NutsSettings", {"warmup": 60, "draws": 30})):
+    few = {"SmcSettings": {"particles": 400, "max_sweeps": 2, "ess_fraction": 0.5}}
+    few |= {"NutsSettings": {"warmup": 60, "draws": 30}}
+    for name, short in few.items():
         kind = getattr(sampled, name)
         monkeypatch.setattr(sampled, name, lambda kind=kind, short=short, **options: replace(kind(**options), **short))
     truth = {"mu1": 0.5, "mu2": 0.1, "mu3": 0.2, "alpha1": 1.3, "alpha2": 5.0, "alpha3": -2.0}
