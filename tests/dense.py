@@ -107,8 +107,8 @@ class Dense:
     def mass(self, low: float, high: float) -> float:
         """Return the probability of the wanted parameter between two values."""
         fine, value = _finely(self.grid, self.density)
-        below = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]))])
-        return float(np.diff(np.interp([low, high], fine, below))[0] / below[-1])
+        below = cumulative(fine, value)
+        return float(np.diff(np.interp([low, high], fine, below))[0])
 
 
 def columns(names: Sequence[str], stretch: Array) -> Array:
@@ -264,21 +264,27 @@ def log_interval(low: Array, high: Array) -> Array:
 def shortest(grid: Array, density: Array, mass: float = 0.95) -> tuple[float, float]:
     """Return the shortest interval that holds a mass, from a density on a grid."""
     fine, value = _finely(grid, density)
-    below = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]))])
-    below /= below[-1]
+    below = cumulative(fine, value)
     alphas = np.linspace(0, 1 - mass, 20_001)
     low, high = np.interp(alphas, below, fine), np.interp(alphas + mass, below, fine)
     best = int((high - low).argmin())
     return float(low[best]), float(high[best])
 
 
+def cumulative(points: Array, density: Array) -> Array:
+    """Return the cumulative probabilities at points, by trapezoids."""
+    below = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(points))])
+    return below / below[-1]
+
+
 def _finely(grid: Array, density: Array) -> tuple[Array, Array]:
-    """Return a fine even grid that reaches half a step beyond Gauss nodes, as far as their panels, and the density."""
+    """Return many points between the nodes, and a little beyond them as far as their panels, with the density."""
     nodes = np.polynomial.legendre.leggauss(8)[0]
-    start = grid[0] - (grid[7] - grid[0]) * (1 + nodes[0]) / (nodes[7] - nodes[0])
-    end = grid[-1] + (grid[-1] - grid[-8]) * (1 + nodes[0]) / (nodes[7] - nodes[0])
+    beyond = (1 + nodes[0]) / (nodes[7] - nodes[0])
+    ends = grid[0] - (grid[7] - grid[0]) * beyond, grid[-1] + (grid[-1] - grid[-8]) * beyond
     seen = density > 1e-10 * density.max()
-    fine = np.linspace(start if seen[0] else grid[seen][0], end if seen[-1] else grid[seen][-1], 200_001)
+    kept = np.concatenate([[ends[0]] if seen[0] else [], grid[seen], [ends[1]] if seen[-1] else []])
+    fine = np.interp(np.linspace(0, len(kept) - 1, 200_001), np.arange(len(kept)), kept)
     return fine, np.exp(CubicSpline(grid[seen], np.log(density[seen]))(fine))
 
 
@@ -296,7 +302,13 @@ def _density(
         density = _density_at(grid, log, mean, covariance, bounds, place, order // 2)
         seen = np.flatnonzero(density > density.max() * np.exp(-NEGLIGIBLE))
         low, high = grid[max(seen[0] - 1, 0)], grid[min(seen[-1] + 1, 200)]
-    grid, steps = _panels(low, high, round(40 * refine), 8)
+    # Close where most of the density is, however far its tails reach.
+    order_of_sd = np.argsort(sd)
+    shares = np.cumsum(np.exp(log - log.max())[order_of_sd])
+    width = min(sd[order_of_sd][np.searchsorted(shares, 0.5 * shares[-1])], high - low)
+    centre = grid[density.argmax()]
+    t, steps = _panels(*np.arcsinh((np.array([low, high]) - centre) / width), round(40 * refine), 8)
+    grid, steps = np.clip(centre + width * np.sinh(t), low, high), steps * width * np.cosh(t)
     density = _density_at(grid, log, mean, covariance, bounds, place, order)
     return grid, steps, density
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.inference.solution import Solution
 
 __all__ = ["warnings_about"]
 
-INSEPARABLE = -0.8
-"""Correlation of two variances below which the data hold only their sum."""
+INSEPARABLE = 0.1
+"""Noise and discrepancy are inseparable when either may be less than this share of both (5 % of the draws each)."""
 HIGH = 0.1
 """Density at a bound, relative to the largest, above which the bound decides."""
 
@@ -40,22 +39,16 @@ def warnings_about(solution: Solution) -> Iterator[str]:
 
 
 def _noise_is_inseparable(solution: Solution) -> bool:
-    """Return whether draws of the noise's and the discrepancy's variances fall and rise against each other."""
+    """Return whether the noise may be almost all or almost nothing of the variance that both have together."""
     model = solution.model
-    is_free = any(symbol in model.nonlinear for symbol in (p.symbol for p in model.discrepancy.parameters))
+    is_free = any(parameter.symbol in model.nonlinear for parameter in model.discrepancy.parameters)
     if not model.noise.parameters or not is_free:
         return False
     values = {symbol: drawn.ravel() for symbol, drawn in solution.draws.items()}
-    level = float(model.levels.mean()) if model.noise.depends_on_level else 0.0
-    noise = np.broadcast_to(model.noise_variance(values, level), solution.draws[model.symbols[0]].size)
+    noise = model.noise_variance(values, float(model.levels.mean()) if model.noise.depends_on_level else 0.0)
     own = model.discrepancy.independent_variance(values) + model.discrepancy.correlated_variance(values)
-    return _correlation(noise, np.broadcast_to(own, noise.shape)) < INSEPARABLE
-
-
-def _correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    if not np.ptp(first) or not np.ptp(second):
-        return 0.0
-    return float(np.corrcoef(first.argsort().argsort(), second.argsort().argsort())[0, 1])
+    low, high = np.quantile(noise / (noise + own), [0.05, 0.95])
+    return bool(low < INSEPARABLE and high > 1 - INSEPARABLE)
 
 
 def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
