@@ -86,13 +86,12 @@ class Boxes:
             crossed = np.flatnonzero(several & (effort == pattern).all(axis=1))
             kept = np.flatnonzero(pattern[1:])
             kept = kept[np.argsort(-beyond[crossed][:, kept].mean(axis=0))]  # the tightest bound first
-            covariance = (root[crossed] @ root[crossed].swapaxes(1, 2))[:, kept[:, None], kept]
-            triangle = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+            own_root = root[crossed][:, kept]
             part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
-            found = part._by_points(mean[crossed][:, kept], triangle, FEW_POINTS if pattern[0] else POINTS)
+            found = part._by_points(mean[crossed][:, kept], own_root, FEW_POINTS if pattern[0] else POINTS)
             log_mass[crossed], error[crossed] = found
             # The error is not to be trusted where no bound alone tells how little is left.
-            ceiling = part.ceiling(mean[crossed][:, kept], triangle)
+            ceiling = part.ceiling(mean[crossed][:, kept], own_root)
             error[crossed] += np.where(ceiling - log_mass[crossed] > DEEP, 1.0, 0.0)
         return log_mass, error
 
@@ -120,7 +119,7 @@ class Boxes:
         They stand for M bounded Gaussians; the mean weight is the mass inside.
         """
         count, p = mean.shape
-        triangle = np.linalg.cholesky(root @ root.swapaxes(1, 2))
+        triangle = _triangle(root)
         uniforms = _quasi_random(p, number)
         log_weights = np.zeros((count, len(uniforms)))
         standard = np.empty((count, len(uniforms), p))
@@ -140,6 +139,16 @@ class Boxes:
         """Return the bounds in standard deviations from the means."""
         sd = np.sqrt((root**2).sum(axis=2))
         return (self.lower - mean) / sd, (self.upper - mean) / sd
+
+
+def _triangle(root: FloatArray) -> FloatArray:
+    """Return lower triangles L (M, k, k) with L L' = root root' for roots (M, k, p), without squaring them."""
+    upper = np.asarray(np.linalg.qr(root.swapaxes(1, 2), mode="r"), dtype=np.float64)
+    diagonal = np.einsum("mii->mi", upper)
+    lower = (upper * np.where(diagonal < 0, -1.0, 1.0)[:, :, None]).swapaxes(1, 2)
+    least = 1e-12 * np.sqrt((root**2).sum(axis=2))
+    np.einsum("mii->mi", lower)[:] = np.maximum(np.abs(diagonal), least)
+    return lower
 
 
 @lru_cache
