@@ -27,7 +27,7 @@ def measured(seed, points, c10, bend, noise_sd):
 
 
 def assert_evidence_and_moments(posterior, problem):
-    """Hold the exact route against dense quadrature: three stated errors where quasi-random points make them, one elsewhere."""
+    """Hold the exact route against dense quadrature: within three stated errors where points make them, else one."""
     truth, rough = integrate(problem), integrate(problem, refine=0.75)
     own = 3 * abs(truth.log_evidence - rough.log_evidence) + 1e-9 * (1 + abs(truth.log_evidence))
     assume(own < 1e-4)
