@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 RESAMPLED = 4000
 REPRESENTED = 200
 """Components, at most, that are represented by points."""
-FEW_POINTS, ALL_POINTS = 2000, 1_200_000
+FEW_POINTS, SOME_POINTS, ALL_POINTS = 2000, 50_000, 1_200_000
 """Points, at least, that represent all of them together: few where they are a small share of the posterior."""
 SMALL_SHARE = 0.05
 
@@ -61,13 +61,13 @@ class Bounded:
         cut = [each for each in (*self.cut.values(), self.crossed) if len(each.weights)]
         whole = self.free
         for each in cut:
-            points = self._crossed_points if each is self.crossed else self._points(each)
+            points = self._crossed_points if each is self.crossed else self._points(each, SOME_POINTS)
             whole = whole.joined(_resampled(points, RESAMPLED // len(cut)))
         return whole
 
     @cached_property
     def _crossed_points(self) -> Components:
-        return self._points(self.crossed)
+        return self._points(self.crossed, ALL_POINTS)
 
     def marginal(self, place: int) -> Marginal:
         """Return the marginal of one linear parameter: in closed form unless several bounds cut."""
@@ -89,15 +89,15 @@ class Bounded:
             parts.append((points.weights.sum(), marginal_of_points(points.mean[:, place], points.weights, bounds)))
         return blended(parts, bounds)
 
-    def _points(self, components: Components) -> Components:
+    def _points(self, components: Components, number: int) -> Components:
         few = components.thinned(REPRESENTED)
         share = components.weights.sum()
-        total = ALL_POINTS if share > SMALL_SHARE else FEW_POINTS
+        total = number if share > SMALL_SHARE else FEW_POINTS
         every = self.box[np.zeros(len(few.weights), dtype=int)]
         order = np.argsort(-(few.weights @ every.beyond(few.mean, few.root)))  # the tightest bound first
         tight = Boxes(every.lower[:, order], every.upper[:, order])
-        number = max(64, total // len(few.weights))
-        log_shares, points = tight.points(few.mean[:, order], few.root[:, order], number)
+        each = max(64, total // len(few.weights))
+        log_shares, points = tight.points(few.mean[:, order], few.root[:, order], each)
         points = points[:, :, np.argsort(order)]
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
