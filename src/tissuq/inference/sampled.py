@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
+from tissuq.gaussian import interval_quantile
 from tissuq.inference.box import Boxes
 from tissuq.inference.densities import Density, given_density, joint_density
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points
@@ -30,6 +31,8 @@ LARGEST_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""
 PRIOR_POINTS = 512
 """Points of the prior among which the sampler starts at the best."""
+SWEEPS = 100
+"""Gibbs sweeps that take draws within several bounds to their distribution."""
 EFFECTIVE = 0.5
 """Share of the draws that must stay effective when the bounds of the linear parameters weight them."""
 
@@ -180,12 +183,22 @@ class _Given:
         return np.asarray((np.array(chosen) + offsets).ravel(), dtype=np.intp)
 
     def _within(self, chosen: NDArray[np.intp], generator: np.random.Generator) -> FloatArray:
-        """Return one draw within the bounds for each chosen Gaussian: the best of a few weighted points."""
+        """Return one draw within the bounds for each chosen Gaussian: a few weighted points, then Gibbs sweeps."""
         boxes, values = self._boxes[chosen], np.empty((len(chosen), self.mean.shape[1]))
         for block in np.array_split(np.arange(len(chosen)), max(1, len(chosen) // 500)):
             log_weights, points = boxes[block].points(self.mean[chosen[block]], self.root[chosen[block]])
             noise = generator.gumbel(size=log_weights.shape)
             values[block] = points[np.arange(len(block)), (log_weights + noise).argmax(axis=1)]
+        inverse = np.linalg.inv(self.root[chosen])
+        precision = inverse.swapaxes(1, 2) @ inverse
+        for _ in range(SWEEPS):
+            for j in range(values.shape[1]):
+                own, away = precision[:, j, j], values - self.mean[chosen]
+                away[:, j] = 0.0
+                centre = self.mean[chosen, j] - (precision[:, j] * away).sum(axis=1) / own
+                ends = ((bound[:, j] - centre) * np.sqrt(own) for bound in (boxes.lower, boxes.upper))
+                score, _ = interval_quantile(generator.random(len(own)), *ends)
+                values[:, j] = np.clip(centre + score / np.sqrt(own), boxes.lower[:, j], boxes.upper[:, j])
         return values
 
 
