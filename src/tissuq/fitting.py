@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import groupby
 from numbers import Integral
 from typing import Literal
@@ -89,8 +89,16 @@ def fit(
     >>> bool(low < 1.2 < high)
     True
     """
-    recipe = _Recipe.of(discrepancy, material, noise_sd, noise, priors, method, seed)
-    return recipe.posteriors([data])[0]
+    return fit_many(
+        [data],
+        discrepancy=discrepancy,
+        material=material,
+        noise_sd=noise_sd,
+        noise=noise,
+        priors=priors,
+        method=method,
+        seed=seed,
+    )[0]
 
 
 def fit_many(
@@ -129,7 +137,15 @@ def fit_many(
     >>> len(held)
     20
     """
-    recipe = _Recipe.of(discrepancy, material, noise_sd, noise, priors, method, seed)
+    if method not in METHODS:
+        raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
+    if not isinstance(seed, Integral) or seed < 0:
+        raise InputError(f"seed must be a whole number, zero or more, not {seed!r}.")
+    if noise_sd is not None and noise is not None:
+        raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
+    chosen = noise_named(noise if noise is not None else "unknown" if noise_sd is None else noise_sd)
+    parts = discrepancy_named(discrepancy), material_named(material), chosen
+    recipe = _Recipe(*parts, dict(priors or {}), method, seed)
     keys = [(data.mode.name, data.stretch.tobytes()) for data in datasets]
     found: dict[int, Posterior] = {}
     for _, group in groupby(sorted(range(len(keys)), key=keys.__getitem__), key=keys.__getitem__):
@@ -145,37 +161,9 @@ class _Recipe:
     discrepancy: Discrepancy
     material: Material
     noise: Noise
-    priors: Mapping[str, Prior] = field(default_factory=dict)
-    method: Method = "auto"
-    seed: int = 0
-
-    @classmethod
-    def of(
-        cls,
-        discrepancy: str | Discrepancy,
-        material: str | Material,
-        noise_sd: float | Literal["unknown"] | None,
-        noise: str | Noise | None,
-        priors: Mapping[str, Prior] | None,
-        method: Method,
-        seed: int,
-    ) -> _Recipe:
-        """Check the arguments of `fit` and return them as objects."""
-        if method not in METHODS:
-            raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
-        if not isinstance(seed, Integral) or seed < 0:
-            raise InputError(f"seed must be a whole number, zero or more, not {seed!r}.")
-        if noise_sd is not None and noise is not None:
-            raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
-        chosen = noise if noise is not None else "unknown" if noise_sd is None else noise_sd
-        return cls(
-            discrepancy_named(discrepancy),
-            material_named(material),
-            noise_named(chosen),
-            dict(priors or {}),
-            method,
-            seed,
-        )
+    priors: Mapping[str, Prior]
+    method: Method
+    seed: int
 
     def posteriors(self, datasets: Sequence[Experiment]) -> list[Posterior]:
         """Fit experiments on the same stretches."""

@@ -130,10 +130,7 @@ class StatisticalModel:
         Where the material has parameters in which its stress is not linear, ``bent`` holds their values: (s,), or
         (m, s) for (m, n, k) mean stresses.
         """
-        mode = self.experiment.mode
-        own = stress_basis(self.material, mode, stretch, bent)
-        other = self.discrepancy.mean_basis(mode, stretch)
-        return np.concatenate([own, np.broadcast_to(other, (*own.shape[:-1], other.shape[-1]))], axis=-1)
+        return _basis(self.material, self.discrepancy, self.experiment.mode, stretch, bent)
 
     @property
     def headline(self) -> str:
@@ -183,6 +180,11 @@ class StatisticalModel:
     def is_correlated(self) -> bool:
         """Whether the discrepancy at one measurement tells something about another."""
         return self.discrepancy.is_correlated or self.is_repeated
+
+    @property
+    def has_directions(self) -> bool:
+        """Whether errors are independent along directions that the size of noise and discrepancy leave alone."""
+        return not (self.is_correlated and self.noise.depends_on_level)
 
     @cached_property
     def is_repeated(self) -> bool:
@@ -328,9 +330,14 @@ class StatisticalModel:
 def _remembered_basis(
     material: Material, discrepancy: Discrepancy, mode: LoadingMode, stretch: bytes, bent: tuple[float, ...]
 ) -> FloatArray:
-    points = np.frombuffer(stretch)
-    own = stress_basis(material, mode, points, bent)
-    return np.hstack([own, discrepancy.mean_basis(mode, points)])
+    return _basis(material, discrepancy, mode, np.frombuffer(stretch), bent)
+
+
+def _basis(
+    material: Material, discrepancy: Discrepancy, mode: LoadingMode, stretch: FloatArray, bent: ArrayLike
+) -> FloatArray:
+    own, other = stress_basis(material, mode, stretch, bent), discrepancy.mean_basis(mode, stretch)
+    return np.concatenate([own, np.broadcast_to(other, (*own.shape[:-1], other.shape[-1]))], axis=-1)
 
 
 @lru_cache(maxsize=256)

@@ -100,18 +100,16 @@ class Prior(ABC):
 
 
 @dataclass(frozen=True)
-class Uniform(Prior):
-    """Constant density between two bounds: p(x) = 1 / (high - low)."""
+class Interval(Prior):
+    """The same density everywhere between two bounds."""
 
     low: float
     high: float
 
-    name = "uniform"
     with_unit = ("low", "high")
 
     def _check(self) -> None:
-        if self.low >= self.high:
-            raise InputError(f"prior {self}: low must be less than high.")
+        _check_order(self, self.low, self.high)
 
     @property
     def support(self) -> tuple[float, float]:
@@ -119,42 +117,43 @@ class Uniform(Prior):
 
     @property
     def gaussian(self) -> tuple[float, float, float]:
-        return 0.0, 0.0, -log(self.high - self.low)
+        return 0.0, 0.0, self._height
+
+    @property
+    @abstractmethod
+    def _height(self) -> float:
+        """The log of the density."""
 
     def log_density(self, value: Any) -> Any:
-        return -log(self.high - self.low) + 0.0 * value
+        return self._height + 0.0 * value
+
+
+@dataclass(frozen=True)
+class Uniform(Interval):
+    """Constant density between two bounds: p(x) = 1 / (high - low)."""
+
+    name = "uniform"
+
+    @property
+    def _height(self) -> float:
+        return -log(self.high - self.low)
 
     def quantile(self, probability: Any) -> Any:
         return self.low + (self.high - self.low) * probability
 
 
 @dataclass(frozen=True)
-class Flat(Prior):
+class Flat(Interval):
     """Density one between bounds that may be infinite: improper, for linear parameters only, and without evidence."""
 
     low: float = -inf
     high: float = inf
 
     name = "flat"
-    with_unit = ("low", "high")
-
-    def _check(self) -> None:
-        if self.low >= self.high:
-            raise InputError(f"prior {self}: low must be less than high.")
-
-    @property
-    def support(self) -> tuple[float, float]:
-        return self.low, self.high
-
-    @property
-    def gaussian(self) -> tuple[float, float, float]:
-        return 0.0, 0.0, 0.0
+    _height = 0.0
 
     def within(self, support: tuple[float, float]) -> Self:
         return replace(self, low=max(self.low, support[0]), high=min(self.high, support[1]))
-
-    def log_density(self, value: Any) -> Any:
-        return 0.0 * value
 
     def quantile(self, probability: Any) -> Any:
         raise InputError(
@@ -176,8 +175,7 @@ class Normal(Prior):
 
     def _check(self) -> None:
         super()._check()
-        if self.low >= self.high:
-            raise InputError(f"prior {self}: low must be less than high.")
+        _check_order(self, self.low, self.high)
 
     @property
     def support(self) -> tuple[float, float]:
@@ -312,6 +310,11 @@ def prior_from(settings: dict[str, Any]) -> Prior:
         optional = f" (and may have {' and '.join(may)})" if may else ""
         raise InputError(f"a {name} prior needs {' and '.join(needed)}{optional}; it was given {given}.")
     return kind(**arguments)
+
+
+def _check_order(prior: Prior, low: float, high: float) -> None:
+    if low >= high:
+        raise InputError(f"prior {prior}: low must be less than high.")
 
 
 def _log(value: Any) -> Any:

@@ -158,7 +158,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
 def independent_draws(**changes):
     generator = np.random.default_rng(0)
     sound = NutsDraws(
-        generator.standard_normal((4, 1000, 2)), generator.standard_normal((4, 2000)), 0, 3.0, ("C10", "S")
+        generator.standard_normal((4, 1000, 2)), ("C10", "S"), generator.standard_normal((4, 2000)), 0, 3.0
     )
     return replace(sound, **changes)
 

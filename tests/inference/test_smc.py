@@ -18,6 +18,8 @@ from bridge import bridge_log_evidence
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference import smc
 from tissuq.inference.coordinates import Box, log_density_on_line
+from tissuq.inference.mutation import compiled_program
+from tissuq.inference.resampling import resampled_at_random
 from tissuq.inference.smc import SmcDraws, SmcSettings, sample_smc
 
 ERRORS_ALLOWED = 5.0
@@ -201,13 +203,13 @@ SMALL = Line(2, noise=0.1, half_width=30.0)
 
 @pytest.fixture(scope="module")
 def small_program():
-    return smc._compile(SMALL.log_likelihood, flat, Box(SMALL.lower, SMALL.upper))
+    return compiled_program(SMALL.log_likelihood, flat, Box(SMALL.lower, SMALL.upper))
 
 
 @pytest.fixture
 def compiled_once(monkeypatch, small_program):
     """Compile the small problem once for all its runs."""
-    monkeypatch.setattr(smc, "_compile", lambda *problem: small_program)
+    monkeypatch.setattr(smc, "compiled_program", lambda *problem: small_program)
 
 
 def small_run(seed, prior_seed=None, **changes):
@@ -228,7 +230,7 @@ def test_the_stated_error_is_the_spread_of_the_log_evidence():
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(monkeypatch, small_program):
     compiled_anew = small_run(3)
-    monkeypatch.setattr(smc, "_compile", lambda *problem: small_program)
+    monkeypatch.setattr(smc, "compiled_program", lambda *problem: small_program)
     again = small_run(3)
     assert compiled_anew.values.tobytes() == again.values.tobytes()
     assert compiled_anew.log_evidence == again.log_evidence
@@ -249,7 +251,7 @@ def made_draws(values, increments=None, drifts=None):
     zeros = np.zeros((3, len(values)))
     increments, drifts = (zeros if array is None else array for array in (increments, drifts))
     sweeps, moved = np.ones(3, dtype=int), np.ones(3, dtype=bool)
-    return SmcDraws(values, increments, drifts, np.array([0.1, 0.5, 1.0]), sweeps, moved, np.ones((3, 2)), ("a",))
+    return SmcDraws(values, ("a",), increments, drifts, np.array([0.1, 0.5, 1.0]), sweeps, moved, np.ones((3, 2)))
 
 
 def test_relatives_are_discounted_in_the_effective_sample_size():
@@ -266,7 +268,7 @@ def test_resampling_follows_the_weights_and_keeps_relatives_together():
     weights = np.random.default_rng(0).exponential(size=(RUNS, 250))
     weights[:, :5] = 0.0
     with np.errstate(divide="ignore"):
-        chosen = smc._resample(np.log(weights) - 1e4, np.random.default_rng(1))
+        chosen = resampled_at_random(np.log(weights) - 1e4, np.random.default_rng(1))
     assert chosen.shape == (RUNS, 250)
     assert np.all(np.diff(chosen, axis=1) >= 0)
     counts = np.stack([np.bincount(run, minlength=250) for run in chosen])

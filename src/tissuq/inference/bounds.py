@@ -62,7 +62,7 @@ class Bounded:
         whole = self.free
         for each in cut:
             points = self._crossed_points if each is self.crossed else self._points(each, SOME_POINTS)
-            whole = whole.joined(_resampled(points, RESAMPLED // len(cut)))
+            whole = whole.joined(points.resampled(RESAMPLED // len(cut)))
         return whole
 
     @cached_property
@@ -94,11 +94,7 @@ class Bounded:
         share = components.weights.sum()
         total = number if share > SMALL_SHARE else FEW_POINTS
         every = self.box[np.zeros(len(few.weights), dtype=int)]
-        order = np.argsort(-(few.weights @ every.beyond(few.mean, few.root)))  # the tightest bound first
-        tight = Boxes(every.lower[:, order], every.upper[:, order])
-        each = max(64, total // len(few.weights))
-        log_shares, points = tight.points(few.mean[:, order], few.root[:, order], each)
-        points = points[:, :, np.argsort(order)]
+        log_shares, points = every.points(few.mean, few.root, max(64, total // len(few.weights)))
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
         kept = weights > 1e-12 * weights.max()
@@ -128,13 +124,3 @@ def bounded(components: Components, beyond: FloatArray, box: Boxes) -> Bounded:
     cut = {place: components[alone & active[:, place]] for place in range(beyond.shape[1])}
     cut = {place: each for place, each in cut.items() if len(each.weights)}
     return Bounded(components[~is_cut], cut, components[is_cut & ~alone], box)
-
-
-def _resampled(points: Components, count: int) -> Components:
-    """Return at most ``count`` of the points, equally weighted, that stand for all of them (systematic resampling)."""
-    if len(points.weights) <= count:
-        return points
-    total = points.weights.sum()
-    targets = (np.arange(count) + 0.5) * total / count
-    chosen = points[np.minimum(np.searchsorted(np.cumsum(points.weights), targets), len(points.weights) - 1)]
-    return Components(np.full(count, total / count), chosen.settings, chosen.mean, chosen.root)

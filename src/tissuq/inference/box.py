@@ -58,10 +58,7 @@ class Boxes:
 
         Their sum over the parameters bounds the mass outside from above (Boole).
         """
-        from scipy.special import ndtr
-
-        low, high = self._scores(mean, root)
-        return np.asarray(ndtr(low) + ndtr(-high))
+        return _beyond(*self._scores(mean, root))
 
     def log_mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the log mass (M,) of M Gaussians inside the bounds (M, p), and its error (M,).
@@ -71,7 +68,7 @@ class Boxes:
         sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
         """
         low, high = self._scores(mean, root)
-        beyond = self.beyond(mean, root)
+        beyond = _beyond(low, high)
         outside = beyond.sum(axis=1)
         log_mass, error = np.log1p(-np.minimum(outside, 0.5)), np.minimum(outside, SMALL)
         active = beyond > TOUCHED
@@ -85,7 +82,6 @@ class Boxes:
         for pattern in np.unique(effort[several], axis=0):
             crossed = np.flatnonzero(several & (effort == pattern).all(axis=1))
             kept = np.flatnonzero(pattern[1:])
-            kept = kept[np.argsort(-beyond[crossed][:, kept].mean(axis=0))]  # the tightest bound first
             own_root = root[crossed][:, kept]
             part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
             found = part._by_points(mean[crossed][:, kept], own_root, FEW_POINTS if pattern[0] else POINTS)
@@ -116,29 +112,36 @@ class Boxes:
     def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
         """Return log weights (M, P) and P = number points (M, P, p) inside the bounds (M, p).
 
-        They stand for M bounded Gaussians; the mean weight is the mass inside.
+        They stand for M bounded Gaussians, drawn one parameter after another; the mean weight is the mass inside.
         """
         count, p = mean.shape
-        triangle = _triangle(root)
+        order = np.argsort(-self.beyond(mean, root).mean(axis=0))  # the tightest bound first
+        triangle = _triangle(root[:, order])
         uniforms = _quasi_random(p, number)
         log_weights = np.zeros((count, len(uniforms)))
         standard = np.empty((count, len(uniforms), p))
         points = np.empty_like(standard)
-        for j in range(p):
-            centre = mean[:, None, j] + np.einsum("nqk,nk->nq", standard[:, :, :j], triangle[:, j, :j])
-            scale = triangle[:, j, j][:, None]
-            low, high = ((ends[:, j, None] - centre) / scale for ends in (self.lower, self.upper))
-            standard[:, :, j], log_mass = interval_quantile(uniforms[:, j], low, high)
+        for step, j in enumerate(order):
+            before = np.einsum("nqk,nk->nq", standard[:, :, :step], triangle[:, step, :step])
+            centre, scale = mean[:, None, j] + before, triangle[:, step, step][:, None]
+            lower, upper = self.lower[:, j, None], self.upper[:, j, None]
+            ends = (lower - centre) / scale, (upper - centre) / scale
+            standard[:, :, step], log_mass = interval_quantile(uniforms[:, step], *ends)
             log_weights += log_mass
-            points[:, :, j] = np.clip(
-                centre + scale * standard[:, :, j], self.lower[:, j, None], self.upper[:, j, None]
-            )
+            points[:, :, j] = np.clip(centre + scale * standard[:, :, step], lower, upper)
         return log_weights, points
 
     def _scores(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the bounds in standard deviations from the means."""
         sd = np.sqrt((root**2).sum(axis=2))
         return (self.lower - mean) / sd, (self.upper - mean) / sd
+
+
+def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the masses of standard normal variables beyond bounds."""
+    from scipy.special import ndtr
+
+    return np.asarray(ndtr(low) + ndtr(-high))
 
 
 def _triangle(root: FloatArray) -> FloatArray:

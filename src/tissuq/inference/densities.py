@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import solve_triangular
 
-from tissuq.inference.reduction import Reducer
+from tissuq.inference.reduction import Reducer, divided_columns
 from tissuq.mechanics import traced_stress_basis
 from tissuq.model import StatisticalModel
 
@@ -41,7 +41,7 @@ def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
     """
     gaussians = np.array([model.priors[s].gaussian for s in model.linear], dtype=np.float64).reshape(-1, 3)
     data: dict[str, Any] = {"mean": gaussians[:, 0], "precision": gaussians[:, 1], "constant": gaussians[:, 2].sum()}
-    if _has_fixed_directions(model):
+    if _is_reduced(model):
         reduced = {name: array[0] for name, array in vars(Reducer([model])(np.zeros((1, 0)))).items()}
         data |= {name: reduced[name] for name in ("counts", "values", "levels", "inverse", "log_size")}
         data |= {"centre": reduced["centre"][0], "squares": reduced["squares"][0]}
@@ -59,9 +59,9 @@ def _measurements(model: StatisticalModel) -> dict[str, Any]:
     return data | {"levels": model.levels if model.noise.depends_on_level else np.zeros(1)}
 
 
-def _has_fixed_directions(model: StatisticalModel) -> bool:
-    """Return whether errors are independent along directions that no parameter changes."""
-    return not model.structure and not (model.is_correlated and model.noise.depends_on_level)
+def _is_reduced(model: StatisticalModel) -> bool:
+    """Return whether one reduction of the data serves all parameters."""
+    return not model.structure and model.has_directions
 
 
 def _remembered(density: Callable[..., Any], model: StatisticalModel) -> Density:
@@ -125,8 +125,7 @@ def _joint(model: StatisticalModel, vector: Any, data: Mapping[str, Any]) -> Any
 
 def _orthogonal(model: StatisticalModel, design: Any, stress: Any) -> tuple[Any, Any, Any, Any]:
     """Return the data matrix [Q, F, e], the inverse triangle of the linear columns, their centre and log size."""
-    free = [model.column_symbols.index(symbol) for symbol in model.linear]
-    fixed = [place for place in range(len(model.column_symbols)) if place not in free]
+    free, fixed = divided_columns(model)
     basis, triangle = jnp.linalg.qr(design[:, free])
     inverse = solve_triangular(triangle, jnp.eye(len(free)))
     centre = inverse @ (basis.T @ stress)
@@ -155,7 +154,7 @@ def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[An
 def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
     """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, the number of measurements, and what Q rests on."""
     q = len(model.column_symbols) + 1
-    if _has_fixed_directions(model):
+    if _is_reduced(model):
         variances = model.white_variance(values, data["levels"]) + model.correlated_variance(values) * data["values"]
         variances = jnp.broadcast_to(variances, data["counts"].shape)
         moments = ((1 / variances) @ data["squares"]).reshape(q, q)

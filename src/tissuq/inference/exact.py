@@ -37,7 +37,7 @@ HEAVY = 1e-6
 
 def why_not_exact(model: StatisticalModel) -> str:
     """Return why the exact route does not apply to a model, or nothing where it does."""
-    if model.noise.depends_on_level and model.is_correlated:
+    if not model.has_directions:
         return (
             f"noise '{model.noise.name}' and discrepancy '{model.discrepancy.name}' are not independent along any "
             "fixed directions"
@@ -118,16 +118,16 @@ class _Integration:
         assert self.warp is not None  # noqa: S101 (only called once it is there)
         h, log_density = self.warp.parameters(u)
         given = self.conditional(h)
-        value = given.log_likelihood + self._ceiling(given) + log_prior_density(self._priors, h) - log_density
+        ceiling = self._ceiling(given)
+        value = given.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
-        surplus = self._ceiling(given)
         known = np.zeros(value.shape, dtype=bool)
         for margin in (0.0, IRRELEVANT):  # the best ones first, which tell what matters
             floor = self._top if margin else value.max(axis=1, keepdims=True)
             relevant = ~known & (value >= floor - margin) & np.isfinite(value)
             data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
             log_mass, _ = self.conditional.boxes[data_set].log_mass(given.mean[relevant], given.root[relevant])
-            value[relevant] += log_mass - surplus[relevant]
+            value[relevant] += log_mass - ceiling[relevant]
             known |= relevant
             exact = np.where(known, value, -np.inf)
             self._top = np.maximum(self._top, exact.max(axis=1, keepdims=True))

@@ -16,6 +16,7 @@ from blackjax.adaptation.window_adaptation import build_schedule
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ConvergenceError, InputError
+from tissuq.inference.convergence import MAX_RHAT, Draws, diagnostic
 from tissuq.inference.coordinates import (
     Box,
     Derivatives,
@@ -30,7 +31,6 @@ __all__ = ["NutsDraws", "NutsSettings", "sample_nuts"]
 
 Floats = NDArray[np.float64]
 
-MAX_RHAT = 1.01
 MIN_ESS_PER_CHAIN = 100
 MAX_DIVERGENT_SHARE = 0.01
 MIN_BFMI = 0.3
@@ -77,79 +77,36 @@ class NutsSettings:
 
 
 @dataclass(frozen=True)
-class NutsDraws:
+class NutsDraws(Draws):
     """Draws from a posterior with the diagnostics of their quality.
 
     Parameters
     ----------
-    values : (chains, draws, d) array
-        Parameter values, in the unit of each.
     energies : (chains, draws * thinning) array
         Energy of the simulated dynamics at the end of each trajectory.
     divergences : int
         Trajectories that the integrator lost.
     leapfrogs_per_draw : float
         Mean number of gradients that one draw took.
-    names : tuple of str
-        What the messages call the d parameters.
 
     References
     ----------
-    Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021), Bayesian Analysis 16, 667-718 (R-hat, effective
-    sample sizes). Betancourt (2016), arXiv:1604.00695 (BFMI).
+    Betancourt (2016), arXiv:1604.00695 (BFMI).
     """
 
-    values: Floats
     energies: Floats
     divergences: int
     leapfrogs_per_draw: float
-    names: tuple[str, ...]
-
-    @cached_property
-    def rhat(self) -> Floats:
-        """Rank-normalised split R-hat of each parameter, the larger of bulk and tail: (d,) array."""
-        return _diagnostic("rhat", self.values)
-
-    @cached_property
-    def ess_bulk(self) -> Floats:
-        """Effective sample size for the centre of each marginal: (d,) array."""
-        return _diagnostic("ess", self.values, method="bulk")
-
-    @cached_property
-    def ess_tail(self) -> Floats:
-        """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
-        return _diagnostic("ess", self.values, method="tail", prob=0.05)
 
     @cached_property
     def bfmi(self) -> Floats:
         """Estimated fraction of missing information of the energy: (chains,) array."""
-        return _diagnostic("bfmi", self.energies)
+        return diagnostic("bfmi", self.energies)
 
-    def of(self, values: Floats, names: tuple[str, ...]) -> NutsDraws:
-        """Return the same run with other quantities (chains, draws, k) that follow from its draws."""
-        return replace(self, values=values, names=names)
-
-    @property
-    def converged(self) -> bool:
-        """Whether every diagnostic passes its threshold."""
-        return not self._failures()
-
-    @property
-    def verdict(self) -> str:
-        """One sentence that says so, or what failed, and then what to try."""
-        failures = self._failures()
-        if failures:
-            found, remedies = zip(*failures, strict=True)
-            return f"Not converged: {'; '.join(found)}. Try {', or '.join(dict.fromkeys(remedies))}."
-        return (
-            f"Converged: R-hat at most {self.rhat.max():.4f}, effective sample sizes at least "
-            f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), {self.divergences} of "
-            f"{self.energies.size} trajectories divergent, BFMI at least {self.bfmi.min():.2f}."
-        )
+    def _quality(self) -> str:
+        return f"{self.divergences} of {self.energies.size} trajectories divergent, BFMI at least {self.bfmi.min():.2f}"
 
     def _failures(self) -> list[tuple[str, str]]:
-        """Return what failed and its remedy; a diagnostic that is not a number fails."""
-        least_ess = MIN_ESS_PER_CHAIN * len(self.values)
         worst = int(np.argmax(self.rhat))
         failures = []
         if not self.rhat[worst] < MAX_RHAT:
@@ -157,11 +114,7 @@ class NutsDraws:
             failures.append((found, LONGER))
             if not self.rhat[worst] < SEPARATE_RHAT:
                 failures.append(("the chains stay in different places", "a narrower prior that leaves one mode"))
-        for part, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
-            worst = int(np.argmin(sizes))
-            if not sizes[worst] > least_ess:
-                found = f"the {part} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
-                failures.append((f"{found} and must exceed {least_ess}", LONGER))
+        failures += self._small_sizes(MIN_ESS_PER_CHAIN * len(self.values), LONGER)
         if not self.divergences < MAX_DIVERGENT_SHARE * self.energies.size:
             found = f"{self.divergences} of {self.energies.size} trajectories diverged"
             failures.append((found, "a target acceptance closer to one, such as 0.99"))
@@ -234,16 +187,16 @@ def sample_nuts(
     if len(labels) != dimension:
         raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
     generator = np.random.default_rng(settings.seed)
-    known = data is not None
-    derivatives = derivatives_on_line(log_density, box, *([data] if known else []))
+    given = () if data is None else (data,)
+    derivatives = derivatives_on_line(log_density, box, *given)
     modes = find_modes(derivatives, box, start, generator)
     states = _overdispersed(derivatives, modes, settings.chains, generator)
     run = _compiled_run(log_density, *_bounds(box), replace(settings, seed=0))
     key = jax.random.key(settings.seed)
-    found = run(key, states, _schedule(settings), modes[0].location, modes[0].scale, *([data] if known else []))
+    found = run(key, states, _schedule(settings), modes[0].location, modes[0].scale, *given)
     values, energies, divergent, leapfrogs = (np.asarray(array) for array in found)
     gradients = float(leapfrogs.mean()) * settings.thinning
-    return NutsDraws(values, energies, int(divergent.sum()), gradients, labels)
+    return NutsDraws(values, labels, energies, int(divergent.sum()), gradients)
 
 
 def _overdispersed(derivatives: Derivatives, modes: Sequence[Mode], chains: int, generator: np.random.Generator) -> Any:
@@ -363,11 +316,3 @@ def _tune(
     going_on = _Tuning(step_size, tuning.inverse_mass, count, total, squares)
     restarted = _Tuning(start(finish(step_size)), shrunk, 0.0, jnp.zeros_like(total), jnp.zeros_like(squares))
     return _Tuning(*jax.tree.map(partial(jnp.where, ends_window), restarted, going_on))
-
-
-def _diagnostic(statistic: str, draws: Floats, **options: Any) -> Floats:
-    """Return one of ArviZ's diagnostics, imported when first needed, of a (chains, draws, ...) array."""
-    from arviz_stats.base import array_stats
-
-    values = getattr(array_stats, statistic)(draws, chain_axis=0, draw_axis=1, **options)
-    return np.asarray(values, dtype=np.float64)

@@ -13,7 +13,7 @@ from tissuq.inference.lowrank import correlation_spectrum
 from tissuq.model import StatisticalModel
 from tissuq.statistics import CHUNK, upper_triangle
 
-__all__ = ["Reducer", "Reductions"]
+__all__ = ["Reducer", "Reductions", "divided_columns"]
 
 FloatArray = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ class Reducer:
 
 def _from_statistics(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -> Reduction:
     """Reduce by the data's triangles alone, at a cost that does not depend on their number."""
-    free, fixed = _columns(models[0])
+    free, fixed = divided_columns(models[0])
     p = len(free)
     centres, squares = [], []
     for model in models:
@@ -136,7 +136,7 @@ def _from_statistics(models: Sequence[StatisticalModel], setting: tuple[float, .
 def _from_rows(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -> Reduction:
     """Reduce by all measurements, in the directions in which their errors are independent."""
     model = models[0]
-    free, fixed = _columns(model)
+    free, fixed = divided_columns(model)
     bent = len(model.bent_symbols)
     design = model.design if not bent else model.basis(model.experiment.stretch, np.array(setting[:bent]))
     basis, triangle = np.linalg.qr(design[:, free])
@@ -175,7 +175,7 @@ def _products(shared: FloatArray, own: FloatArray) -> FloatArray:
     return np.asarray((columns[:, :, :, None] * columns[:, :, None, :]).reshape(*own.shape, -1))
 
 
-def _columns(model: StatisticalModel) -> tuple[list[int], list[int]]:
+def divided_columns(model: StatisticalModel) -> tuple[list[int], list[int]]:
     """Return the places of the columns that are integrated in closed form, and of the others."""
     free = [model.column_symbols.index(symbol) for symbol in model.linear]
     return free, [place for place in range(len(model.column_symbols)) if place not in free]

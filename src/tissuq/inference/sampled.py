@@ -17,9 +17,9 @@ from tissuq.inference.box import Boxes
 from tissuq.inference.densities import Density, given_density, joint_density
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points
 from tissuq.inference.nuts import NutsDraws, NutsSettings, sample_nuts
+from tissuq.inference.resampling import resampled_at_random
 from tissuq.inference.smc import SmcDraws, SmcSettings, sample_smc
 from tissuq.inference.solution import Components, Diagnostics, Marginals, Solution
-from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
 from tissuq.priors import Flat
 
@@ -113,8 +113,7 @@ def sample_smc_given(model: StatisticalModel, seed: int = 0) -> SampledSolution:
     priors = [model.priors[symbol] for symbol in model.nonlinear]
     lower, upper = np.array([prior.support for prior in priors]).T
     settings = SmcSettings(seed=seed)
-    uniforms = np.random.default_rng([seed, 7]).random((settings.particles, len(priors)))
-    points = np.column_stack([prior.quantile(u) for prior, u in zip(priors, uniforms.T, strict=True)])
+    points = _prior_points(model, np.random.default_rng([seed, 7]).random((settings.particles, len(priors))))
     sampled = sample_smc(
         lambda h: density(h, data)[0], lambda h: density(h, data)[1], lower, upper, points, settings, model.nonlinear
     )
@@ -155,7 +154,7 @@ class _Given:
         return f"{linear} integrated in closed form, then drawn" if linear else "these are all parameters"
 
     def components(self) -> Components:
-        """Return the posterior as one Gaussian for each draw; points where bounds cut."""
+        """Return the posterior as one Gaussian for each draw, as if no bound cut."""
         weights = np.full(len(self.settings), 1 / len(self.settings))
         return Components(weights, self.settings, self.mean, self.root)
 
@@ -164,7 +163,8 @@ class _Given:
         generator = np.random.default_rng([seed, 5])
         settings, linear = self.settings, self.mean.copy()
         if self.is_cut:
-            chosen = self._resampled(generator)
+            within = resampled_at_random(self._log_inside.reshape(self.shape), generator)
+            chosen = (within + self.shape[1] * np.arange(self.shape[0])[:, None]).ravel()
             settings = settings[chosen]
             linear = self._within(chosen, generator)
         else:
@@ -172,15 +172,6 @@ class _Given:
         columns = np.column_stack([settings, linear]).T.reshape(-1, *self.shape)
         named = dict(zip((*self.model.nonlinear, *self.model.linear), columns, strict=True))
         return {symbol: named[symbol] for symbol in self.model.symbols}
-
-    def _resampled(self, generator: np.random.Generator) -> NDArray[np.intp]:
-        """Return which draws stand for the posterior within the bounds: systematic resampling, chain by chain."""
-        weights = self._inside.reshape(self.shape)
-        edges = np.cumsum(weights, axis=1) / weights.sum(axis=1, keepdims=True)
-        ticks = (np.arange(self.shape[1]) + generator.random((self.shape[0], 1))) / self.shape[1]
-        chosen = [np.searchsorted(edge[:-1], tick) for edge, tick in zip(edges, ticks, strict=True)]
-        offsets = self.shape[1] * np.arange(self.shape[0])[:, None]
-        return np.asarray((np.array(chosen) + offsets).ravel(), dtype=np.intp)
 
     def _within(self, chosen: NDArray[np.intp], generator: np.random.Generator) -> FloatArray:
         """Return one draw within the bounds for each chosen Gaussian: a few weighted points, then Gibbs sweeps."""
@@ -294,14 +285,14 @@ def _compiled(density: Density) -> Any:
     return jax.jit(jax.vmap(density, (0, None)))
 
 
-def _prior_points(model: StatisticalModel) -> FloatArray:
-    uniforms = np.random.default_rng(0).random((PRIOR_POINTS, len(model.nonlinear))) ** 2
-    columns = [model.priors[s].quantile(u) for s, u in zip(model.nonlinear, uniforms.T, strict=True)]
-    return np.array(columns).reshape(-1, PRIOR_POINTS).T
+def _prior_points(model: StatisticalModel, probabilities: FloatArray) -> FloatArray:
+    """Return the nonlinear parameters (N, d) below which their priors hold probabilities (N, d)."""
+    columns = zip(model.nonlinear, probabilities.T, strict=True)
+    return np.column_stack([model.priors[symbol].quantile(column) for symbol, column in columns])
 
 
 def _best_prior_point(model: StatisticalModel, density: Density, data: Mapping[str, Any]) -> FloatArray:
-    points = _prior_points(model)
+    points = _prior_points(model, np.random.default_rng(0).random((PRIOR_POINTS, len(model.nonlinear))) ** 2)
     log_likelihood = np.asarray(_compiled(density)(points, data)[0])
     best = int(np.argmax(np.where(np.isfinite(log_likelihood), log_likelihood, -np.inf)))
     return np.asarray(points[best], dtype=np.float64)
@@ -311,8 +302,7 @@ def _start(model: StatisticalModel) -> FloatArray:
     """Return a point inside the support: the best of some prior points, linear parameters at their conditional mean."""
     density, data = given_density(model)
     best = _best_prior_point(model, density, data) if model.nonlinear else np.zeros(0)
-    with one_thread():
-        _, _, mean, root = (np.asarray(array)[0] for array in _compiled(density)(best[None], data))
+    _, _, mean, root = (np.asarray(array)[0] for array in _compiled(density)(best[None], data))
     chosen = dict(zip((*model.nonlinear, *model.linear), [*best, *mean], strict=True))
     for place, symbol in enumerate(model.linear):
         low, high = model.priors[symbol].support

@@ -6,46 +6,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
-import blackjax
-import jax
-import jax.numpy as jnp
 import numpy as np
-from blackjax.mcmc.random_walk import RWState
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp, ndtr, stdtrit
 
 from tissuq.errors import ConvergenceError, InputError
+from tissuq.inference.convergence import MAX_RHAT, Draws
 from tissuq.inference.coordinates import Box, LogDensity
+from tissuq.inference.mutation import Mutation, Program, compiled_program
+from tissuq.inference.resampling import resampled_at_random
 
 __all__ = ["SmcDraws", "SmcSettings", "sample_smc"]
 
 Floats = NDArray[np.float64]
 
-MAX_RHAT = 1.01
 MIN_ESS = 400
 MAX_LOG_EVIDENCE_ERROR = 0.3
 MAX_TEMPERATURES = 1000
 MORE = "more particles"
-FORGOTTEN = 0.1
-"""Correlation with the start of a mutation, in any direction, below which the particles count as moved.
-
-With an unknown noise, 0.3 halves the sweeps and doubles the error of the log evidence.
-"""
-STOPPED = 1.1
-"""Growth of the squared distance from the start, over the second half of the sweeps, that counts as none."""
-TARGET_ACCEPTANCE = 0.8
-LONGEST_STEP = 1.5
-"""Leapfrog steps, in standard deviations, stay below this; the dynamics of a normal density break up at two."""
-LENGTH = 2.0
-"""Longest trajectory in standard deviations: steps are jittered, so that the mean is near a quarter period."""
-MAX_LEAPFROGS = 64
-SHORTEST = 0.1
-"""Shortest jump along the difference of two particles, as a share of the best length for a normal density."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +66,7 @@ class SmcSettings:
 
 
 @dataclass(frozen=True)
-class SmcDraws:
+class SmcDraws(Draws):
     r"""Draws from a posterior and its evidence, with the diagnostics of their quality.
 
     The draws of a run stand in genealogical order: particles that descend from the same ancestor are neighbours.
@@ -93,8 +76,6 @@ class SmcDraws:
 
     Parameters
     ----------
-    values : (runs, draws, d) array
-        Parameter values, in the unit of each; all have the same weight.
     increments : (temperatures, runs) array
         What each temperature added to the log evidence of each run.
     drifts : (temperatures, runs) array
@@ -108,24 +89,18 @@ class SmcDraws:
         Whether the particles forgot where their mutation started.
     acceptance : (temperatures, 2) array
         Mean acceptance of the trajectories and of the jumps.
-    names : tuple of str
-        What the messages call the d parameters.
 
     References
     ----------
     Del Moral, Doucet & Jasra (2006), Journal of the Royal Statistical Society B 68, 411-436.
-    Vehtari, Gelman, Simpson, Carpenter & Bürkner (2021), Bayesian Analysis 16, 667-718 (R-hat, effective
-    sample sizes).
     """
 
-    values: Floats
     increments: Floats
     drifts: Floats
     temperatures: Floats
     sweeps: NDArray[np.int64]
     moved: NDArray[np.bool_]
     acceptance: Floats
-    names: tuple[str, ...]
 
     @property
     def log_evidences(self) -> Floats:
@@ -156,59 +131,26 @@ class SmcDraws:
         return float(max(jackknife * stdtrit(runs - 1, ndtr(1.0)), by_temperature, drift))
 
     @cached_property
-    def rhat(self) -> Floats:
-        """Rank-normalised split R-hat between runs of each parameter, the larger of bulk and tail: (d,) array."""
-        return _diagnostic("rhat", self.values)
-
-    @cached_property
-    def ess_bulk(self) -> Floats:
-        """Effective sample size for the centre of each marginal, relatives discounted: (d,) array."""
-        return np.minimum(_diagnostic("ess", self.values, method="bulk"), self.distinct)
-
-    @cached_property
-    def ess_tail(self) -> Floats:
-        """Effective sample size for the 5 % and 95 % quantiles, the smaller of both: (d,) array."""
-        return np.minimum(_diagnostic("ess", self.values, method="tail", prob=0.05), self.distinct)
-
-    @cached_property
     def distinct(self) -> int:
         """Number of distinct draws, which no effective sample size exceeds."""
         return len(np.unique(self.values.reshape(-1, self.values.shape[-1]), axis=0))
 
-    def of(self, values: Floats, names: tuple[str, ...]) -> SmcDraws:
-        """Return the same runs with other quantities (runs, draws, k) that follow from their draws."""
-        return replace(self, values=values, names=names)
+    def _limited(self, sizes: Floats) -> Floats:
+        return np.minimum(sizes, self.distinct)
 
-    @property
-    def converged(self) -> bool:
-        """Whether every diagnostic passes its threshold."""
-        return not self._failures()
-
-    @property
-    def verdict(self) -> str:
-        """One sentence that says so, or what failed, and then what to try."""
-        failures = self._failures()
-        if failures:
-            found, remedies = zip(*failures, strict=True)
-            return f"Not converged: {'; '.join(found)}. Try {', or '.join(dict.fromkeys(remedies))}."
+    def _quality(self) -> str:
         return (
-            f"Converged: R-hat at most {self.rhat.max():.4f}, effective sample sizes at least "
-            f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), log evidence "
-            f"{self.log_evidence:.2f} with standard error {self.log_evidence_error:.2f} from {len(self.values)} runs."
+            f"log evidence {self.log_evidence:.2f} with standard error {self.log_evidence_error:.2f} from "
+            f"{len(self.values)} runs"
         )
 
     def _failures(self) -> list[tuple[str, str]]:
-        """Return what failed and its remedy; a diagnostic that is not a number fails."""
         failures = []
         worst = int(np.argmax(self.rhat))
         if not self.rhat[worst] < MAX_RHAT:
             found = f"R-hat between runs is {self.rhat[worst]:.3f} for {self.names[worst]}"
             failures.append((f"{found} and must be below {MAX_RHAT}", MORE))
-        for part, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
-            worst = int(np.argmin(sizes))
-            if not sizes[worst] > MIN_ESS:
-                found = f"the {part} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
-                failures.append((f"{found} and must exceed {MIN_ESS}", MORE))
+        failures += self._small_sizes(MIN_ESS, MORE)
         if not self.log_evidence_error < MAX_LOG_EVIDENCE_ERROR:
             found = f"the standard error of the log evidence is {self.log_evidence_error:.2f}"
             failures.append((f"{found} and must be below {MAX_LOG_EVIDENCE_ERROR}", MORE))
@@ -298,12 +240,12 @@ def sample_smc(
     labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
     if len(labels) != dimension:
         raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
-    program = _compile(log_likelihood, log_prior, box)
+    program = compiled_program(log_likelihood, log_prior, box)
     lines = _starting_lines(box, prior_draws, settings)
     log_likelihoods = _log_likelihoods_at_start(program, lines)
     # Not the plain seed: the caller may have drawn the prior's particles from it.
     generator = np.random.default_rng([settings.seed, 3])
-    mutation = _Mutation(program, settings, generator)
+    mutation = Mutation(program, settings.max_sweeps, settings.seed, generator)
 
     temperature = 0.0
     steps: list[tuple[Any, ...]] = []
@@ -319,14 +261,14 @@ def sample_smc(
         log_weights = rise * log_likelihoods
         increment = logsumexp(log_weights, axis=1)
         reweighted = np.where(log_weights > -np.inf, log_weights, 0) * np.exp(log_weights - increment[:, None])
-        chosen = _resample(log_weights, generator)
+        chosen = resampled_at_random(log_weights, generator)
         lines = np.take_along_axis(lines, chosen[:, :, None], axis=1)
         lines, log_likelihoods, *moves = mutation(lines, temperature)
         drift = rise * log_likelihoods.mean(1) - reweighted.sum(1)
         steps.append((increment - np.log(log_weights.shape[1]), drift, temperature, *moves))
     values = np.asarray(program.points(lines))
     increments, drifts, temperatures, sweeps, moved, acceptance = map(np.array, zip(*steps, strict=True))
-    return SmcDraws(values, increments, drifts, temperatures, sweeps, moved, acceptance, labels)
+    return SmcDraws(values, labels, increments, drifts, temperatures, sweeps, moved, acceptance)
 
 
 def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> Floats:
@@ -342,7 +284,7 @@ def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> 
     return np.stack([box.to_line(point) for point in points]).reshape(settings.runs, -1, expected[1])
 
 
-def _log_likelihoods_at_start(program: _Program, lines: Floats) -> Floats:
+def _log_likelihoods_at_start(program: Program, lines: Floats) -> Floats:
     """Return the log likelihoods of the prior draws, (runs, draws) array, checked together with their prior."""
     log_likelihoods, log_priors = (np.asarray(array) for array in program.densities(lines))
     if not np.isfinite(log_priors).all():
@@ -379,146 +321,5 @@ def _rise(log_likelihoods: Floats, most: float, ess_fraction: float) -> float:
     return float(np.exp(low))
 
 
-def _resample(log_weights: Floats, generator: np.random.Generator) -> NDArray[np.int64]:
-    """Return the indices of a systematic resampling of each run, in ascending order: relatives stay neighbours."""
-    weights = np.exp(log_weights - log_weights.max(1, keepdims=True))
-    edges = np.cumsum(weights, axis=1)
-    draws = weights.shape[1]
-    ticks = (np.arange(draws) + generator.random((len(weights), 1))) / draws * edges[:, -1:]
-    return np.stack([np.searchsorted(edge, tick, side="right") for edge, tick in zip(edges, ticks, strict=True)])
-
-
-class _Mutation:
-    """Moves the particles by sweeps until they have forgotten their start; keeps the step size between calls."""
-
-    def __init__(self, program: _Program, settings: SmcSettings, generator: np.random.Generator) -> None:
-        self.program = program
-        self.settings = settings
-        self.generator = generator
-        self.step_size = 1.0
-        self.key = jax.random.key(settings.seed)
-        self.count = 0
-
-    def __call__(self, lines: Floats, temperature: float) -> tuple[Floats, Floats, int, bool, Floats]:
-        """Return the moved particles, their log likelihoods, sweeps, whether they moved, and the acceptance."""
-        covariance = _covariance(lines)
-        root = np.linalg.cholesky(covariance)
-        start, moved = lines, False
-        distances: list[Floats] = []
-        accepted: list[Floats] = []
-        while not moved and len(distances) < self.settings.max_sweeps:
-            self.count += 1
-            key = jax.random.fold_in(self.key, self.count)
-            leapfrogs = int(np.clip(np.ceil(LENGTH / self.step_size), 1, MAX_LEAPFROGS))
-            # Jittered steps: no period of the dynamics resonates, and short ones enter narrow places.
-            sizes = self.step_size * self.generator.uniform(0.2, 1.0, lines.shape[:2])
-            # A run jumps along the differences of its neighbour. Its own particles depend on where each one started:
-            # jumps along theirs biased the log evidence of 15 parameters by 0.25.
-            jumps = _jumps(np.roll(start, 1, axis=0), self.generator)
-            moves = self.program.sweep(key, lines, temperature, covariance, sizes, leapfrogs, jumps)
-            lines, log_likelihoods, acceptance = (np.asarray(array) for array in moves)
-            # Pooled over all particles the acceptance is nearly exact, so its steps need no decay.
-            self.step_size *= float(np.exp(acceptance[0] - TARGET_ACCEPTANCE))
-            self.step_size = min(self.step_size, LONGEST_STEP)
-            accepted.append(acceptance)
-            before, after = (np.linalg.solve(root, array.reshape(-1, len(root)).T) for array in (start, lines))
-            moved = _has_moved(before, after, distances)
-        return lines, log_likelihoods, len(distances), moved, np.mean(accepted, axis=0)
-
-
-def _covariance(lines: Floats) -> Floats:
-    """Return the covariance of all particles, kept invertible should a coordinate have collapsed."""
-    covariance = np.atleast_2d(np.cov(lines.reshape(-1, lines.shape[-1]).T))
-    return covariance + 1e-10 * np.diag(np.diag(covariance) + np.finfo(float).tiny)
-
-
-def _has_moved(start: Floats, now: Floats, distances: list[Floats]) -> bool:
-    """Return whether the particles have forgotten their start in every whitened direction, (d, particles) arrays.
-
-    Either they are uncorrelated with it, or the median distance from it has stopped to grow: for a particle that
-    wanders, doubling the sweeps doubles its square. In separated modes, where all remember their mode, only the
-    second can happen.
-    """
-    distances.append(np.median(np.abs(now - start), axis=1) ** 2)
-    sweeps = len(distances)
-    correlations = np.array([np.corrcoef(*pair)[0, 1] for pair in zip(start, now, strict=True)])
-    has_moved = np.abs(correlations) < FORGOTTEN
-    if sweeps >= 4:
-        has_moved |= distances[-1] < STOPPED * distances[(sweeps + 1) // 2 - 1]
-    return bool(has_moved.all())
-
-
-class _Program(NamedTuple):
-    """The compiled functions of real-line coordinates, (runs, draws, d) array."""
-
-    sweep: Callable[..., tuple[Any, Any, Any]]
-    densities: Callable[[Any], tuple[Any, Any]]
-    points: Callable[[Any], Any]
-
-
-def _compile(log_likelihood: LogDensity, log_prior: LogDensity, box: Box) -> _Program:
-    """Return the functions of all particles at once; whatever changes with the temperature is an argument."""
-    trajectory = blackjax.hmc.build_kernel()
-    jump = blackjax.additive_step_random_walk.build_kernel()
-
-    def likelihood(line: Any) -> Any:
-        value = log_likelihood(box.from_line(line))
-        return jnp.where(jnp.isfinite(value), value, -jnp.inf)
-
-    def prior(line: Any) -> Any:
-        return log_prior(box.from_line(line)) + box.log_jacobian(line)
-
-    def sweep(
-        key: Any, lines: Any, temperature: Any, covariance: Any, sizes: Any, leapfrogs: Any, jumps: Any
-    ) -> tuple[Any, Any, Any]:
-        def tempered(line: Any) -> Any:
-            return prior(line) + temperature * likelihood(line)
-
-        def jump_once(state: Any, drawn: tuple[Any, Any]) -> tuple[Any, Any]:
-            key, by = drawn
-            state, info = jump(key, state, tempered, lambda key, line: by)
-            return state, info.acceptance_rate
-
-        def move(key: Any, line: Any, size: Any, jumps: Any) -> tuple[Any, Any, Any]:
-            key_trajectory, key_jumps = jax.random.split(key)
-            start = blackjax.hmc.init(line, tempered)
-            state, info = trajectory(key_trajectory, start, tempered, size, covariance, leapfrogs)
-            keys = jax.random.split(key_jumps, len(jumps))
-            state, accepted = jax.lax.scan(jump_once, RWState(state.position, state.logdensity), (keys, jumps))
-            return state.position, likelihood(state.position), jnp.stack([info.acceptance_rate, accepted.mean()])
-
-        keys = jax.random.split(key, lines.shape[:2])
-        moved, log_likelihoods, acceptance = jax.vmap(jax.vmap(move))(keys, lines, sizes, jumps)
-        return moved, log_likelihoods, acceptance.mean((0, 1))
-
-    # At XLA's usual level the kernels' random numbers take three times as long to compile and run no faster.
-    compiled = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 1})
-    densities = jax.vmap(jax.vmap(lambda line: (likelihood(line), prior(line))))
-    return _Program(compiled(sweep), compiled(densities), compiled(jax.vmap(jax.vmap(box.from_line))))
-
-
-def _jumps(clouds: Floats, generator: np.random.Generator) -> Floats:
-    """Return d jumps per particle along lines between two particles of a cloud, (runs, draws, d, d) array.
-
-    Now and then a jump has the full length, which changes the mode. Half of them move only some coordinates,
-    which enters the narrow places of a funnel.
-    """
-    runs, draws, dimension = clouds.shape
-    shape = (runs, draws, dimension)
-    one, other = (clouds[np.arange(runs)[:, None, None], generator.integers(draws, size=shape)] for _ in range(2))
-    shortened = 2.38 / np.sqrt(2 * dimension) * SHORTEST ** generator.random(shape)
-    sizes = np.where(generator.random(shape) < 0.1, 1.0, shortened)[..., None]
-    takes_part = (generator.random((*shape, 1)) < 0.5) | (generator.random(one.shape) < 0.5)
-    return np.asarray((one - other) * sizes * takes_part)
-
-
 def _log_mean(logarithms: Floats) -> float:
     return float(logsumexp(logarithms) - np.log(len(logarithms)))
-
-
-def _diagnostic(statistic: str, draws: Floats, **options: Any) -> Floats:
-    """Return one of ArviZ's diagnostics, imported when first needed, of a (runs, draws, d) array."""
-    from arviz_stats.base import array_stats
-
-    values = getattr(array_stats, statistic)(draws, chain_axis=0, draw_axis=1, **options)
-    return np.asarray(values, dtype=np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.marginal import Marginal
+from tissuq.inference.resampling import systematic
 from tissuq.model import StatisticalModel
 
 __all__ = ["Components", "Diagnostics", "Marginals", "Solution"]
@@ -50,17 +51,23 @@ class Components:
     def thinned(self, count: int) -> Components:
         """Return few components that stand for all, their weights summing to one.
 
-        The lightest, together less than 1e-7, are left out; if more than ``count`` remain, systematic resampling in
-        their order, which keeps neighbours apart, picks equally weighted ones.
+        The lightest, together less than 1e-7 of all, are left out; if more than ``count`` remain, systematic
+        resampling in their order, which keeps neighbours apart, picks equally weighted ones.
         """
         order = np.argsort(self.weights)
         heavy = self[np.sort(order[np.cumsum(self.weights[order]) > 1e-7 * self.weights.sum()])]
         total = heavy.weights.sum()
         if len(heavy.weights) <= count:
             return Components(heavy.weights / total, heavy.settings, heavy.mean, heavy.root)
-        targets = (np.arange(count) + 0.5) * total / count
-        picked = heavy[np.minimum(np.searchsorted(np.cumsum(heavy.weights), targets), len(heavy.weights) - 1)]
-        return Components(np.full(count, 1 / count), picked.settings, picked.mean, picked.root)
+        picked = heavy.resampled(count)
+        return Components(picked.weights / total, picked.settings, picked.mean, picked.root)
+
+    def resampled(self, count: int) -> Components:
+        """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""
+        if len(self.weights) <= count:
+            return self
+        chosen = self[systematic(self.weights[None], count)[0]]
+        return Components(np.full(count, self.weights.sum() / count), chosen.settings, chosen.mean, chosen.root)
 
 
 @dataclass(frozen=True)
