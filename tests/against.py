@@ -70,18 +70,24 @@ def both(
 
 
 def assert_agrees(
-    posterior: tq.Posterior, problem: Problem, tolerance: float = 1e-3, nodes: int = 0, width: float = 0.0
+    posterior: tq.Posterior,
+    problem: Problem,
+    tolerance: float = 1e-3,
+    nodes: int = 0,
+    width: float = 0.0,
+    refine: float = 1.0,
 ) -> Dense:
     """Hold evidence (within the stated error, the oracle's own added, and 1e-4), and C10's marginal against the oracle.
 
     ``tolerance`` is that of mean, sd and the width of the 95 % HDI, in standard deviations, and of what it holds. The
     ends may both move by more: at the shortest interval, its width does not change to first order. ``nodes`` is the
-    number of the oracle's panels along each axis, ``width`` another tolerance for the HDI.
+    number of the oracle's panels along each axis, ``refine`` multiplies it and all else in the oracle, and ``width`` is
+    another tolerance for the HDI.
     """
     rough, truth = (
         (integrate(problem, nodes=each) for each in (nodes - 1, nodes))
         if nodes
-        else (integrate(problem, refine=each) for each in (0.75, 1.0))
+        else (integrate(problem, refine=each * refine) for each in (0.75, 1.0))
     )
     own = 3 * abs(truth.log_evidence - rough.log_evidence) + 1e-10 * (1 + abs(truth.log_evidence))
     assert own < 5e-5, "the oracle itself is not accurate here"

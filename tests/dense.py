@@ -157,12 +157,14 @@ def integrate(problem: Problem, wanted: str = "", refine: float = 1.0, nodes: in
     """Integrate over everything; ``wanted`` is the linear parameter whose density is computed (the first one)."""
     names = tuple(problem.axes)
     ranges = {name: axis.ends for name, axis in problem.axes.items()}
+    bounds = np.array([[prior.low, prior.high] for prior in problem.linear.values()]).reshape(-1, 2)
     coarse = {0: 1, 1: 201, 2: 41, 3: 17}[len(names)]
     for _ in range(3 if names else 0):
         lines = {name: np.linspace(*ranges[name], coarse) for name in names}
         h, _ = _settings(problem, {name: (line, np.ones(coarse)) for name, line in lines.items()})
-        log = _log_given(problem, h)[0] + _log_prior(problem, h)
-        log = log + sum(0.5 * np.log(h[n] ** 2 + problem.axes[n].scale ** 2) for n in names)
+        log, mean, covariance = _log_given(problem, h)
+        log = log + _log_prior(problem, h) + sum(0.5 * np.log(h[n] ** 2 + problem.axes[n].scale ** 2) for n in names)
+        log = log + log_box_mass(mean, covariance, bounds, 16, log)
         keep = (log > log.max() - NEGLIGIBLE).reshape([coarse] * len(names))
         for place, name in enumerate(names):
             seen = np.flatnonzero(keep.any(axis=tuple(k for k in range(len(names)) if k != place)))
@@ -173,8 +175,8 @@ def integrate(problem: Problem, wanted: str = "", refine: float = 1.0, nodes: in
     log, mean, covariance = _log_given(problem, h)
     log = log + _log_prior(problem, h) + log_weights
     inside = np.full(len(log), -np.inf)
-    heavy = log > log.max() - 2 * NEGLIGIBLE
-    bounds = np.array([[prior.low, prior.high] for prior in problem.linear.values()]).reshape(-1, 2)
+    ceiling = log + _log_single_mass(mean, covariance, bounds)
+    heavy = ceiling > ceiling.max() - 2 * NEGLIGIBLE
     order = round(48 * refine)
     inside[heavy] = log_box_mass(mean[heavy], covariance[heavy], bounds, order, log[heavy])
     total = log + inside
@@ -215,6 +217,12 @@ def log_box_mass(mean: Array, covariance: Array, bounds: Array, order: int, log_
     blocks = np.array_split(np.arange(len(mean)), 1 + len(mean) * order ** (len(active) - 1) // 1_000_000)
     found = [_nested(mean[b], covariance[b], bounds, order) for b in blocks]
     return np.concatenate(found)
+
+
+def _log_single_mass(mean: Array, covariance: Array, bounds: Array) -> Array:
+    """Return the least log mass (M,) within the bounds (p, 2) of single parameters."""
+    sd = np.sqrt(np.einsum("mii->mi", covariance))
+    return log_interval((bounds[:, 0] - mean) / sd, (bounds[:, 1] - mean) / sd).min(axis=1, initial=0.0)
 
 
 def _nested(mean: Array, covariance: Array, bounds: Array, order: int) -> Array:

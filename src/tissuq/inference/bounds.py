@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes
+from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes, lower_triangle, quasi_random
 from tissuq.inference.marginal import (
     Marginal,
     blended,
+    marginal_of_crossed_mixture,
     marginal_of_cut_mixture,
     marginal_of_mixture,
     marginal_of_points,
 )
+from tissuq.inference.nested import MOST_NESTED
 from tissuq.inference.solution import Components
 
 __all__ = ["Bounded", "bounded"]
 
 FloatArray = NDArray[np.float64]
 
-RESAMPLED = 4000
+DRAWN = 4000
+"""Draws, at least, that represent what bounds cut, in predictions and in a posterior's draws."""
 REPRESENTED = 200
-"""Components, at most, that are represented by points."""
-FEW_POINTS, SOME_POINTS, ALL_POINTS = 2000, 50_000, 1_200_000
-"""Points, at least, that represent all of them together: few where they are a small share of the posterior."""
-SMALL_SHARE = 0.05
+"""Components, at most, whose marginals within several bounds are computed."""
+POINTS = 200_000
+"""Points, at least, that stand for all of them together where more bounds cut than can be integrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,20 +58,15 @@ class Bounded:
         return bool(self.cut) or len(self.crossed.weights) > 0
 
     def components(self) -> Components:
-        """Return all as one mixture: Gaussians, and equally weighted points within the bounds for what they cut."""
-        cut = [each for each in (*self.cut.values(), self.crossed) if len(each.weights)]
+        """Return all as one mixture: Gaussians, and draws within the bounds from what these cut."""
         whole = self.free
-        for each in cut:
-            points = self._crossed_points if each is self.crossed else self._points(each, SOME_POINTS)
-            whole = whole.joined(points.resampled(RESAMPLED // len(cut)))
+        for each in (*self.cut.values(), self.crossed):
+            if len(each.weights):
+                whole = whole.joined(self._drawn(each))
         return whole
 
-    @cached_property
-    def _crossed_points(self) -> Components:
-        return self._points(self.crossed, ALL_POINTS)
-
     def marginal(self, place: int) -> Marginal:
-        """Return the marginal of one linear parameter: in closed form unless several bounds cut."""
+        """Return the marginal of one linear parameter: in closed form where at most one bound cuts."""
         bounds = float(self.box.lower[0, place]), float(self.box.upper[0, place])
         parts = []
         if len(self.free.weights):
@@ -85,23 +81,55 @@ class Bounded:
             marginal = marginal_of_cut_mixture(each.weights, each.mean, covariance, place, which, ends)
             parts.append((each.weights.sum(), marginal))
         if len(self.crossed.weights):
-            points = self._crossed_points
-            parts.append((points.weights.sum(), marginal_of_points(points.mean[:, place], points.weights, bounds)))
+            parts += self._crossed_marginals(place, bounds)
         return blended(parts, bounds)
 
-    def _points(self, components: Components, number: int) -> Components:
-        few = components.thinned(REPRESENTED)
-        share = components.weights.sum()
-        total = number if share > SMALL_SHARE else FEW_POINTS
-        every = self.box[np.zeros(len(few.weights), dtype=int)]
-        log_shares, points = every.points(few.mean, few.root, max(64, total // len(few.weights)))
+    def _crossed_marginals(self, place: int, bounds: tuple[float, float]) -> list[tuple[float, Marginal]]:
+        """Return marginals of what several bounds cut, with their weights: by which bounds these are."""
+        few = self.crossed.thinned(REPRESENTED)
+        share, every = self.crossed.weights.sum(), self._boxes(few)
+        active = every.beyond(few.mean, few.root) > TOUCHED
+        active[:, place] = True
+        found = []
+        for pattern in np.unique(active, axis=0):
+            own = few[(active == pattern).all(axis=1)]
+            order = np.array([place, *(k for k in np.flatnonzero(pattern) if k != place)])
+            if len(order) > MOST_NESTED:
+                points = self._points(own)
+                marginal = marginal_of_points(points.mean[:, place], points.weights, bounds)
+            else:
+                low, high = ((ends[0] - own.mean)[:, order] for ends in (self.box.lower, self.box.upper))
+                triangle = lower_triangle(own.root[:, order])
+                marginal = marginal_of_crossed_mixture(own.weights, own.mean[:, place], triangle, low, high)
+            found.append((share * own.weights.sum(), marginal))
+        return found
+
+    def _boxes(self, components: Components) -> Boxes:
+        return self.box[np.zeros(len(components.weights), dtype=int)]
+
+    def _drawn(self, components: Components) -> Components:
+        """Return draws within the bounds, as components without extent."""
+        few = components.thinned(DRAWN)
+        count, p = few.mean.shape
+        each = -(-DRAWN // count)
+        uniforms = quasi_random(p, count * each).reshape(count, each, p)
+        points = self._boxes(few).draws(few.mean, few.root, uniforms)
+        return _of_points(few, components.weights.sum() * np.ones(points.shape[:2]) / points.shape[1], points)
+
+    def _points(self, components: Components) -> Components:
+        """Return weighted points within the bounds."""
+        number = max(64, POINTS // len(components.weights))
+        log_shares, points = self._boxes(components).points(components.mean, components.root, number)
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
-        weights = (few.weights[:, None] * shares / shares.sum(axis=1, keepdims=True)).ravel()
-        kept = weights > 1e-12 * weights.max()
-        p = points.shape[2]
-        settings = np.repeat(few.settings, points.shape[1], axis=0)[kept]
-        weights = weights[kept] * (share / weights[kept].sum())
-        return Components(weights, settings, points.reshape(-1, p)[kept], np.zeros((len(weights), p, p)))
+        return _of_points(components, shares / shares.sum(axis=1, keepdims=True), points)
+
+
+def _of_points(components: Components, shares: FloatArray, points: FloatArray) -> Components:
+    """Return components without extent: points (M, R, p) that have shares (M, R) of the weights of M components."""
+    weights = (components.weights[:, None] * shares).ravel()
+    settings = np.repeat(components.settings, points.shape[1], axis=0)
+    p = points.shape[2]
+    return Components(weights, settings, points.reshape(-1, p), np.zeros((len(weights), p, p)))
 
 
 def bounded(components: Components, beyond: FloatArray, box: Boxes) -> Bounded:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -10,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.gaussian import interval_quantile, log_interval
+from tissuq.inference.nested import MOST_NESTED, nested_draws, nested_log_mass
 
-__all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes"]
+__all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes", "lower_triangle", "quasi_random"]
 
 FloatArray = NDArray[np.float64]
+Places = NDArray[np.intp]
 
 NEGLIGIBLE = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
@@ -29,9 +32,8 @@ DEEP = 15.0
 AT_ONCE = 500_000
 """Points at once: what bounds the memory."""
 MOST_POINTS = 30_000
-FEW_POINTS = 128
-NEARLY_ALL = 1e-2
-"""Mass outside up to which few points compute the mass inside: their error is a share of the mass outside."""
+SWEEPS = 100
+"""Gibbs sweeps that take draws to their distribution."""
 SHIFTS = 8
 """Shifted copies of the quasi-random points, whose spread tells the error (more, where few points count)."""
 
@@ -64,8 +66,9 @@ class Boxes:
         """Return the log mass (M,) of M Gaussians inside the bounds (M, p), and its error (M,).
 
         It is at least one less the sum of the masses beyond single bounds, which is near enough where that is small.
-        Elsewhere it is computed over the parameters that come near their bounds: exactly for one, and by Genz's
-        sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph. Stat. 1:141).
+        Elsewhere it is computed over the parameters that come near their bounds: by nested quadrature for up to
+        three, and by Genz's sequential conditioning on quasi-random points for more (Genz 1992, J. Comput. Graph.
+        Stat. 1:141).
         """
         low, high = self._scores(mean, root)
         beyond = _beyond(low, high)
@@ -78,18 +81,71 @@ class Boxes:
             log_mass[alone] = log_interval(*(np.take_along_axis(s[alone], only, 1)[:, 0] for s in (low, high)))
             error[alone] = 0.0
         several = (active.sum(axis=1) > 1) & (outside > SMALL)
-        effort = np.column_stack([outside < NEARLY_ALL, active])
-        for pattern in np.unique(effort[several], axis=0):
-            crossed = np.flatnonzero(several & (effort == pattern).all(axis=1))
-            kept = np.flatnonzero(pattern[1:])
-            own_root = root[crossed][:, kept]
+        for kept, crossed in _by_pattern(active, several):
             part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
-            found = part._by_points(mean[crossed][:, kept], own_root, FEW_POINTS if pattern[0] else POINTS)
+            found = part._log_mass(mean[crossed][:, kept], root[crossed][:, kept])
             log_mass[crossed], error[crossed] = found
-            # The error is not to be trusted where no bound alone tells how little is left.
-            ceiling = part.ceiling(mean[crossed][:, kept], own_root)
-            error[crossed] += np.where(ceiling - log_mass[crossed] > DEEP, 1.0, 0.0)
         return log_mass, error
+
+    def draws(self, mean: FloatArray, root: FloatArray, uniforms: FloatArray) -> FloatArray:
+        """Return R draws within the bounds from each of M Gaussians, (M, R, p), from uniforms (M, R, p).
+
+        Exact where up to three bounds matter; else a few weighted points, then Gibbs sweeps.
+        """
+        from scipy.special import ndtri
+
+        values = np.empty(uniforms.shape)
+        active = self.beyond(mean, root) > TOUCHED
+        for kept, rows in _by_pattern(active, np.ones(len(mean), dtype=bool)):
+            every, k = self[rows], len(kept)
+            if k > MOST_NESTED:
+                values[rows] = every._gibbs(mean[rows], root[rows], uniforms[rows])
+                continue
+            order = np.concatenate([kept, np.setdiff1d(np.arange(mean.shape[1]), kept)])
+            triangle, own = lower_triangle(root[rows][:, order]), uniforms[rows]
+            scores = ndtri(own)
+            if k:
+                low, high = ((bound - mean[rows])[:, kept] for bound in (every.lower, every.upper))
+                scores[:, :, :k] = nested_draws(triangle[:, :k, :k], low, high, own[:, :, :k])
+            values[rows[:, None, None], np.arange(own.shape[1])[:, None], order] = mean[rows][
+                :, None, order
+            ] + np.einsum("mjk,mrk->mrj", triangle, scores)
+        return np.clip(values, self.lower[:, None], self.upper[:, None])
+
+    def _log_mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return log masses and their errors where every bound matters."""
+        if mean.shape[1] > MOST_NESTED:
+            log_mass, error = self._by_points(mean, root, POINTS)
+            # The error is not to be trusted where no bound alone tells how little is left.
+            return log_mass, error + np.where(self.ceiling(mean, root) - log_mass > DEEP, 1.0, 0.0)
+        log_mass, error = np.empty(len(mean)), np.empty(len(mean))
+        for block in np.array_split(np.arange(len(mean)), 1 + len(mean) // 500):
+            ends = ((bound[block] - mean[block]) for bound in (self.lower, self.upper))
+            log_mass[block], error[block] = nested_log_mass(lower_triangle(root[block]), *ends)
+        return log_mass, error
+
+    def _gibbs(self, mean: FloatArray, root: FloatArray, uniforms: FloatArray) -> FloatArray:
+        """Return draws (M, R, p) from uniforms (M, R, p) that start the sweeps."""
+        each, p = uniforms.shape[1:]
+        rows = np.repeat(np.arange(len(mean)), each)
+        boxes, mean, root = self[rows], mean[rows], root[rows]
+        generator, values = np.random.default_rng(0), np.empty(mean.shape)
+        for block in np.array_split(np.arange(len(rows)), max(1, len(rows) // 500)):
+            log_weights, points = boxes[block].points(mean[block], root[block])
+            cumulative = np.cumsum(np.exp(log_weights - log_weights.max(axis=1, keepdims=True)), axis=1)
+            place = uniforms.reshape(-1, p)[block, :1] * cumulative[:, -1:]
+            values[block] = points[np.arange(len(block)), (cumulative < place).sum(axis=1)]
+        inverse = np.linalg.inv(root)
+        precision = inverse.swapaxes(1, 2) @ inverse
+        for _ in range(SWEEPS):
+            for j in range(p):
+                own, away = precision[:, j, j], values - mean
+                away[:, j] = 0.0
+                centre = mean[:, j] - (precision[:, j] * away).sum(axis=1) / own
+                ends = ((bound[:, j] - centre) * np.sqrt(own) for bound in (boxes.lower, boxes.upper))
+                score, _ = interval_quantile(generator.random(len(own)), *ends)
+                values[:, j] = np.clip(centre + score / np.sqrt(own), boxes.lower[:, j], boxes.upper[:, j])
+        return values.reshape(-1, each, p)
 
     def _by_points(self, mean: FloatArray, root: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
         """Return the log mass inside the bounds and its error by quasi-random points; more of them where needed."""
@@ -116,8 +172,8 @@ class Boxes:
         """
         count, p = mean.shape
         order = np.argsort(-self.beyond(mean, root).mean(axis=0))  # the tightest bound first
-        triangle = _triangle(root[:, order])
-        uniforms = _quasi_random(p, number)
+        triangle = lower_triangle(root[:, order])
+        uniforms = quasi_random(p, number)
         log_weights = np.zeros((count, len(uniforms)))
         standard = np.empty((count, len(uniforms), p))
         points = np.empty_like(standard)
@@ -144,7 +200,13 @@ def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
     return np.asarray(ndtr(low) + ndtr(-high))
 
 
-def _triangle(root: FloatArray) -> FloatArray:
+def _by_pattern(active: NDArray[np.bool_], rows: NDArray[np.bool_]) -> Iterator[tuple[Places, Places]]:
+    """Yield places of parameters whose bounds matter, and the rows among some of which this is true."""
+    for pattern in np.unique(active[rows], axis=0):
+        yield np.flatnonzero(pattern), np.flatnonzero(rows & (active == pattern).all(axis=1))
+
+
+def lower_triangle(root: FloatArray) -> FloatArray:
     """Return lower triangles L (M, k, k) with L L' = root root' for roots (M, k, p), without squaring them."""
     upper = np.asarray(np.linalg.qr(root.swapaxes(1, 2), mode="r"), dtype=np.float64)
     diagonal = np.einsum("mii->mi", upper)
@@ -155,7 +217,7 @@ def _triangle(root: FloatArray) -> FloatArray:
 
 
 @lru_cache
-def _quasi_random(dimension: int, number: int) -> FloatArray:
+def quasi_random(dimension: int, number: int) -> FloatArray:
     """Return a Kronecker sequence of the generalised golden ratio in the unit cube, shifted copy by shifted copy.
 
     The tent map makes any integrand periodic, which lets the error fall faster than one over the number of points.
@@ -165,5 +227,5 @@ def _quasi_random(dimension: int, number: int) -> FloatArray:
         ratio = (1 + ratio) ** (1 / (dimension + 1))
     steps = ratio ** -np.arange(1.0, dimension + 1)
     shifts = np.random.default_rng(0).random((SHIFTS, 1, dimension))
-    lattice = shifts + np.arange(1, number // SHIFTS + 1)[:, None] * steps
-    return np.asarray(np.abs(2 * (lattice % 1.0) - 1)).reshape(-1, dimension)
+    lattice = shifts + np.arange(1, -(-number // SHIFTS) + 1)[:, None] * steps
+    return np.asarray(np.abs(2 * (lattice % 1.0) - 1)).reshape(-1, dimension)[:number]

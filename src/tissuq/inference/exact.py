@@ -55,7 +55,7 @@ def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[Exa
 
     Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
     linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
-    off more, it is represented by points within them. The error given with the evidence is that of the
+    off more, they are integrated numerically. The error given with the evidence is that of the
     quadrature and of the mass within the bounds.
 
     Parameters

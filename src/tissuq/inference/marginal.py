@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.gaussian import log_interval
+from tissuq.inference.nested import nested_log_density, nested_points
 from tissuq.inference.quadrature import Lines, Quadrature
 from tissuq.inference.warp import Warp
 
 __all__ = [
     "Marginal",
     "blended",
+    "marginal_of_crossed_mixture",
     "marginal_of_cut_mixture",
     "marginal_of_mixture",
     "marginal_of_points",
@@ -153,6 +155,39 @@ def marginal_of_cut_mixture(
     points = _between(coarse)
     cumulative = smooth.antiderivative()(points)
     return Marginal(mean, float(np.sqrt(variance)), points, np.maximum(smooth(points), 0.0), _proper(cumulative))
+
+
+def marginal_of_crossed_mixture(
+    weights: FloatArray, means: FloatArray, triangle: FloatArray, low: FloatArray, high: FloatArray
+) -> Marginal:
+    """Return the marginal of the first parameter of M Gaussians that bounds of several parameters cut.
+
+    Parameters
+    ----------
+    weights, means : (M,) arrays
+        Of the Gaussians after the cut, and of the parameter before it.
+    triangle : (M, k, k) array
+        Lower triangles L of the covariances L L'.
+    low, high : (M, k) arrays
+        Bounds, from the means.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    scale = triangle[:, 0, :1]
+    scores, log_terms = nested_points(triangle, low, high)
+    top = log_terms.max(axis=1, keepdims=True)
+    log_mass = top + np.log(np.exp(log_terms - top).sum(axis=1, keepdims=True))
+    shares = (weights / weights.sum())[:, None] * np.exp(log_terms - log_mass)
+    values = means[:, None] + scale * scores
+    mean = float((shares * values).sum())
+    sd = float(np.sqrt((shares * (values - mean) ** 2).sum()))
+    coarse = _grid(values.ravel(), shares.ravel(), (values.min(), values.max()), 2 * NODES)
+    scores = (coarse - means[:, None]) / scale
+    log_density = nested_log_density(triangle, low, high, scores)[0] - log_mass
+    within = (scores >= low[:, :1] / scale) & (scores <= high[:, :1] / scale)
+    density = (weights / weights.sum() / scale[:, 0]) @ np.where(within, np.exp(log_density), 0.0)
+    smooth, points = PchipInterpolator(coarse, density), _between(coarse)
+    return Marginal(mean, sd, points, np.maximum(smooth(points), 0.0), _proper(smooth.antiderivative()(points)))
 
 
 def marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, values: FloatArray) -> Marginal:

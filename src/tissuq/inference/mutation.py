@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import blackjax
@@ -13,7 +13,7 @@ import numpy as np
 from blackjax.mcmc.random_walk import RWState
 from numpy.typing import NDArray
 
-from tissuq.inference.coordinates import Box, LogDensity
+from tissuq.inference.coordinates import Box
 
 __all__ = ["Mutation", "Program", "compiled_program"]
 
@@ -39,8 +39,11 @@ SHORTEST = 0.1
 class Mutation:
     """Moves the particles by sweeps until they have forgotten their start; keeps the step size between calls."""
 
-    def __init__(self, program: Program, max_sweeps: int, seed: int, generator: np.random.Generator) -> None:
+    def __init__(
+        self, program: Program, data: tuple[Any, ...], max_sweeps: int, seed: int, generator: np.random.Generator
+    ) -> None:
         self.program = program
+        self.data = data
         self.max_sweeps = max_sweeps
         self.generator = generator
         self.step_size = 1.0
@@ -63,7 +66,7 @@ class Mutation:
             # A run jumps along the differences of its neighbour. Its own particles depend on where each one started:
             # jumps along theirs biased the log evidence of 15 parameters by 0.25.
             jumps = _jumps(np.roll(start, 1, axis=0), self.generator)
-            moves = self.program.sweep(key, lines, temperature, covariance, sizes, leapfrogs, jumps)
+            moves = self.program.sweep(key, lines, temperature, covariance, sizes, leapfrogs, jumps, *self.data)
             lines, log_likelihoods, acceptance = (np.asarray(array) for array in moves)
             # Pooled over all particles the acceptance is nearly exact, so its steps need no decay.
             self.step_size *= float(np.exp(acceptance[0] - TARGET_ACCEPTANCE))
@@ -97,30 +100,37 @@ def _has_moved(start: Floats, now: Floats, distances: list[Floats]) -> bool:
 
 
 class Program(NamedTuple):
-    """The compiled functions of real-line coordinates, (runs, draws, d) array."""
+    """The compiled functions of real-line coordinates, (runs, draws, d); data follow where densities take them."""
 
     sweep: Callable[..., tuple[Any, Any, Any]]
-    densities: Callable[[Any], tuple[Any, Any]]
+    densities: Callable[..., tuple[Any, Any]]
     points: Callable[[Any], Any]
 
 
-def compiled_program(log_likelihood: LogDensity, log_prior: LogDensity, box: Box) -> Program:
-    """Return the functions of all particles at once; whatever changes with the temperature is an argument."""
+@lru_cache(maxsize=64)
+def compiled_program(
+    log_likelihood: Callable[..., Any],
+    log_prior: Callable[..., Any],
+    lower: tuple[float, ...],
+    upper: tuple[float, ...],
+) -> Program:
+    """Return the functions of all particles at once; whatever changes with temperature or data is an argument."""
+    box = Box(lower, upper)
     trajectory = blackjax.hmc.build_kernel()
     jump = blackjax.additive_step_random_walk.build_kernel()
 
-    def likelihood(line: Any) -> Any:
-        value = log_likelihood(box.from_line(line))
+    def likelihood(line: Any, *data: Any) -> Any:
+        value = log_likelihood(box.from_line(line), *data)
         return jnp.where(jnp.isfinite(value), value, -jnp.inf)
 
-    def prior(line: Any) -> Any:
-        return log_prior(box.from_line(line)) + box.log_jacobian(line)
+    def prior(line: Any, *data: Any) -> Any:
+        return log_prior(box.from_line(line), *data) + box.log_jacobian(line)
 
     def sweep(
-        key: Any, lines: Any, temperature: Any, covariance: Any, sizes: Any, leapfrogs: Any, jumps: Any
+        key: Any, lines: Any, temperature: Any, covariance: Any, sizes: Any, leapfrogs: Any, jumps: Any, *data: Any
     ) -> tuple[Any, Any, Any]:
         def tempered(line: Any) -> Any:
-            return prior(line) + temperature * likelihood(line)
+            return prior(line, *data) + temperature * likelihood(line, *data)
 
         def jump_once(state: Any, drawn: tuple[Any, Any]) -> tuple[Any, Any]:
             key, by = drawn
@@ -133,15 +143,18 @@ def compiled_program(log_likelihood: LogDensity, log_prior: LogDensity, box: Box
             state, info = trajectory(key_trajectory, start, tempered, size, covariance, leapfrogs)
             keys = jax.random.split(key_jumps, len(jumps))
             state, accepted = jax.lax.scan(jump_once, RWState(state.position, state.logdensity), (keys, jumps))
-            return state.position, likelihood(state.position), jnp.stack([info.acceptance_rate, accepted.mean()])
+            acceptance = jnp.stack([info.acceptance_rate, accepted.mean()])
+            return state.position, likelihood(state.position, *data), acceptance
 
         keys = jax.random.split(key, lines.shape[:2])
         moved, log_likelihoods, acceptance = jax.vmap(jax.vmap(move))(keys, lines, sizes, jumps)
         return moved, log_likelihoods, acceptance.mean((0, 1))
 
+    def densities(lines: Any, *data: Any) -> tuple[Any, Any]:
+        return jax.vmap(jax.vmap(lambda line: (likelihood(line, *data), prior(line, *data))))(lines)
+
     # At XLA's usual level the kernels' random numbers take three times as long to compile and run no faster.
     compiled = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 1})
-    densities = jax.vmap(jax.vmap(lambda line: (likelihood(line), prior(line))))
     return Program(compiled(sweep), compiled(densities), compiled(jax.vmap(jax.vmap(box.from_line))))
 
 

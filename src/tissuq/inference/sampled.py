@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.gaussian import interval_quantile
 from tissuq.inference.box import Boxes
 from tissuq.inference.densities import Density, given_density, joint_density
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points
@@ -31,8 +30,6 @@ LARGEST_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""
 PRIOR_POINTS = 512
 """Points of the prior among which the sampler starts at the best."""
-SWEEPS = 100
-"""Gibbs sweeps that take draws within several bounds to their distribution."""
 EFFECTIVE = 0.5
 """Share of the draws that must stay effective when the bounds of the linear parameters weight them."""
 
@@ -114,9 +111,7 @@ def sample_smc_given(model: StatisticalModel, seed: int = 0) -> SampledSolution:
     lower, upper = np.array([prior.support for prior in priors]).T
     settings = SmcSettings(seed=seed)
     points = _prior_points(model, np.random.default_rng([seed, 7]).random((settings.particles, len(priors))))
-    sampled = sample_smc(
-        lambda h: density(h, data)[0], lambda h: density(h, data)[1], lower, upper, points, settings, model.nonlinear
-    )
+    sampled = sample_smc(*_likelihood_and_prior(density), lower, upper, points, settings, model.nonlinear, data)
     given = _Given(model, density, data, sampled.values)
     reason = f"tempered SMC on {', '.join(model.nonlinear)}; {given.rest}"
     found = SampledSolution(model, "smc", reason, given.draws(seed), given, sampled)
@@ -165,32 +160,14 @@ class _Given:
         if self.is_cut:
             within = resampled_at_random(self._log_inside.reshape(self.shape), generator)
             chosen = (within + self.shape[1] * np.arange(self.shape[0])[:, None]).ravel()
+            uniforms = generator.random((len(chosen), 1, linear.shape[1]))
             settings = settings[chosen]
-            linear = self._within(chosen, generator)
+            linear = self._boxes[chosen].draws(self.mean[chosen], self.root[chosen], uniforms)[:, 0]
         else:
             linear += np.einsum("nij,nj->ni", self.root, generator.standard_normal(self.mean.shape))
         columns = np.column_stack([settings, linear]).T.reshape(-1, *self.shape)
         named = dict(zip((*self.model.nonlinear, *self.model.linear), columns, strict=True))
         return {symbol: named[symbol] for symbol in self.model.symbols}
-
-    def _within(self, chosen: NDArray[np.intp], generator: np.random.Generator) -> FloatArray:
-        """Return one draw within the bounds for each chosen Gaussian: a few weighted points, then Gibbs sweeps."""
-        boxes, values = self._boxes[chosen], np.empty((len(chosen), self.mean.shape[1]))
-        for block in np.array_split(np.arange(len(chosen)), max(1, len(chosen) // 500)):
-            log_weights, points = boxes[block].points(self.mean[chosen[block]], self.root[chosen[block]])
-            noise = generator.gumbel(size=log_weights.shape)
-            values[block] = points[np.arange(len(block)), (log_weights + noise).argmax(axis=1)]
-        inverse = np.linalg.inv(self.root[chosen])
-        precision = inverse.swapaxes(1, 2) @ inverse
-        for _ in range(SWEEPS):
-            for j in range(values.shape[1]):
-                own, away = precision[:, j, j], values - self.mean[chosen]
-                away[:, j] = 0.0
-                centre = self.mean[chosen, j] - (precision[:, j] * away).sum(axis=1) / own
-                ends = ((bound[:, j] - centre) * np.sqrt(own) for bound in (boxes.lower, boxes.upper))
-                score, _ = interval_quantile(generator.random(len(own)), *ends)
-                values[:, j] = np.clip(centre + score / np.sqrt(own), boxes.lower[:, j], boxes.upper[:, j])
-        return values
 
 
 class SampledSolution(Solution):
@@ -278,6 +255,12 @@ def _check_size(model: StatisticalModel) -> None:
 def _log_posterior(density: Density) -> Density:
     """Return log p(y | h) + log p(h); the same function for the same density."""
     return lambda h, data: sum(density(h, data)[:2])
+
+
+@lru_cache(maxsize=64)
+def _likelihood_and_prior(density: Density) -> tuple[Density, Density]:
+    """Return log p(y | h) and log p(h); the same functions for the same density."""
+    return lambda h, data: density(h, data)[0], lambda h, data: density(h, data)[1]
 
 
 @lru_cache(maxsize=64)

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from scipy.special import logsumexp, ndtr, stdtrit
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.convergence import MAX_RHAT, Draws
-from tissuq.inference.coordinates import Box, LogDensity
+from tissuq.inference.coordinates import Box
 from tissuq.inference.mutation import Mutation, Program, compiled_program
 from tissuq.inference.resampling import resampled_at_random
 
@@ -163,13 +163,14 @@ class SmcDraws(Draws):
 
 
 def sample_smc(
-    log_likelihood: LogDensity,
-    log_prior: LogDensity,
+    log_likelihood: Callable[..., Any],
+    log_prior: Callable[..., Any],
     lower: ArrayLike,
     upper: ArrayLike,
     prior_draws: ArrayLike,
     settings: SmcSettings | None = None,
     names: Sequence[str] | None = None,
+    data: Any = None,
 ) -> SmcDraws:
     r"""Lead particles from the prior to the posterior through powers of the likelihood.
 
@@ -198,6 +199,9 @@ def sample_smc(
         Numbers of particles and runs, care and seed.
     names : sequence of str, optional
         What to call the parameters in messages.
+    data : pytree of arrays, optional
+        A second argument of both densities. What is compiled once for them and the bounds serves all data of one
+        shape.
 
     Returns
     -------
@@ -240,12 +244,13 @@ def sample_smc(
     labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
     if len(labels) != dimension:
         raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
-    program = compiled_program(log_likelihood, log_prior, box)
+    given = () if data is None else (data,)
+    program = compiled_program(log_likelihood, log_prior, tuple(box.lower.tolist()), tuple(box.upper.tolist()))
     lines = _starting_lines(box, prior_draws, settings)
-    log_likelihoods = _log_likelihoods_at_start(program, lines)
+    log_likelihoods = _log_likelihoods_at_start(program, lines, given)
     # Not the plain seed: the caller may have drawn the prior's particles from it.
     generator = np.random.default_rng([settings.seed, 3])
-    mutation = Mutation(program, settings.max_sweeps, settings.seed, generator)
+    mutation = Mutation(program, given, settings.max_sweeps, settings.seed, generator)
 
     temperature = 0.0
     steps: list[tuple[Any, ...]] = []
@@ -284,9 +289,9 @@ def _starting_lines(box: Box, prior_draws: ArrayLike, settings: SmcSettings) -> 
     return np.stack([box.to_line(point) for point in points]).reshape(settings.runs, -1, expected[1])
 
 
-def _log_likelihoods_at_start(program: Program, lines: Floats) -> Floats:
+def _log_likelihoods_at_start(program: Program, lines: Floats, data: tuple[Any, ...]) -> Floats:
     """Return the log likelihoods of the prior draws, (runs, draws) array, checked together with their prior."""
-    log_likelihoods, log_priors = (np.asarray(array) for array in program.densities(lines))
+    log_likelihoods, log_priors = (np.asarray(array) for array in program.densities(lines, *data))
     if not np.isfinite(log_priors).all():
         index = int(np.argmin(np.isfinite(log_priors)))
         raise InputError(f"the log prior is {log_priors.ravel()[index]} at prior draw {index}; it must be finite.")

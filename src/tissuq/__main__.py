@@ -1,0 +1,5 @@
+"""`python -m tissuq` is `tissuq`."""
+
+from tissuq.cli import main
+
+main()
