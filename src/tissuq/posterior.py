@@ -126,12 +126,10 @@ class Posterior:
         unknown = [symbol for symbol in wanted if symbol not in self.model.symbols]
         if unknown:
             raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(self.model.symbols)}.")
-        rows = {}
-        for symbol in wanted:
-            marginal = self.solution.marginals[symbol]
-            low, high = marginal.hdi(prob)
-            rows[symbol] = {"mean": marginal.mean, "sd": marginal.sd, "hdi_low": low, "hdi_high": high}
-        table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+        marginals = [self.solution.marginals[symbol] for symbol in wanted]
+        rows = [(marginal.mean, marginal.sd, *marginal.hdi(prob)) for marginal in marginals]
+        index = pd.Index(wanted, name="parameter")
+        table = pd.DataFrame(np.array(rows), index, ["mean", "sd", "hdi_low", "hdi_high"])
         found = self.solution.diagnostics
         if found is not None:
             table["ess"] = [min(found.ess_bulk[symbol], found.ess_tail[symbol]) for symbol in table.index]

@@ -202,7 +202,7 @@ def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
 
 def _by_pattern(active: NDArray[np.bool_], rows: NDArray[np.bool_]) -> Iterator[tuple[Places, Places]]:
     """Yield places of parameters whose bounds matter, and the rows among some of which this is true."""
-    for pattern in np.unique(active[rows], axis=0):
+    for pattern in np.unique(active[rows], axis=0) if rows.any() else ():
         yield np.flatnonzero(pattern), np.flatnonzero(rows & (active == pattern).all(axis=1))
 
 

@@ -13,7 +13,7 @@ from tissuq.discrepancy import Discrepancy
 from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
 
-__all__ = ["Spectrum", "correlation_spectrum", "scaled_spectrum"]
+__all__ = ["FEW_POINTS", "Spectrum", "correlation_spectrum", "scaled_spectrum"]
 
 FloatArray = NDArray[np.float64]
 

@@ -17,6 +17,7 @@ __all__ = [
     "blended",
     "marginal_of_crossed_mixture",
     "marginal_of_cut_mixture",
+    "marginal_of_logs",
     "marginal_of_mixture",
     "marginal_of_points",
     "marginal_of_quadrature",
@@ -68,10 +69,11 @@ class Marginal:
         start = np.linspace(0.0, 1.0 - prob, COARSE)
         best = int((self.quantile(start + prob) - self.quantile(start)).argmin())
         low, high = start[max(best - 2, 0)], start[min(best + 2, COARSE - 1)]
-        for _ in range(40):
-            middle = 0.5 * (low + high)
-            rising = self.pdf(self.quantile(middle)) < self.pdf(self.quantile(middle + prob))
-            low, high = (middle, high) if rising else (low, middle)
+        for _ in range(7):
+            inner = np.linspace(low, high, COARSE)
+            rising = self.pdf(self.quantile(inner)) < self.pdf(self.quantile(inner + prob))
+            place = int(rising.argmin()) if not rising.all() else COARSE - 1
+            low, high = inner[max(place - 1, 0)], inner[place]
         return float(self.quantile(low)), float(self.quantile(low + prob))
 
 
@@ -242,6 +244,25 @@ def marginal_of_points(points: FloatArray, weights: FloatArray, bounds: tuple[fl
     smooth = np.convolve(np.pad(heights, reach, mode="symmetric"), kernel / kernel.sum(), mode="valid")
     cumulative = np.concatenate([[0.0], np.cumsum(smooth)])
     return Marginal(mean, sd, edges, np.interp(edges, edges[:-1] + 0.5 * step, smooth), _proper(cumulative))
+
+
+def marginal_of_logs(values: FloatArray, weights: FloatArray, step: float) -> Marginal:
+    """Return the marginal of a positive quantity from weighted values (M,), smoothed over a step of their logarithm.
+
+    Mean and standard deviation are those of the values themselves.
+    """
+    weights = weights / weights.sum()
+    positive = values > 0
+    mean = float(weights @ values)
+    sd = float(np.sqrt(weights @ (values - mean) ** 2))
+    if not positive.any():
+        return Marginal(mean, sd, np.array([0.0, 1e-300]), np.ones(2), np.array([0.0, 1.0]))
+    spread = step * ((np.arange(8) + 0.5) / 8 - 0.5)
+    logs = (np.log(values[positive])[:, None] + spread).ravel()
+    smooth = marginal_of_points(logs, np.repeat(weights[positive], 8), (-np.inf, np.inf))
+    points = np.exp(smooth.points)
+    share = float(weights[positive].sum())
+    return Marginal(mean, sd, points, share * smooth.density / points, _proper(1 - share + share * smooth.cumulative))
 
 
 def _grid(values: FloatArray, weights: FloatArray, ends: tuple[float, float], count: int) -> FloatArray:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.lowrank import correlation_spectrum
+from tissuq.inference.lowrank import FEW_POINTS, Spectrum, correlation_spectrum
 from tissuq.model import StatisticalModel
 from tissuq.statistics import CHUNK, upper_triangle
 
@@ -92,23 +92,67 @@ class Reducer:
         """Return the reductions at K settings (K, s) of the structure."""
         if not settings.shape[1]:
             return self._only
-        return Reductions.of([self._at(tuple(map(float, setting))) for setting in settings])
+        keys = [tuple(map(float, setting)) for setting in settings]
+        new = [key for key in dict.fromkeys(keys) if key not in self._known]
+        self._known |= zip(new, self._at(new), strict=True)
+        return Reductions.of([self._known[key] for key in keys])
 
     @cached_property
     def _only(self) -> Reductions:
-        return Reductions.of([self._at(())])
+        return Reductions.of(self._at([()]))
 
-    def _at(self, setting: tuple[float, ...]) -> Reduction:
-        if setting not in self._known:
-            model = self._models[0]
-            is_plain = not model.structure and not model.is_correlated and not model.noise.depends_on_level
-            is_alone = len(self._models) == 1 or len(model.experiment) > CHUNK
-            reduce = _from_statistics if is_plain and is_alone else _from_rows
-            self._known[setting] = reduce(self._models, setting)
-        return self._known[setting]
+    @cached_property
+    def _fit(self) -> _Fit:
+        return _Fit.of(self._models, self._models[0].design)
+
+    def _at(self, settings: Sequence[tuple[float, ...]]) -> list[Reduction]:
+        """Reduce at settings of the structure; at many at once where the data are few."""
+        model = self._models[0]
+        n, bent = len(model.experiment), len(model.bent_symbols)
+        if bent:
+            bases = (model.basis(model.experiment.stretch, np.array(setting[:bent])) for setting in settings)
+            fits = (_Fit.of(self._models, basis) for basis in bases)
+            pairs = zip(fits, settings, strict=True)
+            return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
+        is_plain = not model.is_correlated and not model.noise.depends_on_level
+        if is_plain and (len(self._models) == 1 or n > CHUNK):
+            return [_from_statistics(self._models)]
+        together = len(settings) if n <= FEW_POINTS else 1
+        blocks = (settings[start : start + together] for start in range(0, len(settings), max(1, together)))
+        return [reduction for block in blocks for reduction in _reduced(model, self._fit, block)]
 
 
-def _from_statistics(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -> Reduction:
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """B data sets by least squares: the basis (n, q - 1) of the columns, and what is left of the stresses (B, n)."""
+
+    inverse: FloatArray
+    log_size: float
+    centre: FloatArray
+    shared: FloatArray
+    residual: FloatArray
+
+    @classmethod
+    def of(cls, models: Sequence[StatisticalModel], design: FloatArray) -> _Fit:
+        """Fit the columns of a design (n, k) that are integrated in closed form."""
+        free, fixed = divided_columns(models[0])
+        basis, triangle = np.linalg.qr(design[:, free])
+        inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
+        stresses = np.array([each.experiment.stress for each in models])
+        centre = (stresses @ basis) @ inverse.T
+        residual = stresses - centre @ design[:, free].T
+        log_size = float(np.log(np.abs(np.diag(triangle))).sum())
+        return cls(inverse, log_size, centre, np.hstack([basis, design[:, fixed]]), residual)
+
+    def reduction(
+        self, squares: FloatArray, counts: FloatArray, values: FloatArray, levels: FloatArray | None = None
+    ) -> Reduction:
+        """Return the reduction with these sums of squares."""
+        rest = np.zeros(len(counts)) if levels is None else levels
+        return Reduction(self.inverse, self.log_size, self.centre, squares, counts, values, rest)
+
+
+def _from_statistics(models: Sequence[StatisticalModel]) -> Reduction:
     """Reduce by the data's triangles alone, at a cost that does not depend on their number."""
     free, fixed = divided_columns(models[0])
     p = len(free)
@@ -133,46 +177,46 @@ def _from_statistics(models: Sequence[StatisticalModel], setting: tuple[float, .
     )
 
 
-def _from_rows(models: Sequence[StatisticalModel], setting: tuple[float, ...]) -> Reduction:
-    """Reduce by all measurements, in the directions in which their errors are independent."""
-    model = models[0]
-    free, fixed = divided_columns(model)
-    bent = len(model.bent_symbols)
-    design = model.design if not bent else model.basis(model.experiment.stretch, np.array(setting[:bent]))
-    basis, triangle = np.linalg.qr(design[:, free])
-    inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
-    stresses = np.array([each.experiment.stress for each in models])
-    centre = (stresses @ basis) @ inverse.T
-    residual = stresses - centre @ design[:, free].T
-    shared = np.hstack([basis, design[:, fixed]])
-    n, count, q = len(design), len(models), shared.shape[1] + 1
+def _reduced(model: StatisticalModel, fit: _Fit, shapes: Sequence[tuple[float, ...]]) -> list[Reduction]:
+    """Reduce by all measurements, in the directions in which their errors are independent, for some correlations."""
+    n = len(model.experiment)
     if model.is_correlated:
-        spectrum = correlation_spectrum(model, setting[bent:])
-        shared_part, residual_part = spectrum.vectors.T @ shared, residual @ spectrum.vectors
-        outside = shared - spectrum.vectors @ shared_part, residual - residual_part @ spectrum.vectors.T
-        squares = np.empty((count, len(spectrum.values) + 1, q * q))
-        squares[:, :-1] = _products(shared_part, residual_part)
-        squares[:, -1] = _products(*outside).sum(axis=1)
-        counts = np.append(np.ones(len(spectrum.values)), n - len(spectrum.values))
-        values, levels = np.append(spectrum.values, 0.0), np.zeros(len(counts))
-    elif model.noise.depends_on_level:
-        levels, place, number = np.unique(model.levels, return_inverse=True, return_counts=True)
-        by_level = np.zeros((len(levels), count, q * q))
-        for start in range(0, n, CHUNK):
-            block = slice(start, start + CHUNK)
-            np.add.at(by_level, place[block], _products(shared[block], residual[:, block]).swapaxes(0, 1))
-        squares = by_level.swapaxes(0, 1)
-        counts, values = number.astype(np.float64), np.zeros(len(levels))
-    else:
-        squares = _products(shared, residual).sum(axis=1, keepdims=True)
-        counts, values, levels = np.array([float(n)]), np.zeros(1), np.zeros(1)
-    return Reduction(inverse, float(np.log(np.abs(np.diag(triangle))).sum()), centre, squares, counts, values, levels)
+        return _along_spectra(fit, [correlation_spectrum(model, shape) for shape in shapes])
+    if not model.noise.depends_on_level:
+        squares = _products(fit.shared, fit.residual).sum(axis=1, keepdims=True)
+        return [fit.reduction(squares, np.array([float(n)]), np.zeros(1))]
+    levels, place, number = np.unique(model.levels, return_inverse=True, return_counts=True)
+    by_level = np.zeros((len(levels), len(fit.residual), (fit.shared.shape[1] + 1) ** 2))
+    for start in range(0, n, CHUNK):
+        block = slice(start, start + CHUNK)
+        np.add.at(by_level, place[block], _products(fit.shared[block], fit.residual[:, block]).swapaxes(0, 1))
+    return [fit.reduction(by_level.swapaxes(0, 1), number.astype(np.float64), np.zeros(len(levels)), levels)]
+
+
+def _along_spectra(fit: _Fit, spectra: Sequence[Spectrum]) -> list[Reduction]:
+    """Reduce along the eigenvectors of K correlations; all that is outside them shares one variance."""
+    n, ranks = len(fit.shared), [len(spectrum.values) for spectrum in spectra]
+    vectors = np.zeros((len(spectra), n, max(ranks)))
+    for place, spectrum in enumerate(spectra):
+        vectors[place, :, : ranks[place]] = spectrum.vectors
+    shared, residual = vectors.swapaxes(1, 2) @ fit.shared, fit.residual @ vectors
+    inside = _products(shared, residual)
+    outside = _products(fit.shared - vectors @ shared, fit.residual - residual @ vectors.swapaxes(1, 2)).sum(axis=2)
+    return [
+        fit.reduction(
+            np.concatenate([inside[place, :, :rank], outside[place, :, None]], axis=1),
+            np.append(np.ones(rank), n - rank),
+            np.append(spectra[place].values, 0.0),
+        )
+        for place, rank in enumerate(ranks)
+    ]
 
 
 def _products(shared: FloatArray, own: FloatArray) -> FloatArray:
-    """Return, along r directions, the products (B, r, q^2) of q - 1 shared columns (r, q - 1) and one own (B, r)."""
-    columns = np.concatenate([np.broadcast_to(shared, (len(own), *shared.shape)), own[:, :, None]], axis=2)
-    return np.asarray((columns[:, :, :, None] * columns[:, :, None, :]).reshape(*own.shape, -1))
+    """Return, along r directions, products (..., B, r, q^2) of shared (..., r, q - 1) and own (..., B, r) columns."""
+    wide = np.broadcast_to(shared[..., None, :, :], (*own.shape, shared.shape[-1]))
+    columns = np.concatenate([wide, own[..., None]], axis=-1)
+    return np.asarray((columns[..., :, None] * columns[..., None, :]).reshape(*own.shape, -1))
 
 
 def divided_columns(model: StatisticalModel) -> tuple[list[int], list[int]]:
