@@ -16,6 +16,7 @@ ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "noise",
     "statistics", "model", "inference", "prediction", "cautions", "posterior", "fitting", "studies", "report", "cli",
+    "__main__",
 ]  # fmt: skip
 
 

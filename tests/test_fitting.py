@@ -7,8 +7,9 @@ import pytest
 
 import tissuq as tq
 from against import BOXES, TRUTH, columns_of, parts
+from dense import TERMS
 
-DISCREPANCIES = list(tq.discrepancies())
+DISCREPANCIES = list(TERMS)
 FIRST, SECOND, THIRD = np.linspace(0.7, 2.0, 10), np.linspace(0.8, 2.4, 13), np.linspace(0.7, 2.0, 10)[::-1]
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 from tissuq.discrepancy import Discrepancy, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
+from tissuq.inference.energies import solve_energies
 from tissuq.inference.exact import solve_exactly, why_not_exact
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import Material, material_named
@@ -177,6 +178,13 @@ class _Recipe:
 
     def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
         """Solve models on the same stretches: together by the exact route, one by one by the others."""
+        if models[0].energy_members:
+            if self.method not in ("auto", "exact"):
+                raise ModelError(
+                    f"the method '{self.method}' does not apply: discrepancy '{self.discrepancy.name}' is integrated "
+                    "exactly. Use 'auto' or 'exact'."
+                )
+            return solve_energies(models, self.seed)
         if self.method != "auto":
             return solve_exactly(models, self.seed) if self.method == "exact" else [self._sample(m) for m in models]
         refusal = why_not_exact(models[0]) or _why_not_soon(models[0])

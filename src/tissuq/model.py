@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.discrepancy import Discrepancy
+from tissuq.discrepancy import Discrepancy, EnergyDiscrepancy, Member
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, engineering_stress, stress_basis
+from tissuq.mechanics.path import invariant_rates
 from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
 from tissuq.priors import Flat, Prior, Uniform
@@ -123,6 +124,18 @@ class StatisticalModel:
     def material_symbols(self) -> tuple[str, ...]:
         """The parameters of the material."""
         return tuple(p.symbol for p in self.material.parameters)
+
+    @cached_property
+    def energy_members(self) -> tuple[Member, ...]:
+        """The members of an energy discrepancy over the range of the data; none for other discrepancies."""
+        if not isinstance(self.discrepancy, EnergyDiscrepancy):
+            return ()
+        return tuple(self.discrepancy.members(self.experiment.mode, self.experiment.stretch))
+
+    @property
+    def energy_symbols(self) -> tuple[str, ...]:
+        """The amplitudes of an energy discrepancy."""
+        return tuple(p.symbol for p in self.discrepancy.parameters) if self.energy_members else ()
 
     def basis(self, stretch: FloatArray, bent: ArrayLike = ()) -> FloatArray:
         """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,).
@@ -258,8 +271,23 @@ class StatisticalModel:
                 f"experiment '{data.name}' has one stretch only, so nothing tells the {parameter.description} "
                 f"{parameter.symbol}: measure at other stretches, or choose another discrepancy."
             )
-        unit = {"stress": np.abs(data.stress).max(), "stretch": np.ptp(data.stretch), "number": 1.0}
+        unit = {
+            "stress": np.abs(data.stress).max(),
+            "modulus": self.pilot_modulus,
+            "stretch": np.ptp(data.stretch),
+            "number": 1.0,
+        }
         return parameter.relative_prior.scaled(float(unit[parameter.dimension]))
+
+    @cached_property
+    def pilot_modulus(self) -> float:
+        """A rough C10 of the data, MPa: the median of stress over that of a neo-Hookean material with C10 = 1.
+
+        It only sets the scale of priors: the same data in another unit give the same answer in that unit.
+        """
+        unit, _ = invariant_rates(self.experiment.mode, self.experiment.stretch)
+        strained = np.abs(unit) > 1e-3 * np.abs(unit).max()
+        return float(np.median(np.abs(self.experiment.stress[strained] / unit[strained])))
 
     def _default_boxes(self) -> dict[str, Prior]:
         """Return uniform priors that hold the least-squares solution with a margin, whatever the units.

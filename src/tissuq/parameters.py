@@ -22,20 +22,21 @@ class Parameter:
     description : str
         What it is, in a few words.
     dimension : str
-        ``"stress"`` (MPa), ``"stretch"`` or ``"number"`` (both dimensionless).
+        ``"stress"`` or ``"modulus"`` (both MPa), ``"stretch"`` or ``"number"`` (both dimensionless).
     support : tuple of float
         The lowest and highest value that has a meaning.
     is_linear : bool
         Whether the stress is proportional to it.
     relative_prior : Prior or None
-        The default prior in units of the data: the largest measured stress for a stress, the range of the
-        measured stretches for a stretch. Linear parameters have none: theirs is a box that the data's own
-        least-squares solution sets (`tissuq.model.StatisticalModel`).
+        The default prior in units of the data: the largest measured stress for a stress, the range of the measured
+        stretches for a stretch, and for a modulus the typical ratio of the stress to that of a neo-Hookean material
+        with C10 = 1. Linear parameters have none: theirs is a box that the data's own least-squares solution sets
+        (`tissuq.model.StatisticalModel`).
     """
 
     symbol: str
     description: str
-    dimension: Literal["stress", "stretch", "number"] = "stress"
+    dimension: Literal["stress", "modulus", "stretch", "number"] = "stress"
     support: tuple[float, float] = (-inf, inf)
     is_linear: bool = True
     relative_prior: Prior | None = None
@@ -43,7 +44,7 @@ class Parameter:
     @property
     def unit(self) -> str:
         """The unit of its values: MPa, or nothing."""
-        return "MPa" if self.dimension == "stress" else ""
+        return "MPa" if self.dimension in ("stress", "modulus") else ""
 
     @classmethod
     def scale(cls, symbol: str, description: str) -> Parameter:

@@ -39,7 +39,7 @@ def variants(base: type[T]) -> dict[str, type[T]]:
 def _descendants(base: type[T]) -> Iterator[type[T]]:
     level = base.__subclasses__()
     while level:
-        yield from (kind for kind in level if not isabstract(kind) and "name" in vars(kind))
+        yield from (kind for kind in level if not isabstract(kind) and isinstance(vars(kind).get("name"), str))
         level = [child for kind in level for child in kind.__subclasses__()]
 
 

@@ -135,7 +135,7 @@ def test_the_material_and_the_discrepancy_can_be_chosen(cli, here, specimen):
 
 
 def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(cli, here, specimen):
-    said = cli("fit", specimen, "--material", "yeoh", "--noise-sd", 1, "--no-figures")
+    said = cli("fit", specimen, "--material", "yeoh", "--discrepancy", "all", "--noise-sd", 1, "--no-figures")
     assert said.status == 0, said.err
     fitted = [row["formulation"] for row in summary_of(here / "runs" / "specimen")]
     assert "yeoh" not in fitted

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tissuq.discrepancy import discrepancies, discrepancy_named
+from tissuq.discrepancy import EnergyDiscrepancy, discrepancies, discrepancy_named
 from tissuq.experiments.modes import Uniaxial
 from tissuq.mechanics.stress import differentiator
 
@@ -25,7 +25,7 @@ MEANS = {  # eq. 20 to 24, as corrected
     "gp": [],
 }
 
-EVERY = pytest.mark.parametrize("name", list(discrepancies()))
+EVERY = pytest.mark.parametrize("name", list(MEANS))
 
 
 def covariance(discrepancy, stretch, values):
@@ -35,8 +35,9 @@ def covariance(discrepancy, stretch, values):
     return total
 
 
-def test_the_library_holds_exactly_the_papers_formulations():
-    assert set(discrepancies()) == set(MEANS)
+def test_the_library_holds_exactly_the_papers_formulations_and_energies():
+    energies = {name for name, kind in discrepancies().items() if issubclass(kind, EnergyDiscrepancy)}
+    assert set(discrepancies()) - energies == set(MEANS)
 
 
 @EVERY

@@ -19,7 +19,7 @@ from sbc import narrowed, p_values, probability_below, simulate
 STRETCH = np.linspace(0.7, 1.6, 12)
 NOISE_SD = 0.1
 SIZE = 2e-5
-COUNTS = dict.fromkeys(tq.discrepancies(), 2000) | {"gp": 1000}
+COUNTS = dict.fromkeys(TERMS, 2000) | {"gp": 1000}
 TRUE = {
     "C10": truncnorm(-1 / 0.3, np.inf, 1, 0.3),
     **{symbol: norm(0, 0.3) for symbol in ("m0", "m1", "m2", "C01")},

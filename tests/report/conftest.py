@@ -24,7 +24,7 @@ def specimen_file(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def specimen_study(specimen_file):
-    return run_specimen(SpecimenSettings(file=str(specimen_file), noise_sd=200.0, seed=5))
+    return run_specimen(SpecimenSettings(file=str(specimen_file), discrepancies=("all",), noise_sd=200.0, seed=5))
 
 
 @pytest.fixture(scope="session")

@@ -66,5 +66,5 @@ def _default(parameter: Parameter) -> str:
     if parameter.relative_prior is None:
         side = "positive, " if parameter.support[0] == 0 else ""
         return f"uniform, {side}to 10 times beyond least squares"
-    of_what = {"stress": " x the largest stress", "stretch": " x the stretch range", "number": ""}
-    return f"{parameter.relative_prior}{of_what[parameter.dimension]}"
+    of_what = {"stress": " x the largest stress", "stretch": " x the stretch range", "modulus": " x the pilot C10"}
+    return f"{parameter.relative_prior}{of_what.get(parameter.dimension, '')}"

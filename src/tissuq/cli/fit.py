@@ -21,7 +21,7 @@ def fit(
     material: Annotated[str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")] = None,
     discrepancy: Annotated[
         list[str] | None,
-        typer.Option(help="Discrepancy; repeat for more; 'all' fits every one that applies [all]."),
+        typer.Option(help="Discrepancy; repeat for more; 'all' fits the paper's seven and auto [auto]."),
     ] = None,
     noise_sd: Annotated[
         str | None,

@@ -79,4 +79,6 @@ def discrepancy_named(discrepancy: str | Discrepancy) -> Discrepancy:
     """
     if isinstance(discrepancy, Discrepancy):
         return discrepancy
-    return find(Discrepancy, "discrepancy", discrepancy, ModelError)()
+    from tissuq.discrepancy.energy import energy_sum
+
+    return energy_sum(discrepancy) or find(Discrepancy, "discrepancy", discrepancy, ModelError)()

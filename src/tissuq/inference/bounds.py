@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,9 +127,8 @@ class Bounded:
 def _of_points(components: Components, shares: FloatArray, points: FloatArray) -> Components:
     """Return components without extent: points (M, R, p) that have shares (M, R) of the weights of M components."""
     weights = (components.weights[:, None] * shares).ravel()
-    settings = np.repeat(components.settings, points.shape[1], axis=0)
-    p = points.shape[2]
-    return Components(weights, settings, points.reshape(-1, p), np.zeros((len(weights), p, p)))
+    rows, p = np.repeat(np.arange(len(points)), points.shape[1]), points.shape[2]
+    return replace(components[rows], weights=weights, mean=points.reshape(-1, p), root=np.zeros((len(rows), p, p)))
 
 
 def bounded(components: Components, beyond: FloatArray, box: Boxes) -> Bounded:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,20 +33,29 @@ class Components:
         Means of the linear parameters.
     root : (M, p, p) array
         Roots of their covariances; zero where a component is a point.
+    member : (M,) array, optional
+        Where a discrepancy is an average, which of its members; its weights then follow the linear parameters.
     """
 
     weights: FloatArray
     settings: FloatArray
     mean: FloatArray
     root: FloatArray
+    member: NDArray[np.intp] | None = None
 
     def __getitem__(self, chosen: NDArray[Any]) -> Components:
-        return Components(self.weights[chosen], self.settings[chosen], self.mean[chosen], self.root[chosen])
+        member = None if self.member is None else self.member[chosen]
+        return Components(self.weights[chosen], self.settings[chosen], self.mean[chosen], self.root[chosen], member)
 
     def joined(self, other: Components) -> Components:
         """Return these components followed by others; the weights of both together must sum to one."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Components(*(np.concatenate(pair) for pair in pairs))
+        is_average = self.member is not None and other.member is not None
+        names = ("weights", "settings", "mean", "root", *(["member"] if is_average else []))
+        return Components(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def weighted(self, weights: FloatArray) -> Components:
+        """Return the same components with other weights (M,)."""
+        return replace(self, weights=weights)
 
     def thinned(self, count: int) -> Components:
         """Return few components that stand for all, their weights summing to one.
@@ -58,16 +67,16 @@ class Components:
         heavy = self[np.sort(order[np.cumsum(self.weights[order]) > 1e-7 * self.weights.sum()])]
         total = heavy.weights.sum()
         if len(heavy.weights) <= count:
-            return Components(heavy.weights / total, heavy.settings, heavy.mean, heavy.root)
+            return heavy.weighted(heavy.weights / total)
         picked = heavy.resampled(count)
-        return Components(picked.weights / total, picked.settings, picked.mean, picked.root)
+        return picked.weighted(picked.weights / total)
 
     def resampled(self, count: int) -> Components:
         """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""
         if len(self.weights) <= count:
             return self
         chosen = self[systematic(self.weights[None], count)[0]]
-        return Components(np.full(count, self.weights.sum() / count), chosen.settings, chosen.mean, chosen.root)
+        return chosen.weighted(np.full(count, self.weights.sum() / count))
 
 
 @dataclass(frozen=True)
@@ -123,6 +132,8 @@ class Solution(ABC):
         Log of p(y) with respect to the normalised priors, y in MPa; None where there is none.
     diagnostics : Diagnostics or None
         Of the sampler; None on the exact route.
+    drawn_discrepancy : (chains, draws, n) array or None
+        The discrepancy's stress at the measurements in every draw, MPa, where it has weights of its own.
     """
 
     model: StatisticalModel
@@ -132,6 +143,7 @@ class Solution(ABC):
     log_evidence: float | None = None
     log_evidence_error: float | None = None
     diagnostics: Diagnostics | None = None
+    drawn_discrepancy: FloatArray | None = None
 
     @property
     @abstractmethod

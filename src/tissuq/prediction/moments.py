@@ -118,12 +118,40 @@ def stress_moments(
             mean[part.chosen] += shift
             root[part.chosen] -= np.einsum("mgk,mkp->mgp", pull, root_b[part.chosen])
             extra[part.chosen] += variance
+    if discrepancy and components.member is not None:
+        for shift, spread, variance, own in _energies(model, components, stretch):
+            mean[own] += shift
+            root[own] += spread
+            extra[own] += variance
     level = np.abs(mean)
     if discrepancy and not model.is_repeated:
         extra += model.discrepancy.independent_variance(values)
     if noise:
         extra += model.noise_variance(values, level)
     return mean, extra + (root**2).sum(axis=2)
+
+
+def _energies(
+    model: StatisticalModel, components: Components, stretch: FloatArray
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
+    """Yield means (N, g), roots (N, g, p) and further variances (N, g) of energy discrepancies, and whose they are.
+
+    What the terms that serve the data leave of the discrepancy elsewhere is independent of the data.
+    """
+    mode, start = model.experiment.mode, len(model.linear)
+    assert components.member is not None  # noqa: S101 (the caller has looked)
+    for place in np.unique(components.member):
+        member, own = model.energy_members[place], np.flatnonzero(components.member == place)
+        features = member.stress_features(mode, stretch)
+        left = [
+            np.maximum(whole - (each**2).sum(axis=1), 0.0)
+            for whole, each in zip(member.stress_variances(mode, stretch), features, strict=True)
+        ]
+        symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]
+        every = np.hstack([np.zeros((len(stretch), 0)), *features])
+        chosen = slice(start, start + every.shape[1])
+        variance = components.settings[own][:, symbols] ** 2 @ np.reshape(left, (-1, len(stretch)))
+        yield components.mean[own, chosen] @ every.T, every @ components.root[own, chosen], variance, own
 
 
 def _condition(

@@ -80,4 +80,7 @@ def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray
     column_values = {symbol: drawn[:, None] for symbol, drawn in values.items()}
     levels = model.levels if model.noise.depends_on_level else 0.0
     white = np.atleast_2d(model.white_variance(column_values, levels))
-    return mean_stress(model, columns, settings), settings, np.broadcast_to(white, (count, white.shape[1]))
+    mean = mean_stress(model, columns, settings)
+    if solution.drawn_discrepancy is not None:
+        mean = mean + solution.drawn_discrepancy[:, ::step].reshape(mean.shape)
+    return mean, settings, np.broadcast_to(white, (count, white.shape[1]))

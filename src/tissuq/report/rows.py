@@ -76,7 +76,7 @@ def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -
     for formulation, posterior in posteriors.items():
         for symbol, numbers in posterior.summary().iterrows():
             parameter = next(p for p in posterior.model.parameters if p.symbol == symbol)
-            is_stress = parameter.dimension == "stress"
+            is_stress = parameter.unit == "MPa"
             factor = unit.to_mpa if is_stress else 1.0
             mean, sd, low, high = (float(numbers[key]) / factor for key in ("mean", "sd", "hdi_low", "hdi_high"))
             ends = interval(low, high, sd)

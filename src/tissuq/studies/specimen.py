@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from tissuq.discrepancy import discrepancies, discrepancy_named
+from tissuq.discrepancy import Auto, EnergyDiscrepancy, discrepancies, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import read_experiment
@@ -26,7 +26,7 @@ from tissuq.priors import Prior, prior_from
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
 
 ALL = "all"
-"""In place of discrepancies: every one that applies to the material."""
+"""In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
 
 
 class SpecimenSettings(BaseModel):
@@ -43,7 +43,7 @@ class SpecimenSettings(BaseModel):
     compression_positive: bool = False
     skip_rows: int = Field(0, ge=0)
     material: str = "neo-hookean"
-    discrepancies: tuple[str, ...] = Field((ALL,), min_length=1)
+    discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     noise_sd: float | Literal["unknown"] = "unknown"
     noise: Literal["unknown", "proportional", "repeats"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
@@ -152,7 +152,7 @@ def run_specimen(
     experiment = settings.experiment(folder)
     unit = stress_unit(experiment.stress_unit)
     is_all = settings.discrepancies == (ALL,)
-    names = list(discrepancies()) if is_all else list(dict.fromkeys(settings.discrepancies))
+    names = _every() if is_all else list(dict.fromkeys(settings.discrepancies))
     priors = _priors(settings, names, unit)
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
@@ -183,6 +183,10 @@ def run_specimen(
     return SpecimenStudy(settings, experiment, posteriors, seconds, skipped)
 
 
+def _every() -> list[str]:
+    return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, EnergyDiscrepancy)]
+
+
 def _parameters(settings: SpecimenSettings, discrepancy: str) -> tuple[Parameter, ...]:
     noise = settings.noise_in(stress_unit("MPa")).parameters
     return (*material_named(settings.material).parameters, *discrepancy_named(discrepancy).parameters, *noise)
@@ -195,6 +199,6 @@ def _priors(settings: SpecimenSettings, names: list[str], unit: StressUnit) -> M
     if unknown:
         raise InputError(f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(known)}.")
     return {
-        symbol: prior_from(given).scaled(unit.to_mpa if known[symbol].dimension == "stress" else 1.0)
+        symbol: prior_from(given).scaled(unit.to_mpa if known[symbol].unit else 1.0)
         for symbol, given in settings.priors.items()
     }

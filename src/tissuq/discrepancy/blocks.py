@@ -1,0 +1,204 @@
+"""Random strain energies without initial modulus: what an energy discrepancy is built of."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import LoadingMode
+from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
+
+__all__ = ["EnergyBlock", "LogBlock", "SplineBlock", "TaylorBlock", "ValanisLandelBlock", "ZeroModulusBlock"]
+
+FloatArray = NDArray[np.float64]
+
+GRID = 400
+"""Points over the data's range among which the pivots of a process are chosen."""
+
+
+@dataclass(frozen=True)
+class EnergyBlock(ABC):
+    """A random strain energy dW = c sum_k u_k dW_k with independent standard normal weights u.
+
+    Energy, stress and shear modulus of every dW_k vanish at the reference, so that the initial modulus stays the
+    material's own. A block says what stress its terms have in any loading mode. Where it has a length scale, that
+    is a multiple of the range of the data, with equal prior probability for each of ``lengths``.
+    """
+
+    name: ClassVar[str]
+    formula: ClassVar[str]
+    lengths: ClassVar[tuple[float, ...]] = (1.0,)
+
+    @abstractmethod
+    def reach(self, mode: LoadingMode, stretch: FloatArray) -> tuple[float, float]:
+        """Return the range of the block's coordinate over stretches (n,); the reference, zero, is in it."""
+
+    @abstractmethod
+    def stress_features(
+        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
+    ) -> FloatArray:
+        """Return the engineering stresses (n, r) of the terms dW_k (c = 1) at stretches (n,).
+
+        They are terms enough for stretches within the reach; `stress_variance` is that of all there are.
+        """
+
+    @abstractmethod
+    def stress_variance(
+        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
+    ) -> FloatArray:
+        """Return the variance (n,) of the stress for c = 1."""
+
+
+class ZeroModulusBlock(EnergyBlock):
+    """dW = c u ((I2 - 3) - (I1 - 3)): the Mooney-Rivlin term with its initial modulus taken out."""
+
+    name = "zero-modulus"
+    formula = "c u (I2 - I1)"
+
+    def reach(self, mode: LoadingMode, stretch: FloatArray) -> tuple[float, float]:
+        return 0.0, 1.0
+
+    def stress_features(
+        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
+    ) -> FloatArray:
+        first, second = invariant_rates(mode, stretch)
+        return (second - first)[:, None]
+
+    def stress_variance(
+        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
+    ) -> FloatArray:
+        return self.stress_features(mode, stretch, reach, length)[:, 0] ** 2
+
+
+class ProcessBlock(EnergyBlock):
+    """A block whose stress is sum_k q(z_k) v_k with a Gaussian process q of a coordinate z, zero at the reference.
+
+    It is reduced to the r directions that matter within the reach, by pivoted Cholesky.
+    """
+
+    tolerance: ClassVar[float] = 1e-11
+    """Variance, relative to the largest, that may be left out."""
+
+    @abstractmethod
+    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return z and v, (n, m) each."""
+
+    @abstractmethod
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        """Return cov(q(z), q(z')) for c = 1; arrays broadcast."""
+
+    def reach(self, mode: LoadingMode, stretch: FloatArray) -> tuple[float, float]:
+        z, _ = self.coordinates(mode, stretch)
+        return min(0.0, float(z.min())), max(0.0, float(z.max()))
+
+    def stress_features(
+        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
+    ) -> FloatArray:
+        scale = length * (reach[1] - reach[0])
+        pivots, triangle = self._pivots(reach, scale)
+        z, v = self.coordinates(mode, stretch)
+        values = np.linalg.solve(triangle, self.covariance(pivots[:, None], z.ravel()[None], scale))
+        return np.asarray(np.einsum("rnm,nm->nr", values.reshape(len(pivots), *z.shape), v))
+
+    def stress_variance(
+        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
+    ) -> FloatArray:
+        z, v = self.coordinates(mode, stretch)
+        with np.errstate(over="ignore"):
+            covariance = self.covariance(z[:, :, None], z[:, None, :], length * (reach[1] - reach[0]))
+        return np.asarray(np.einsum("nm,nmk,nk->n", v, covariance, v))
+
+    def _pivots(self, reach: tuple[float, float], scale: float) -> tuple[FloatArray, FloatArray]:
+        """Return r pivots and the lower triangle (r, r) of their covariance's Cholesky decomposition."""
+        grid = reach[0] + (reach[1] - reach[0]) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
+        remaining = self.covariance(grid, grid, scale)
+        least = self.tolerance * remaining.max()
+        chosen: list[int] = []
+        columns = np.zeros((GRID, 0))
+        while (pivot := int(remaining.argmax())) not in chosen and remaining[pivot] > least:
+            own = self.covariance(grid, grid[pivot], scale) - columns @ columns[pivot]
+            columns = np.column_stack([columns, own / np.sqrt(remaining[pivot])])
+            remaining = remaining - columns[:, -1] ** 2
+            chosen.append(pivot)
+        return grid[chosen], np.tril(columns[chosen])
+
+
+class InvariantBlock(ProcessBlock):
+    """dW(I1), with W1 = dW/dI1 a process in a coordinate of x = I1 - 3."""
+
+    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        x, _ = invariants(mode, stretch)
+        first, _ = invariant_rates(mode, stretch)
+        return self.coordinate(np.maximum(x, 0.0))[:, None], first[:, None]
+
+    @abstractmethod
+    def coordinate(self, x: FloatArray) -> FloatArray:
+        """Return the coordinate of x = I1 - 3."""
+
+
+class TaylorBlock(InvariantBlock):
+    """W1 = c g(x), cov(g, g') = exp(x x' / L^2) - 1: independent normal Taylor coefficients, an infinite Yeoh."""
+
+    name = "taylor"
+    formula = "W1 = c g(x), cov g = exp(x x' / L^2) - 1, x = I1 - 3"
+    lengths = (0.4, 0.6, 0.9, 1.4, 2.1, 3.2)
+
+    def coordinate(self, x: FloatArray) -> FloatArray:
+        return x
+
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        return np.asarray(np.expm1(first * second / length**2))
+
+
+class LogBlock(InvariantBlock):
+    """W1 = c g(t), t = log(1 + x): a squared exponential conditioned on g(0) = 0; fast change near the reference."""
+
+    name = "log"
+    formula = "W1 = c g(log(1 + x)), cov g squared exponential given g(0) = 0, x = I1 - 3"
+    lengths = (0.15, 0.25, 0.4, 0.7, 1.2, 2.0)
+
+    def coordinate(self, x: FloatArray) -> FloatArray:
+        return np.log1p(x)
+
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        one, other = first / length, second / length
+        return np.asarray(np.expm1(one * other) * _bell(one) * _bell(other))
+
+
+class SplineBlock(InvariantBlock):
+    """W1 = c g(x / L): an integrated Wiener process with a random slope, pinned at g(0) = 0."""
+
+    name = "spline"
+    formula = "W1 = c g(x), g an integrated Wiener process with g(0) = 0, x = I1 - 3"
+    tolerance = 1e-7
+
+    def coordinate(self, x: FloatArray) -> FloatArray:
+        return x
+
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        one, other = first / length, second / length
+        least = np.minimum(one, other)
+        return np.asarray(one * other + least**3 + 1.5 * np.abs(one - other) * least**2)
+
+
+class ValanisLandelBlock(ProcessBlock):
+    """dW = sum_k w(l_k) with l w'(l) = c q(ln l): a squared exponential conditioned on q(0) = q'(0) = 0."""
+
+    name = "valanis-landel"
+    formula = "sum_k w(l_k), l w'(l) = c q(ln l), cov q squared exponential given q(0) = q'(0) = 0"
+    lengths = (0.2, 0.35, 0.6, 1.0, 1.7)
+
+    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return log_stretches(mode, stretch)
+
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        one, other = first / length, second / length
+        return np.asarray((np.expm1(one * other) - one * other) * _bell(one) * _bell(other))
+
+
+def _bell(score: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * score**2))

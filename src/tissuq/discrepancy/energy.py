@@ -1,0 +1,204 @@
+"""Discrepancies in the strain energy, single, summed and averaged: they leave the initial shear modulus alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.discrepancy.blocks import (
+    EnergyBlock,
+    LogBlock,
+    SplineBlock,
+    TaylorBlock,
+    ValanisLandelBlock,
+    ZeroModulusBlock,
+)
+from tissuq.discrepancy.discrepancy import Discrepancy
+from tissuq.errors import ModelError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.parameters import Parameter
+from tissuq.priors import HalfCauchy
+
+__all__ = ["Auto", "AutoBalanced", "AutoSharp", "EnergyDiscrepancy", "EnergySum", "Member", "energy_sum"]
+
+FloatArray = NDArray[np.float64]
+
+AMPLITUDES = tuple(
+    Parameter(symbol, f"amplitude of the {place} energy", "modulus", (0.0, float("inf")), False, HalfCauchy(1.0))
+    for symbol, place in (("c1", "first"), ("c2", "second"))
+)
+SOURCE = "tissuq (energy discrepancy)"
+
+
+@dataclass(frozen=True)
+class Member:
+    """A sum of at most two blocks, each at one of its length scales, as measured over a range of stretches.
+
+    ``places`` says for each block which of the amplitudes is its own; ``probability`` is the member's before data.
+    """
+
+    blocks: tuple[EnergyBlock, ...]
+    places: tuple[int, ...]
+    lengths: tuple[float, ...]
+    reaches: tuple[tuple[float, float], ...]
+    probability: float
+
+    @property
+    def name(self) -> str:
+        """The blocks' names, joined."""
+        return "+".join(block.name for block in self.blocks) or "none"
+
+    def stress_features(self, mode: LoadingMode, stretch: FloatArray) -> list[FloatArray]:
+        """Return the engineering stresses (n, r) of each block's terms."""
+        parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
+        return [block.stress_features(mode, stretch, reach, length) for block, reach, length in parts]
+
+    def stress_variances(self, mode: LoadingMode, stretch: FloatArray) -> list[FloatArray]:
+        """Return the variance (n,) of the stress of each block at unit amplitude."""
+        parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
+        return [block.stress_variance(mode, stretch, reach, length) for block, reach, length in parts]
+
+
+@dataclass(frozen=True)
+class EnergyDiscrepancy(Discrepancy):
+    """A random strain energy of zero energy, stress and modulus at the reference, averaged over some sums of blocks.
+
+    Every sum has the same prior probability, and so has every length scale of its blocks; the posterior is the mixture
+    that the evidence weights. Each block has an amplitude, half-Cauchy with the data's pilot modulus as its scale.
+    """
+
+    source = SOURCE
+    sums: ClassVar[tuple[tuple[EnergyBlock | None, ...], ...]]
+    """Blocks in the order of the amplitudes; None where a sum has no block with that amplitude."""
+
+    def members(self, mode: LoadingMode, stretch: FloatArray) -> list[Member]:
+        """Return every sum of blocks at every combination of their length scales, over the range of stretches (n,)."""
+        found = []
+        for every in self.sums:
+            places = tuple(place for place, block in enumerate(every) if block is not None)
+            blocks = tuple(block for block in every if block is not None)
+            reaches = tuple(block.reach(mode, stretch) for block in blocks)
+            choices = list(product(*(block.lengths for block in blocks)))
+            probability = 1 / (len(self.sums) * len(choices))
+            found += [Member(blocks, places, lengths, reaches, probability) for lengths in choices]
+        return found
+
+
+class _Single(EnergyDiscrepancy):
+    """One block."""
+
+    parameters = AMPLITUDES[:1]
+
+
+class Taylor(_Single):
+    """An infinite Yeoh: independent normal Taylor coefficients in I1 - 3."""
+
+    name = TaylorBlock.name
+    formula = TaylorBlock.formula
+    sums = ((TaylorBlock(),),)
+
+
+class Logarithmic(_Single):
+    """A process in log(I1 - 2): fast change near the reference."""
+
+    name = LogBlock.name
+    formula = LogBlock.formula
+    sums = ((LogBlock(),),)
+
+
+class Spline(_Single):
+    """An integrated Wiener process in I1 - 3."""
+
+    name = SplineBlock.name
+    formula = SplineBlock.formula
+    sums = ((SplineBlock(),),)
+
+
+class ZeroModulus(_Single):
+    """The Mooney-Rivlin term without its initial modulus."""
+
+    name = ZeroModulusBlock.name
+    formula = ZeroModulusBlock.formula
+    sums = ((ZeroModulusBlock(),),)
+
+
+class ValanisLandel(_Single):
+    """A separable function of the principal stretches."""
+
+    name = ValanisLandelBlock.name
+    formula = ValanisLandelBlock.formula
+    sums = ((ValanisLandelBlock(),),)
+
+
+@dataclass(frozen=True)
+class EnergySum(EnergyDiscrepancy):
+    """The sum of two blocks."""
+
+    blocks: tuple[EnergyBlock, ...] = ()
+
+    parameters = AMPLITUDES
+
+    @property
+    def sums(self) -> tuple[tuple[EnergyBlock | None, ...], ...]:  # type: ignore[override]  # of the object, not the class
+        """The one sum."""
+        return (self.blocks,)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """The blocks' names, joined."""
+        return "+".join(block.name for block in self.blocks)
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """The blocks' formulas, joined."""
+        return "; and ".join(block.formula for block in self.blocks)
+
+
+FIRST, SECOND = (TaylorBlock(), LogBlock()), (ZeroModulusBlock(), ValanisLandelBlock())
+PAIRS = tuple(product(FIRST, SECOND))
+
+
+class Auto(EnergyDiscrepancy):
+    """The evidence decides: the average of {taylor, log} x {zero-modulus, valanis-landel}."""
+
+    name = "auto"
+    formula = "average of {taylor, log} + {zero-modulus, valanis-landel}, by evidence"
+    parameters = AMPLITUDES
+    sums = PAIRS
+
+
+class AutoBalanced(EnergyDiscrepancy):
+    """The average of the same sums and of their single blocks: narrower, and more often wrong."""
+
+    name = "auto-balanced"
+    formula = "average of auto's sums and their single blocks, by evidence"
+    parameters = AMPLITUDES
+    sums = (*PAIRS, *((block, None) for block in FIRST), *((None, block) for block in SECOND))
+
+
+class AutoSharp(EnergyDiscrepancy):
+    """The average of the same, and of no discrepancy: narrowest, and wrong where a small discrepancy hides in noise."""
+
+    name = "auto-sharp"
+    formula = "average of auto-balanced and no discrepancy, by evidence"
+    parameters = AMPLITUDES
+    sums = (*AutoBalanced.sums, ())
+
+
+def energy_sum(names: str) -> EnergySum | None:
+    """Return the sum of two blocks named with a plus sign between them, or None when these are other names."""
+    known = {block.name: block for block in (*FIRST, *SECOND, SplineBlock())}
+    parts = [part.strip() for part in names.split("+")]
+    if len(parts) < 2 or not any(part in known for part in parts):
+        return None
+    unknown = [part for part in parts if part not in known]
+    if unknown or len(parts) > 2 or len(set(parts)) < 2:
+        raise ModelError(
+            f"discrepancy '{names}': a sum has two different ones of the energies {', '.join(known)}"
+            + (f"; '{unknown[0]}' is none of them." if unknown else ".")
+        )
+    return EnergySum(tuple(known[part] for part in parts))

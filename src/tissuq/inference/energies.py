@@ -1,0 +1,279 @@
+"""The posterior under an energy discrepancy: exact sums over its members and lattices of their amplitudes.
+
+Given a member and the ratios g = c / noise_sd of its amplitudes, everything is linear and Gaussian
+(`tissuq.inference.lattice`). The integrand is smooth in log g and log noise_sd, so that equally spaced points integrate
+it with an error that falls exponentially with their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ModelError
+from tissuq.inference.bounds import bounded
+from tissuq.inference.box import Boxes
+from tissuq.inference.lattice import STEP, Lattice
+from tissuq.inference.marginal import Marginal, marginal_of_logs
+from tissuq.inference.resampling import systematic
+from tissuq.inference.solution import Components, Marginals, Solution
+from tissuq.inference.threads import one_thread
+from tissuq.model import StatisticalModel
+
+__all__ = ["EnergySolution", "solve_energies", "why_no_energies"]
+
+FloatArray = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+NOISE_STEP, NOISE_REACH = 0.8, 6.0
+"""Of the lattice of log noise_sd, in standard deviations from its conditional mode."""
+IRRELEVANT = 22.0
+"""Log density below the largest, at the best noise, at which a point of the lattice is left out at once."""
+LIGHT = 1e-8
+"""Share of the posterior that may be left out."""
+TOUCHED = 1e-10
+"""Mass outside the bounds from which it is taken off a component's weight."""
+REPRESENTED = 3000
+"""Components, at most, that represent the posterior in draws and predictions."""
+CHAINS, DRAWS = 4, 1000
+
+
+def why_no_energies(model: StatisticalModel) -> str:
+    """Return why an energy discrepancy cannot be integrated with the rest of a model, or nothing where it can."""
+    if model.bent_symbols:
+        return f"the material's stress is not linear in {', '.join(model.bent_symbols)}"
+    others = [symbol for symbol in model.nonlinear if symbol not in (*model.energy_symbols, "noise_sd")]
+    if others or model.noise.depends_on_level or model.noise.shares_discrepancy:
+        return f"noise '{model.noise.name}' or a prior leaves more than amplitudes and noise_sd to integrate"
+    gaussians = (model.priors[symbol].gaussian for symbol in model.linear)
+    if any(each is not None and each[1] for each in gaussians):
+        return "a linear parameter has a Gaussian prior, where only uniform and flat ones are integrated"
+    return ""
+
+
+def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[EnergySolution]:
+    """Return posterior and evidence of models with an energy discrepancy, on the same stretches.
+
+    Parameters
+    ----------
+    models : sequence of StatisticalModel
+        With the same material, discrepancy and noise on the same stretches: they share every decomposition.
+    seed : int
+        Of the draws; nothing else is random.
+
+    Raises
+    ------
+    ModelError
+        When the model has parameters that this route does not integrate.
+    """
+    reason = why_no_energies(models[0])
+    if reason:
+        raise ModelError(
+            f"discrepancy '{models[0].discrepancy.name}' needs a material that is linear in its parameters, uniform or "
+            "flat priors on them, and noise that is known, or unknown but the same everywhere. Here "
+            f"{reason}: choose otherwise, or another discrepancy."
+        )
+    with one_thread():
+        lattices = [Lattice(models, member) for member in models[0].energy_members]
+        return [EnergySolution(model, lattices, index, seed) for index, model in enumerate(models)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """M points of the lattices: which lattice, where in it, what noise, both amplitudes, log p(data and point)."""
+
+    lattice: Places
+    second: Places
+    first: Places
+    noise_sd: FloatArray
+    amplitudes: FloatArray
+    log_weight: FloatArray
+
+    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> _Points:
+        return _Points(*(array[chosen] for array in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Points]) -> _Points:
+        """Return all points of several sets."""
+        return cls(*(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True)))
+
+
+class EnergySolution(Solution):
+    """The posterior of one data set under an energy discrepancy."""
+
+    route = "exact"
+
+    def __init__(self, model: StatisticalModel, lattices: Sequence[Lattice], index: int, seed: int) -> None:
+        self.model, self._lattices, self._index, self._seed = model, lattices, index, seed
+        points, error = self._weigh()
+        mean, root = self._linear(points)
+        supports = np.array([model.priors[symbol].support for symbol in model.linear])
+        self._box = Boxes(supports[None, :, 0], supports[None, :, 1])
+        beyond = self._box.beyond(mean, root)
+        near = np.flatnonzero(beyond.sum(axis=1) > TOUCHED)
+        log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
+        every = self._box[np.zeros(len(near), dtype=int)]
+        log_mass[near], error_of_mass[near] = every.log_mass(mean[near], root[near])
+        log_weights = points.log_weight + log_mass
+        top = log_weights.max()
+        total = np.exp(log_weights - top).sum()
+        self._points, self._weights = points, np.exp(log_weights - top) / total
+        self._bounded = bounded(Components(self._weights, self._settings(points), mean, root), beyond, self._box)
+        if np.isfinite(supports).all():
+            self.log_evidence = float(top + np.log(total) - np.log(np.diff(supports, axis=1)).sum())
+            self.log_evidence_error = float(error + self._weights @ error_of_mass + LIGHT)
+
+    @property
+    def reason(self) -> str:  # type: ignore[override]  # computed, where others store it
+        """What was done."""
+        model = self.model
+        return (
+            f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
+            f"{len(self._lattices)} energies and lattices of {', '.join(model.nonlinear)}"
+        )
+
+    @cached_property
+    def members(self) -> dict[str, float]:
+        """The posterior probability of every sum of blocks, its length scales together."""
+        found: dict[str, float] = {}
+        shares = np.bincount(self._points.lattice, self._weights, minlength=len(self._lattices))
+        for lattice, share in zip(self._lattices, shares, strict=True):
+            found[lattice.member.name] = found.get(lattice.member.name, 0.0) + float(share)
+        return found
+
+    @cached_property
+    def components(self) -> Components:  # type: ignore[override]  # a cached property
+        """The posterior as a mixture; after the material's parameters come the weights of the discrepancy."""
+        points, weights = self._points, self._weights
+        if len(weights) > REPRESENTED:
+            order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice))  # neighbours are alike
+            points = points[order[systematic(weights[order][None], REPRESENTED)[0]]]
+            weights = np.full(REPRESENTED, 1 / REPRESENTED)
+        width = len(self.model.linear) + max(sum(f.shape[1] for f in each.features) for each in self._lattices)
+        mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
+        for place in np.unique(points.lattice):
+            lattice, own = self._lattices[place], np.flatnonzero(points.lattice == place)
+            amplitudes = points.amplitudes[own][:, list(lattice.member.places)]
+            found, found_root = lattice.everything(self._index, amplitudes, points.noise_sd[own])
+            q = found.shape[1]
+            mean[own, :q], root[own, :q, :q] = found, found_root
+        whole = Components(weights, self._settings(points), mean, root, points.lattice)
+        free = np.full((1, width - len(self.model.linear)), np.inf)
+        box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
+        return bounded(whole, box.beyond(mean, root), box).components()
+
+    @cached_property
+    def marginals(self) -> Marginals:
+        """The marginal posterior of every parameter."""
+        return Marginals(self.model.symbols, self._marginal)
+
+    @cached_property
+    def draws(self) -> dict[str, FloatArray]:
+        """Independent draws of every parameter."""
+        chosen, linear = self._drawn
+        columns = np.moveaxis(np.concatenate([self.components.settings[chosen], linear], axis=2), 2, 0)
+        named = dict(zip((*self.model.nonlinear, *self.model.linear), columns, strict=False))  # then the weights
+        return {symbol: named[symbol] for symbol in self.model.symbols}
+
+    @cached_property
+    def drawn_discrepancy(self) -> FloatArray:  # type: ignore[override]  # a cached property
+        """The discrepancy's stress (chains, draws, n) at the measurements in every draw."""
+        chosen, linear = self._drawn
+        assert self.components.member is not None  # noqa: S101 (this solution's components have one)
+        member, start = self.components.member[chosen], len(self.model.linear)
+        values = np.zeros((CHAINS, DRAWS, len(self.model.experiment)))
+        for place in np.unique(member):
+            features = np.hstack([np.zeros((values.shape[2], 0)), *self._lattices[place].features])
+            own = member == place
+            values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
+        return values
+
+    @cached_property
+    def _drawn(self) -> tuple[Places, FloatArray]:
+        """The component of every draw, and its linear parameters and weights."""
+        generator, parts = np.random.default_rng(self._seed), self.components
+        chosen = generator.choice(len(parts.weights), size=(CHAINS, DRAWS), p=parts.weights)
+        noise = generator.standard_normal((CHAINS, DRAWS, parts.root.shape[2]))
+        return chosen, parts.mean[chosen] + np.einsum("cdij,cdj->cdi", parts.root[chosen], noise)
+
+    def _marginal(self, symbol: str) -> Marginal:
+        if symbol in self.model.linear:
+            return self._bounded.marginal(self.model.linear.index(symbol))
+        values = self._settings(self._points)[:, self.model.nonlinear.index(symbol)]
+        return marginal_of_logs(values, self._weights, STEP if symbol in self.model.energy_symbols else 0.0)
+
+    def _settings(self, points: _Points) -> FloatArray:
+        """Return the nonlinear parameters (M, d)."""
+        columns = dict(zip(self.model.energy_symbols, points.amplitudes.T, strict=True)) | {"noise_sd": points.noise_sd}
+        return np.column_stack([columns[symbol] for symbol in self.model.nonlinear])
+
+    def _linear(self, points: _Points) -> tuple[FloatArray, FloatArray]:
+        """Return means (M, p) and roots (M, p, p) of the linear parameters, before their bounds."""
+        p = len(self.model.linear)
+        mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
+        for place in np.unique(points.lattice):
+            own = np.flatnonzero(points.lattice == place)
+            # Points that differ in the noise alone have the same mean, and roots in proportion.
+            size = len(self._lattices[place].ratios[0])
+            pair, group = np.unique(points.second[own] * size + points.first[own], return_inverse=True)
+            found, found_root = self._lattices[place].linear(self._index, pair // size, pair % size)
+            mean[own], root[own] = found[group], found_root[group] * points.noise_sd[own, None, None]
+        return mean, root
+
+    def _weigh(self) -> tuple[_Points, float]:
+        """Return the points that matter, and the error of their sum: from that of every second point."""
+        known = not self.model.noise.parameters
+        every = [self._best_noise(place) for place in range(len(self._lattices))]
+        top = max(float(points.log_weight.max()) for points in every)
+        every = [points[points.log_weight > top - IRRELEVANT] for points in every]
+        points = _Points.joined(every if known else [self._all_noise(each) for each in every if len(each.lattice)])
+        mass = np.exp(points.log_weight - points.log_weight.max())
+        coarse = 0.0
+        for place, lattice in enumerate(self._lattices):
+            own = points.lattice == place
+            for grid, places in zip(lattice.ratios, (points.first, points.second), strict=True):
+                own = own & ((places % 2 == 0) | (len(grid) == 1))
+            coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[own].sum()
+        order = np.argsort(mass)
+        heavy = order[np.cumsum(mass[order]) > LIGHT * mass.sum()]
+        return points[heavy], float(abs(coarse / mass.sum() - 1) ** 1.5)
+
+    def _best_noise(self, place: int) -> _Points:
+        """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
+        lattice, noise = self._lattices[place], self.model.noise
+        second, first = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
+        if not noise.parameters:
+            return self._weighed(place, second, first, np.full(len(second), float(noise.sd({}, 0.0))))
+        low, high = self.model.priors["noise_sd"].support
+        best = np.sqrt(lattice.misfit[second, first, self._index] / lattice.freedom)
+        return self._weighed(place, second, first, np.clip(best, low * (1 + 1e-9), high * (1 - 1e-9)))
+
+    def _all_noise(self, points: _Points) -> _Points:
+        """Return the points of a lattice with a lattice of the noise around the best of each."""
+        place = int(points.lattice[0])
+        step = NOISE_STEP / np.sqrt(2 * self._lattices[place].freedom)
+        count = int(NOISE_REACH / NOISE_STEP)
+        noise_sd = (points.noise_sd[:, None] * np.exp(step * np.arange(-count, count + 1))).ravel()
+        second, first = (np.repeat(each, 2 * count + 1) for each in (points.second, points.first))
+        prior = self.model.priors["noise_sd"]
+        low, high = prior.support
+        within = (noise_sd > low) & (noise_sd < high)
+        found = self._weighed(place, second[within], first[within], noise_sd[within])
+        log_cell = prior.log_density(found.noise_sd) + np.log(step * found.noise_sd)
+        return replace(found, log_weight=found.log_weight + log_cell)
+
+    def _weighed(self, place: int, second: Places, first: Places, noise_sd: FloatArray) -> _Points:
+        """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
+        lattice, symbols = self._lattices[place], self.model.energy_symbols
+        amplitudes = np.zeros((len(first), len(symbols)))
+        log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
+        ratios = lattice.ratios[0][first], lattice.ratios[1][second]
+        for which, ratio in zip(lattice.member.places, ratios, strict=False):
+            amplitudes[:, which] = ratio * noise_sd
+            prior = self.model.priors[symbols[which]]
+            log_weight += prior.log_density(amplitudes[:, which]) + np.log(STEP * amplitudes[:, which])
+        return _Points(np.full(len(first), place), second, first, noise_sd, amplitudes, log_weight)

@@ -1,0 +1,39 @@
+"""How the principal stretches change along a loading mode, without differentiating an energy."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.experiments.modes import LoadingMode
+
+__all__ = ["invariant_rates", "invariants", "log_stretches"]
+
+FloatArray = NDArray[np.float64]
+
+STEP = 1e-30
+"""Imaginary step of the derivative: without subtraction, so without loss of digits."""
+
+
+def log_stretches(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the logarithms (n, 3) of the principal stretches and their rates (n, 3) along a mode.
+
+    Divided by the number of loaded axes, so that the engineering stress of a separable energy
+    w(l1) + w(l2) + w(l3) is sum_k l_k w'(l_k) rate_k.
+    """
+    points = np.asarray(stretch, dtype=np.float64)
+    principal = mode.principal_stretches(points + 1j * STEP)
+    logs = np.log(np.stack([np.broadcast_to(each, points.shape).astype(complex) for each in principal], axis=-1))
+    return np.asarray(logs.real), np.asarray(logs.imag / STEP / mode.loaded_axes)
+
+
+def invariants(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return I1 - 3 and I2 - 3, (n,) each; their digits near the reference are kept."""
+    logs, _ = log_stretches(mode, stretch)
+    return np.expm1(2 * logs).sum(axis=1), np.expm1(-2 * logs).sum(axis=1)
+
+
+def invariant_rates(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the engineering stresses (n,) of the energies I1 and I2."""
+    logs, rates = log_stretches(mode, stretch)
+    return (2 * np.exp(2 * logs) * rates).sum(axis=1), (-2 * np.exp(-2 * logs) * rates).sum(axis=1)

@@ -1,0 +1,82 @@
+"""Energy blocks: nothing at the reference, the same energy in every loading mode, variance as their features say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tissuq.discrepancy.blocks import EnergyBlock
+from tissuq.experiments.modes import loading_mode, loading_modes
+from tissuq.mechanics import MooneyRivlin, stress_basis
+from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
+from tissuq.registry import variants
+
+BLOCKS = variants(EnergyBlock)
+MODES = sorted(loading_modes())
+STRETCH = np.linspace(0.6, 2.5, 40)
+
+
+def of(name):
+    return BLOCKS[name]()
+
+
+def settings(block, mode):
+    reach = block.reach(mode, STRETCH)
+    return [(reach, length) for length in block.lengths]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_rates_are_the_stresses_of_the_invariants(mode):
+    mode = loading_mode(mode)
+    basis = stress_basis(MooneyRivlin(), mode, STRETCH)
+    assert np.allclose(np.column_stack(invariant_rates(mode, STRETCH)), basis, rtol=1e-12, atol=1e-12)
+    one, three = mode.principal_stretches(STRETCH)[0], np.stack(np.broadcast_arrays(*mode.principal_stretches(STRETCH)))
+    assert np.allclose(invariants(mode, STRETCH)[0], (three**2).sum(axis=0) - 3, atol=1e-12)
+    assert np.allclose(invariants(mode, STRETCH)[1], (three**-2.0).sum(axis=0) - 3, atol=1e-12)
+    assert np.allclose(log_stretches(mode, STRETCH)[0][:, 0], np.log(one), atol=1e-14)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", BLOCKS)
+def test_stress_and_modulus_vanish_at_the_reference_for_random_draws(name, mode):
+    block, mode = of(name), loading_mode(mode)
+    step = 1e-3
+    near = np.array([1 - step, 1.0, 1 + step])
+    for reach, length in settings(block, mode):
+        features = block.stress_features(mode, near, reach, length)
+        u = np.random.default_rng(0).standard_normal((features.shape[1], 20))
+        stress = features @ u
+        size = np.abs(block.stress_features(mode, STRETCH, reach, length) @ u).max(axis=0)
+        assert np.abs(stress[1]).max() < 1e-12 * size.max() + 1e-14
+        slope = (stress[2] - stress[0]) / (2 * step)
+        assert (np.abs(slope) < 1e-2 * size + 1e-9).all()  # two blocks have no stress in some modes
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", BLOCKS)
+def test_features_make_up_the_variance_within_the_reach(name, mode):
+    block, mode = of(name), loading_mode(mode)
+    for reach, length in settings(block, mode):
+        features = block.stress_features(mode, STRETCH, reach, length)
+        variance = block.stress_variance(mode, STRETCH, reach, length)
+        tolerance = 1e-8 if name != "spline" else 1e-5
+        assert np.allclose((features**2).sum(axis=1), variance, atol=tolerance * variance.max())
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_one_energy_acts_in_every_mode(name):
+    # The work along two paths to one and the same state is the same: equibiaxial at l is uniaxial at l^-2.
+    block = of(name)
+    uniaxial, equibiaxial = loading_mode("uniaxial"), loading_mode("equibiaxial")
+    reach, length = settings(block, uniaxial)[0]
+    ends = np.array([1.1, 1.2])
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+
+    def energy(mode, end):
+        points = 1 + 0.5 * (end - 1) * (1 + nodes)
+        features = block.stress_features(mode, points, reach, length)
+        return mode.loaded_axes * 0.5 * (end - 1) * weights @ features
+
+    for end in ends:
+        first, second = energy(equibiaxial, end), energy(uniaxial, end**-2)
+        assert np.allclose(first, second, rtol=1e-5, atol=1e-5 * np.abs(first).max())

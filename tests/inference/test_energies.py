@@ -1,0 +1,251 @@
+"""The posterior under energy discrepancies, against full covariance matrices and dense sums over the amplitudes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import halfcauchy
+
+import tissuq as tq
+from tissuq.discrepancy import discrepancy_named
+from tissuq.errors import ModelError, TissuqError
+
+STRETCH = np.array([0.7, 0.8, 0.9, 0.95, 1.1, 1.2, 1.35, 1.5, 1.7, 1.9, 2.1, 2.4])
+X = STRETCH**2 + 2 / STRETCH - 3
+UNIT = 2 * (STRETCH - STRETCH**-2)
+NOISE_SD = 0.05
+
+
+def bell(score):
+    return np.exp(-0.5 * score**2)
+
+
+def by_invariant(covariance):
+    """The covariance of the stress when W1 has a covariance."""
+    return np.outer(UNIT, UNIT) * covariance
+
+
+def taylor(length):
+    return by_invariant(np.exp(np.outer(X, X) / (length * X.max()) ** 2) - 1)
+
+
+def log(length):
+    t = np.log(1 + X)
+    scale = length * t.max()
+    return by_invariant(bell((t[:, None] - t) / scale) - np.outer(bell(t / scale), bell(t / scale)))
+
+
+def zero_modulus(length):
+    stress = 2 * (1 - STRETCH**-3) - UNIT
+    return np.outer(stress, stress)
+
+
+def valanis_landel(length):
+    """The stress is (q(e) - q(-e / 2)) / l; a process given its value and slope at zero."""
+    e = np.log(STRETCH)
+    ends = np.concatenate([e, -0.5 * e])
+    scale = length * (ends.max() - ends.min())
+    z = ends / scale
+    prior = bell(z[:, None] - z)
+    known = np.column_stack([bell(z), z * bell(z)])  # covariance with q(0), and with scale q'(0)
+    given = prior - known @ known.T
+    take = np.hstack([np.diag(1 / STRETCH), -np.diag(1 / STRETCH)])
+    return take @ given @ take.T
+
+
+KERNELS = {"taylor": taylor, "log": log, "zero-modulus": zero_modulus, "valanis-landel": valanis_landel}
+
+
+def measured(seed=0, noise=NOISE_SD):
+    truth = {"C10": 0.4, "C20": 0.03, "C30": 0.002}
+    return tq.simulate("yeoh", truth, STRETCH, noise_sd=noise, seed=seed)
+
+
+def dense(names, data, noise_sd, columns=UNIT[:, None], log_noise_prior=None):
+    """Return log evidence, and mean and sd of the first linear parameter; noise_sd may be several with weights."""
+    blocks = [block() for block in discrepancy_sum(names)]
+    scale = np.median(np.abs(data.stress / UNIT))
+    grid = np.exp(np.arange(-16, 10, 0.25)) * scale
+    log_prior = halfcauchy.logpdf(grid, scale=scale) + np.log(0.25 * grid)
+    log_weight, means, variances = [], [], []
+    noise = np.atleast_1d(noise_sd)
+    for lengths in np.ndindex(*(len(block.lengths) for block in blocks)):
+        kernels = [KERNELS[b.name](b.lengths[k]) for b, k in zip(blocks, lengths, strict=True)]
+        share = -sum(np.log(len(block.lengths)) for block in blocks)
+        amplitudes = np.stack(np.meshgrid(*[grid] * len(kernels), indexing="ij"), -1).reshape(-1, len(kernels))
+        prior = sum(np.meshgrid(*[log_prior] * len(kernels), indexing="ij")).ravel()
+        for j, sd in enumerate(noise):
+            total = np.einsum("mk,kij->mij", amplitudes**2, np.array(kernels)) + sd**2 * np.eye(len(UNIT))
+            white = np.linalg.inv(np.linalg.cholesky(total))
+            left, right = white @ columns, white @ data.stress
+            precision = left.swapaxes(1, 2) @ left
+            covariance = np.linalg.inv(precision)
+            mean = (covariance @ (left.swapaxes(1, 2) @ right[:, :, None]))[:, :, 0]
+            rest = right - (left @ mean[:, :, None])[:, :, 0]
+            log_determinant = np.log(np.einsum("mii->mi", white)).sum(axis=1)
+            value = log_determinant - 0.5 * (rest**2).sum(axis=1) - 0.5 * np.linalg.slogdet(precision)[1]
+            value += -0.5 * (len(UNIT) - columns.shape[1]) * np.log(2 * np.pi) + prior + share
+            log_weight.append(value + (0 if log_noise_prior is None else log_noise_prior[j]))
+            means.append(mean[:, 0])
+            variances.append(covariance[:, 0, 0])
+    log_weight, means, variances = map(np.concatenate, (log_weight, means, variances))
+    top = log_weight.max()
+    weight = np.exp(log_weight - top)
+    evidence = top + np.log(weight.sum()) - columns.shape[1] * np.log(50)  # the width of every prior
+    weight /= weight.sum()
+    mean = weight @ means
+    return evidence, mean, np.sqrt(weight @ (variances + (means - mean) ** 2))
+
+
+def discrepancy_sum(names):
+    return [type(block) for block in discrepancy_named(names).sums[0]]
+
+
+@pytest.mark.parametrize("names", ["taylor", "log", "zero-modulus", "valanis-landel"])
+def test_a_single_energy_is_its_dense_covariance(names):
+    data = measured()
+    posterior = tq.fit(data, discrepancy=names, noise_sd=NOISE_SD, priors={"C10": tq.Uniform(0, 50)})
+    evidence, mean, sd = dense(names, data, NOISE_SD)
+    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
+    c10 = posterior.summary().loc["C10"]
+    assert abs(c10["mean"] - mean) < 2e-3 * sd
+    assert abs(c10["sd"] / sd - 1) < 2e-3
+
+
+@pytest.mark.parametrize("names", ["taylor+zero-modulus", "log+zero-modulus"])
+def test_a_sum_of_energies_is_its_dense_covariance(names):
+    data = measured(seed=1)
+    posterior = tq.fit(data, discrepancy=names, noise_sd=NOISE_SD, priors={"C10": tq.Uniform(0, 50)})
+    evidence, mean, sd = dense(names, data, NOISE_SD)
+    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
+    c10 = posterior.summary().loc["C10"]
+    assert abs(c10["mean"] - mean) < 2e-3 * sd
+    assert abs(c10["sd"] / sd - 1) < 2e-3
+
+
+def test_unknown_noise_is_integrated_too():
+    data = measured(seed=2)
+    priors = {"C10": tq.Uniform(0, 50), "noise_sd": tq.Uniform(0, 2)}
+    posterior = tq.fit(data, discrepancy="taylor", priors=priors)
+    noise = np.exp(np.arange(np.log(0.005), np.log(1.9), 0.08))
+    evidence, mean, sd = dense("taylor", data, noise, log_noise_prior=np.log(0.08 * noise / 2))
+    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 2e-3
+    c10 = posterior.summary().loc["C10"]
+    assert abs(c10["mean"] - mean) < 3e-3 * sd
+    assert abs(c10["sd"] / sd - 1) < 3e-3
+
+
+def test_a_material_with_three_parameters_keeps_them_apart():
+    data = measured(seed=3)
+    columns = np.column_stack([UNIT, 2 * X * UNIT, 3 * X**2 * UNIT])
+    priors = {"C10": tq.Uniform(0, 50)} | dict.fromkeys(("C20", "C30"), tq.Uniform(-25, 25))
+    posterior = tq.fit(data, material="yeoh", discrepancy="zero-modulus", noise_sd=NOISE_SD, priors=priors)
+    evidence, mean, sd = dense("zero-modulus", data, NOISE_SD, columns)
+    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
+    c10 = posterior.summary().loc["C10"]
+    assert abs(c10["mean"] - mean) < 2e-3 * sd
+    assert abs(c10["sd"] / sd - 1) < 2e-3
+
+
+def test_auto_is_the_mixture_of_its_sums():
+    data = measured(seed=4)
+    priors = {"C10": tq.Uniform(0, 50)}
+    auto = tq.fit(data, discrepancy="auto", noise_sd=NOISE_SD, priors=priors)
+    names = ["taylor+zero-modulus", "taylor+valanis-landel", "log+zero-modulus", "log+valanis-landel"]
+    parts = [tq.fit(data, discrepancy=name, noise_sd=NOISE_SD, priors=priors) for name in names]
+    evidence = np.array([part.log_evidence for part in parts])
+    weights = np.exp(evidence - evidence.max())
+    assert auto.log_evidence == pytest.approx(np.log(weights.mean()) + evidence.max(), abs=1e-6)
+    weights /= weights.sum()
+    assert [auto.solution.members[name] for name in names] == pytest.approx(list(weights), abs=1e-5)
+    mean = weights @ [part.summary().loc["C10", "mean"] for part in parts]
+    assert auto.summary().loc["C10", "mean"] == pytest.approx(mean, rel=1e-5)
+
+
+@pytest.mark.parametrize("noise", ["known", "unknown"])
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_the_unit_of_the_data_does_not_matter(noise, scale):
+    data = measured(seed=5)
+    other = tq.Experiment(mode="uniaxial", stretch=STRETCH, stress=scale * data.stress)
+    sds = ("unknown", "unknown") if noise == "unknown" else (NOISE_SD, scale * NOISE_SD)
+    first, second = (
+        tq.fit(d, discrepancy="auto", noise_sd=sd).summary() for d, sd in zip((data, other), sds, strict=True)
+    )
+    assert np.allclose(scale * first.loc["C10"], second.loc["C10"], rtol=1e-6)
+
+
+def test_many_data_sets_are_those_one_by_one():
+    every = [measured(seed=seed) for seed in range(3)]
+    together = tq.fit_many(every, discrepancy="auto", noise_sd=NOISE_SD)
+    for data, found in zip(every, together, strict=True):
+        alone = tq.fit(data, discrepancy="auto", noise_sd=NOISE_SD)
+        assert found.log_evidence == pytest.approx(alone.log_evidence, abs=1e-9)
+        assert np.allclose(found.summary().loc["C10"], alone.summary().loc["C10"], rtol=1e-9)
+
+
+def test_a_bound_cuts_the_posterior_and_the_draws():
+    data = measured(seed=6)
+    free = tq.fit(data, discrepancy="taylor", noise_sd=NOISE_SD, priors={"C10": tq.Uniform(0, 50)})
+    middle = free.summary().loc["C10", "mean"]
+    cut = tq.fit(data, discrepancy="taylor", noise_sd=NOISE_SD, priors={"C10": tq.Uniform(middle, 50)})
+    below = float(np.interp(middle, free.solution.marginals["C10"].points, free.solution.marginals["C10"].cumulative))
+    expected = free.log_evidence + np.log(1 - below) + np.log(50 / (50 - middle))
+    assert cut.log_evidence == pytest.approx(expected, abs=1e-3)
+    assert cut.solution.draws["C10"].min() >= middle
+    assert cut.summary().loc["C10", "hdi_low"] == pytest.approx(middle, abs=1e-3)
+
+
+def test_predictions_at_the_data_are_those_of_the_dense_process():
+    data = measured(seed=7)
+    posterior = tq.fit(data, discrepancy="auto", noise_sd=NOISE_SD)
+    band = posterior.predict(STRETCH, noise=False)
+    exact = tq.simulate("yeoh", {"C10": 0.4, "C20": 0.03, "C30": 0.002}, STRETCH, noise_sd=0.0, seed=0).stress
+    assert np.abs(band["mean"] - exact).max() < 4 * NOISE_SD
+    assert (band["high"] - band["low"] < 4 * NOISE_SD).all()
+    mean = posterior.data["posterior_predictive"]["stress"].mean(("chain", "draw")).to_numpy()
+    assert np.abs(mean - band["mean"]).max() < 0.1 * NOISE_SD
+    drawn = posterior.solution.draws["C10"][:, :, None] * UNIT + posterior.solution.drawn_discrepancy
+    assert np.abs(np.quantile(drawn, 0.975, axis=(0, 1)) - band["high"]).max() < 0.15 * NOISE_SD
+
+
+def test_what_lies_beyond_the_data_is_as_uncertain_as_the_prior_says():
+    data = measured(seed=8)
+    posterior = tq.fit(data, discrepancy="auto", noise_sd=NOISE_SD)
+    width = np.diff(posterior.predict([2.4, 2.6, 3.0, 4.0], noise=False)[["low", "high"]], axis=1).ravel()
+    assert (np.diff(width) > 0).all()
+    assert width[-1] > 10 * width[0]
+
+
+def test_the_reference_state_is_left_alone():
+    data = measured(seed=9)
+    posterior = tq.fit(data, discrepancy="auto", noise_sd=NOISE_SD)
+    near = posterior.predict([1.0, 1.001], noise=False)
+    alone = posterior.predict([1.0, 1.001], noise=False, discrepancy=False)
+    assert near["high"][0] == pytest.approx(0.0, abs=1e-12)
+    assert np.allclose(near["mean"][1], alone["mean"][1], rtol=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"discrepancy": "auto", "material": "ogden-1"}, "alpha1"),
+        ({"discrepancy": "auto", "noise": "proportional"}, "proportional"),
+        ({"discrepancy": "auto", "priors": {"C10": tq.Normal(1, 1)}}, "Gaussian"),
+        ({"discrepancy": "auto", "method": "nuts"}, "exactly"),
+        ({"discrepancy": "taylor+gp"}, "gp"),
+        ({"discrepancy": "taylor+taylor"}, "different"),
+    ],
+)
+def test_what_is_not_integrated_is_refused_in_words(options, words):
+    with pytest.raises(TissuqError, match=words):
+        tq.fit(measured(), **options)
+    assert issubclass(ModelError, TissuqError)
+
+
+def test_an_energy_among_a_hundred_thousand_points():
+    stretch = np.linspace(0.7, 2.4, 100_000)
+    data = tq.simulate("yeoh", {"C10": 0.4, "C20": 0.03, "C30": 0.002}, stretch, noise_sd=NOISE_SD, seed=1)
+    posterior = tq.fit(data, discrepancy="taylor", noise_sd=NOISE_SD)
+    c10 = posterior.summary().loc["C10"]
+    assert abs(c10["mean"] - 0.4) < 5 * c10["sd"]
+    assert c10["sd"] < 1e-2
