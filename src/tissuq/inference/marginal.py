@@ -140,7 +140,7 @@ def marginal_of_cut_mixture(
     limits = ends if place == which else (-np.inf, np.inf)
     reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
     shares = weights[:, None] * np.exp(-np.abs(scores))
-    count = max(2 * NODES, min(8 * NODES, MANY_VALUES // len(weights)))
+    count = max(2 * NODES, min(4 * NODES, MANY_VALUES // len(weights)))
     coarse = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, count)
     scores = (coarse - means[:, place, None]) / sd[:, None]
     log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
