@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tissuq.assessment import Assessment, assess
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -78,6 +79,22 @@ class Posterior:
     def warnings(self) -> tuple[str, ...]:
         """What a reader of this posterior must know, in sentences."""
         return tuple(warnings_about(self.solution))
+
+    def assess(self) -> Assessment:
+        """Return to what extent the data need the discrepancy, and what it does to the parameters.
+
+        The same data are fitted without discrepancy and, where it is an energy, with other priors of its amplitudes.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, stretch, noise_sd=0.02, seed=1)
+        >>> found = tq.fit(data, discrepancy="auto", noise_sd=0.02).assess()
+        >>> found.share[0] > 0.2, abs(found.initial_share[0]) < 1e-6, found.probability_of_none < 0.01
+        (True, True, True)
+        """
+        return assess(self.solution, lambda models: [posterior.solution for posterior in self._solve(models)])
 
     def update(self, more: Experiment) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.

@@ -8,7 +8,7 @@ from textwrap import fill
 from typing import Any
 
 from tissuq.errors import InputError
-from tissuq.report.run_folder import RECIPE
+from tissuq.report.run_folder import ASSESSMENT, RECIPE
 from tissuq.report.tables import headline_of
 
 __all__ = ["print_rows", "print_summary", "print_warnings"]
@@ -62,7 +62,18 @@ def print_summary(folder: Path) -> None:
         "HPD: 95 %. In band, alone: measurements inside the 95 % band with the discrepancy, and of the material alone."
     )
     print(f"A good predictive check does not mean that {headline_of(rows[0])} is right.")
+    _print_assessment(folder / ASSESSMENT)
     print(f"Report: {folder / 'report.html'}")
+
+
+def _print_assessment(path: Path) -> None:
+    """Print to what extent the material is wrong, where one discrepancy tells it."""
+    found = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
+    if len(found) == 1:
+        print("\nTo what extent the material is wrong:")
+        for text in found[0]["sentences"]:
+            print(fill(text, 96, initial_indent="- ", subsequent_indent="  "))
+        print()
 
 
 def print_warnings(warnings: list[str]) -> None:

@@ -137,7 +137,7 @@ class EnergySolution(Solution):
         )
 
     @cached_property
-    def members(self) -> dict[str, float]:
+    def members(self) -> dict[str, float]:  # type: ignore[override]  # a cached property
         """The posterior probability of every sum of blocks, its length scales together."""
         found: dict[str, float] = {}
         shares = np.bincount(self._points.lattice, self._weights, minlength=len(self._lattices))

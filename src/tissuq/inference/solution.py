@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -134,6 +135,8 @@ class Solution(ABC):
         Of the sampler; None on the exact route.
     drawn_discrepancy : (chains, draws, n) array or None
         The discrepancy's stress at the measurements in every draw, MPa, where it has weights of its own.
+    members : mapping of str to float
+        Posterior probabilities of the members, where the discrepancy is an average.
     """
 
     model: StatisticalModel
@@ -144,6 +147,7 @@ class Solution(ABC):
     log_evidence_error: float | None = None
     diagnostics: Diagnostics | None = None
     drawn_discrepancy: FloatArray | None = None
+    members: Mapping[str, float] = MappingProxyType({})
 
     @property
     @abstractmethod

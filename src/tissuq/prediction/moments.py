@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,15 @@ from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spec
 from tissuq.inference.solution import Components
 from tissuq.model import StatisticalModel
 
-__all__ = ["CorrelatedPart", "basis_of", "coefficients", "correlated_parts", "mean_stress", "stress_moments"]
+__all__ = [
+    "CorrelatedPart",
+    "basis_of",
+    "coefficients",
+    "correlated_parts",
+    "drawn_curves",
+    "mean_stress",
+    "stress_moments",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -129,6 +137,45 @@ def stress_moments(
     if noise:
         extra += model.noise_variance(values, level)
     return mean, extra + (root**2).sum(axis=2)
+
+
+def drawn_curves(
+    model: StatisticalModel, components: Components, stretch: FloatArray, seed: int = 0
+) -> tuple[FloatArray, FloatArray]:
+    """Return stresses (M, g) of the material alone and of the discrepancy, one joint draw for every component.
+
+    Scatter that is independent from point to point is no curve, and left out.
+    """
+    generator, settings = np.random.default_rng([seed, 11]), components.settings
+    score = generator.standard_normal(components.mean.shape)
+    linear = components.mean + np.einsum("mpq,mq->mp", components.root, score)
+    drawn, _ = coefficients(model, replace(components, mean=linear))
+    terms = basis_of(model, stretch, settings) * drawn[:, None, :]
+    own = np.isin(model.column_symbols, model.material_symbols)
+    alone, other = terms[..., own].sum(axis=2), terms[..., ~own].sum(axis=2)
+    if components.member is not None:
+        for shift, _, _, chosen in _energies(model, replace(components, mean=linear), stretch):
+            other[chosen] += shift
+    if model.is_correlated:
+        for part in correlated_parts(model, settings):
+            shift, covariance = _condition_jointly(model, part, stretch, drawn[part.chosen])
+            values, vectors = np.linalg.eigh(covariance)
+            score = generator.standard_normal(shift.shape)
+            other[part.chosen] += shift + np.einsum(
+                "ngk,nk->ng", vectors * np.sqrt(np.maximum(values, 0))[:, None], score
+            )
+    return alone, other
+
+
+def _condition_jointly(
+    model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray, b: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return means (N, g) and covariances (N, g, g) of the correlated discrepancy given the data and coefficients b."""
+    shift, _, _ = _condition(model, part, stretch, b)
+    inside = (model.correlation(stretch, model.experiment.stretch, part.shape) / part.scale) @ part.correlation.vectors
+    gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
+    explained = np.einsum("gr,nr,hr->ngh", inside, gain, inside)
+    return shift, part.amplitude[:, None, None] * (model.correlation(stretch, stretch, part.shape) - explained)
 
 
 def _energies(

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tissuq.assessment import Assessment
 from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
 from tissuq.report.rows import readable_methods, readable_parameters, readable_summary, significant
-from tissuq.report.run_folder import RECIPE
-from tissuq.report.tables import Row, summary_row
+from tissuq.report.run_folder import ASSESSMENT, RECIPE
+from tissuq.report.tables import Row, summary_row, write_json
 from tissuq.studies.specimen import SpecimenStudy
 
 if TYPE_CHECKING:
@@ -43,10 +45,15 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
     write_posteriors(folder, study.posteriors)
+    write_json(folder / ASSESSMENT, [_assessment_row(*each) for each in study.assessments.items()])
     if figures:
         write_figures(folder, _figures(study))
     page = render("specimen.html", **_context(study, summary, folder), command=command)
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _assessment_row(name: str, assessment: Assessment) -> Row:
+    return {"formulation": name, **asdict(assessment), "sentences": assessment.sentences}
 
 
 def specimen_summary(study: SpecimenStudy) -> list[Row]:
@@ -83,6 +90,7 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
             if each.model.discrepancy.caution
         },
         "parameters": readable_parameters(study.posteriors, study.unit),
+        "assessments": {name: each.sentences for name, each in study.assessments.items()},
         "methods": readable_methods(study.posteriors),
         "noise": known or noise.description,
         "skipped": study.skipped,

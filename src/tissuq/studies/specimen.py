@@ -11,6 +11,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from tissuq.assessment import Assessment, design_warnings
 from tissuq.discrepancy import Auto, EnergyDiscrepancy, discrepancies, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
@@ -96,13 +97,17 @@ class SpecimenSettings(BaseModel):
 
 @dataclass(frozen=True)
 class SpecimenStudy:
-    """What was found: a posterior for each discrepancy, and why some do not apply."""
+    """What was found: a posterior for each discrepancy, why some do not apply, and what those that do, do.
+
+    Sampled posteriors are not assessed, which would sample them again.
+    """
 
     settings: SpecimenSettings
     experiment: Experiment
     posteriors: dict[str, Posterior]
     seconds: dict[str, float]
     skipped: dict[str, str]
+    assessments: dict[str, Assessment]
 
     @property
     def unit(self) -> StressUnit:
@@ -117,6 +122,7 @@ class SpecimenStudy:
             for text in posterior.warnings:
                 concerned.setdefault(text, []).append(name)
         found = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        found += design_warnings(self.experiment)
         if "the file states no unit" in self.experiment.source:
             found.insert(
                 0, "the file states no unit of stress, so MPa was assumed; if it is another, give --stress-unit."
@@ -180,7 +186,9 @@ def run_specimen(
     if not posteriors:
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
-    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped)
+    step("assessing")
+    assessments = {name: each.assess() for name, each in posteriors.items() if name != "none" and not each.diagnostics}
+    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped, assessments)
 
 
 def _every() -> list[str]:

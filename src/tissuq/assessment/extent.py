@@ -1,0 +1,192 @@
+"""To what extent the data need a discrepancy, and what it does to the parameters, in numbers and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment.design import design_warnings
+from tissuq.discrepancy import discrepancy_named
+from tissuq.inference.marginal import Marginal
+from tissuq.inference.resampling import systematic
+from tissuq.inference.solution import Solution
+from tissuq.model import StatisticalModel
+from tissuq.prediction.moments import drawn_curves
+
+__all__ = ["Assessment", "assess"]
+
+FloatArray = NDArray[np.float64]
+Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
+
+DRAWS = 2000
+POINTS = 60
+"""Measured stretches, at most, over which the share is taken."""
+STEP = 1e-4
+"""Of the stretch, for the initial slope."""
+SCALES = (0.25, 4.0)
+"""Factors of the amplitudes' prior scale with which its influence is told."""
+SENSITIVE = 0.5
+"""Shift of the mean, in standard deviations, from which the prior of the amplitudes matters."""
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What a discrepancy does in a posterior.
+
+    Attributes
+    ----------
+    parameter : str
+        The headline parameter, to which the numbers refer.
+    share : tuple of float
+        Root mean square of the discrepancy's stress over that of the whole, at the measurements: mean, and the ends
+        of its 95 % interval.
+    initial_share : tuple of float
+        Share of the initial stiffness that the discrepancy carries, likewise: what it could have taken from the
+        parameter. Zero for an energy discrepancy.
+    amplitudes : dict of str to float
+        Posterior mean of each amplitude of an energy discrepancy over that of the parameter.
+    members : dict of str to float
+        Posterior probabilities of the sums that an average is made of.
+    between : float
+        Share of the parameter's variance that is between these.
+    probability_of_none : float or None
+        Of no discrepancy, were it as probable as this one before the data. For information: intervals that drop the
+        discrepancy on that ground miss the parameter where a small discrepancy hides in the noise.
+    width_against_none : float or None
+        Standard deviation of the parameter over that without discrepancy.
+    shifts : dict of float to float
+        Shift of the parameter's mean, in standard deviations, when the scale of the amplitudes' priors is multiplied by
+        a factor.
+    warnings : tuple of str
+        What the design of the test leaves open, and what to measure next.
+    """
+
+    parameter: str
+    share: tuple[float, float, float]
+    initial_share: tuple[float, float, float]
+    amplitudes: Mapping[str, float]
+    members: Mapping[str, float]
+    between: float
+    probability_of_none: float | None
+    width_against_none: float | None
+    shifts: Mapping[float, float]
+    warnings: tuple[str, ...]
+
+    @property
+    def sentences(self) -> list[str]:
+        """The numbers as a person reads them."""
+        mean, low, high = self.share
+        found = [f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"]
+        if max(map(abs, self.initial_share)) < 1e-6:
+            found.append(f"it has no initial stiffness, so it has taken nothing from {self.parameter}")
+        else:
+            mean, low, high = self.initial_share
+            found.append(
+                f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), which "
+                f"{self.parameter} may lack"
+            )
+        if self.width_against_none is not None:
+            found.append(f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy")
+        if self.probability_of_none is not None:
+            found.append(
+                f"were no discrepancy as probable before the data, it would have {_percent(self.probability_of_none)} "
+                "now (for information: that is no reason to drop it)"
+            )
+        if len(self.members) > 1:
+            named = ", ".join(f"{name} {weight:.0%}" for name, weight in self.members.items() if weight >= 0.005)
+            found.append(f"the energies have the weights {named}; {self.between:.0%} of the variance is between them")
+        if self.shifts:
+            worst = max(self.shifts, key=lambda factor: abs(self.shifts[factor]))
+            matters = "matters" if abs(self.shifts[worst]) > SENSITIVE else "hardly matters"
+            found.append(
+                f"the prior scale of the amplitudes {matters}: times {worst:g} it moves {self.parameter} by "
+                f"{self.shifts[worst]:+.2f} sd"
+            )
+        return [f"{text[0].upper()}{text[1:]}." for text in found]
+
+
+def assess(solution: Solution, solve: Solve) -> Assessment:
+    """Return what the discrepancy does in a posterior.
+
+    Parameters
+    ----------
+    solution : Solution
+    solve : callable
+        Returns the solutions of models by the method that gave this one: for the same model without discrepancy, and
+        with other priors of the amplitudes.
+    """
+    model, marginal = solution.model, solution.marginals[solution.model.headline]
+    none = _without(model, solve)
+    share, initial_share = _shares(solution)
+    factors = SCALES if model.energy_symbols else ()
+    moved = {factor: _rescaled(model, solve, factor).marginals[model.headline].mean for factor in factors}
+    return Assessment(
+        parameter=model.headline,
+        share=share,
+        initial_share=initial_share,
+        amplitudes={symbol: solution.marginals[symbol].mean / marginal.mean for symbol in model.energy_symbols},
+        members=dict(solution.members),
+        between=_between(solution, marginal),
+        probability_of_none=_probability_of_none(solution, none),
+        width_against_none=marginal.sd / none.marginals[model.headline].sd if none else None,
+        shifts={factor: (mean - marginal.mean) / marginal.sd for factor, mean in moved.items()},
+        warnings=tuple(design_warnings(model.experiment)),
+    )
+
+
+def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
+    """Return the solution without discrepancy, or None where there is none already."""
+    nothing = discrepancy_named("none")
+    if model.discrepancy == nothing:
+        return None
+    own = {symbol: prior for symbol, prior in model.priors.items() if symbol in (*model.material_symbols, "noise_sd")}
+    return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None)])[0]
+
+
+def _rescaled(model: StatisticalModel, solve: Solve, factor: float) -> Solution:
+    """Return the solution with the scale of an energy's amplitudes multiplied by a factor."""
+    wider = {symbol: model.priors[symbol].scaled(factor) for symbol in model.energy_symbols}
+    return solve([replace(model, chosen_priors=model.priors | wider)])[0]
+
+
+def _shares(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals."""
+    data = np.unique(solution.model.experiment.stretch)
+    some = data[np.linspace(0, len(data) - 1, min(len(data), POINTS)).astype(int)]
+    components, at = solution.components, np.append(some, [1 - STEP, 1 + STEP])
+    alone, other = drawn_curves(solution.model, components[systematic(components.weights[None], DRAWS)[0]], at)
+    size = np.sqrt((other[:, :-2] ** 2).mean(axis=1) / ((alone + other)[:, :-2] ** 2).mean(axis=1))
+    slope, own = (curve[:, -1] - curve[:, -2] for curve in (other, alone))
+    return _mean_and_ends(size), _mean_and_ends(slope / (slope + own))
+
+
+def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
+    low, high = np.quantile(values, [0.025, 0.975])
+    return float(values.mean()), float(low), float(high)
+
+
+def _between(solution: Solution, marginal: Marginal) -> float:
+    """Return the share of the headline parameter's variance that is between the members of an average."""
+    parts, place = solution.components, solution.model.linear.index(solution.model.headline)
+    if parts.member is None:
+        return 0.0
+    names = np.array([member.name for member in solution.model.energy_members])[parts.member]
+    explained = 0.0
+    for name in np.unique(names):
+        own = names == name
+        mean = float(np.average(parts.mean[own, place], weights=parts.weights[own]))
+        explained += float(parts.weights[own].sum()) * (mean - marginal.mean) ** 2
+    return explained / marginal.sd**2
+
+
+def _probability_of_none(solution: Solution, none: Solution | None) -> float | None:
+    if none is None or none.log_evidence is None or solution.log_evidence is None:
+        return None
+    return float(1 / (1 + np.exp(np.clip(solution.log_evidence - none.log_evidence, -700, 700))))
+
+
+def _percent(probability: float) -> str:
+    return f"{probability:.0%}" if probability >= 0.005 else "less than 1 %"
