@@ -58,7 +58,8 @@ def test_default_boxes_of_moduli_hold_the_truth_whatever_the_exponents(name, exp
 
 def test_the_default_prior_of_c10_is_the_same_for_every_discrepancy():
     boxes = {name: model(name).priors["C10"] for name in discrepancies()}
-    assert len(set(boxes.values())) == 1
+    assert {box.low for box in boxes.values()} == {0.0}
+    assert np.ptp([box.high for box in boxes.values()]) < 1e-13 * boxes["none"].high
 
 
 def test_chosen_priors_replace_defaults():
@@ -192,8 +193,10 @@ def test_an_energy_that_jax_cannot_differentiate_is_refused_in_words():
         def strain_energy(self, I1, I2, values):
             return values[0] * (np.exp(I1 - 3) - 1)
 
+    stretch = np.linspace(0.7, 2.0, 20_000)
+    many = tq.Experiment(mode="uniaxial", stretch=stretch, stress=stretch - 1)
     with pytest.raises(tq.ModelError, match=r"jax\.numpy"):
-        tq.fit(DATA, material=WithNumpy(), discrepancy="none", noise_sd=0.1)
+        tq.fit(many, material=WithNumpy(), discrepancy="none", noise_sd=0.1)
 
 
 def test_two_materials_of_one_name_are_refused():

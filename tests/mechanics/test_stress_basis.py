@@ -8,11 +8,13 @@ import pytest
 import tissuq as tq
 from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial, loading_modes
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3, StretchMaterial, stress_basis, traced_stress_basis
+from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.stress import differentiator
 
 jax = differentiator()
 
 STRETCH = np.linspace(0.6, 2.0, 15)
+MANY = np.linspace(0.6, 2.0, 20_000)
 EVERY_MODE = pytest.mark.parametrize("mode", [kind() for kind in loading_modes().values()], ids=str)
 
 
@@ -62,8 +64,34 @@ def test_new_values_compile_nothing_new():
             return super().energy(stretches, values)
 
     for alpha in (2.0, 3.0, 4.0):
-        stress_basis(Counted(), Uniaxial(), STRETCH, [alpha])
+        stress_basis(Counted(), Uniaxial(), MANY, [alpha])
     assert len(traced) == 1
+
+
+@pytest.mark.parametrize(("material", "nonlinear"), [(NeoHookean(), []), (Ogden1(), [3.3])])
+@EVERY_MODE
+def test_few_points_and_many_give_the_same_stress(material, nonlinear, mode):
+    # Few are differentiated by an imaginary step, many by JAX.
+    few, many = (stress_basis(material, mode, points, nonlinear) for points in (MANY[::500], MANY))
+    np.testing.assert_allclose(few, many[::500], rtol=1e-12, atol=1e-12)
+
+
+def test_what_an_imaginary_step_cannot_differentiate_is_left_to_jax():
+    class WithAbsolute(StretchMaterial):
+        """Neo-Hookean, in a way that loses the imaginary part."""
+
+        parameters = (tq.Parameter("mu", "shear modulus"),)
+        name = "with-absolute"
+        formula = "mu / 2 |I1 - 3|"
+        source = "this test"
+
+        def energy(self, stretches, values):
+            return 0.5 * values[0] * abs(sum(stretch**2 for stretch in stretches) - 3) + 0 * stretches[0]
+
+    strained = STRETCH[np.abs(STRETCH - 1) > 1e-9]
+    assert complex_step_stress(WithAbsolute(), Uniaxial(), strained, np.ones((1, 1))) is None
+    expected = stress_basis(NeoHookean(), Uniaxial(), strained) / 2
+    np.testing.assert_allclose(stress_basis(WithAbsolute(), Uniaxial(), strained), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -93,6 +121,6 @@ def test_an_energy_of_stretches_that_jax_cannot_differentiate_is_refused_in_word
             return values[0] * sum(np.log(stretch) ** 2 for stretch in stretches)
 
     with pytest.raises(tq.ModelError, match=r"jax\.numpy"):
-        stress_basis(WithNumpy(), Uniaxial(), STRETCH)
+        stress_basis(WithNumpy(), Uniaxial(), MANY)
     with pytest.raises(tq.ModelError, match=r"jax\.numpy"):
         tq.initial_shear_modulus(WithNumpy(), [1.0])

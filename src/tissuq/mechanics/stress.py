@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode, Uniaxial
+from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.material import Material
 
 __all__ = ["engineering_stress", "initial_shear_modulus", "path_energy", "stress_basis", "traced_stress_basis"]
@@ -46,10 +47,12 @@ def engineering_stress(
     ----------
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
     """
-    values = np.asarray(values, dtype=np.float64)
-    with _explained(material):
-        curves = _curves(material, mode)(np.asarray(stretch, dtype=np.float64), np.atleast_2d(values))
-    return np.asarray(curves if values.ndim == 2 else curves[0])
+    values, points = np.asarray(values, dtype=np.float64), np.asarray(stretch, dtype=np.float64)
+    curves = complex_step_stress(material, mode, points, np.atleast_2d(values))
+    if curves is None:
+        with _explained(material):
+            curves = np.asarray(_curves(material, mode)(points, np.atleast_2d(values)))
+    return curves if values.ndim == 2 else np.asarray(curves[0])
 
 
 def stress_basis(
@@ -84,25 +87,38 @@ def stress_basis(
     >>> stress_basis(Ogden1(), Uniaxial(), [0.5, 1.0, 2.0], nonlinear=[2.0]).ravel().round(12).tolist()
     [-3.5, 0.0, 1.75]
     """
-    settings = np.asarray(nonlinear, dtype=np.float64)
-    with _explained(material):
-        bases = _bases(material, mode)(np.asarray(stretch, dtype=np.float64), np.atleast_2d(settings))
-    return np.asarray(bases if settings.ndim == 2 else bases[0])
+    settings, points = np.asarray(nonlinear, dtype=np.float64), np.asarray(stretch, dtype=np.float64)
+    rows = np.atleast_2d(settings)
+    _check_nonlinear(material, rows.shape[1:])
+    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(rows), axis=0)
+    values[:, :, ~is_linear] = rows[:, None]
+    found = complex_step_stress(material, mode, points, values.reshape(-1, is_linear.size))
+    if found is not None:
+        bases = np.ascontiguousarray(found.reshape(len(rows), -1, len(points)).swapaxes(1, 2))
+    else:
+        bases = np.asarray(_bases(material, mode)(points, rows))
+    return bases if settings.ndim == 2 else np.asarray(bases[0])
 
 
 def traced_stress_basis(material: Material, mode: LoadingMode, stretch: Any, nonlinear: Any) -> Any:
     """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
-    others = [parameter.symbol for parameter in material.parameters if not parameter.is_linear]
-    if np.shape(nonlinear) != (len(others),):
-        raise ModelError(
-            f"the stress of material '{material.name}' is linear in its parameters only at given values of "
-            f"{', '.join(others) or 'nothing else'}, so its basis needs {len(others)} of them: "
-            f"it was given the shape {np.shape(nonlinear)}."
-        )
+    _check_nonlinear(material, np.shape(nonlinear))
     jnp = differentiator().numpy
     is_linear = np.array([parameter.is_linear for parameter in material.parameters])
     unit = jnp.asarray(np.eye(is_linear.size)[is_linear])
-    return _stresses(material, mode)(jnp.asarray(stretch), unit.at[:, ~is_linear].set(nonlinear)).T
+    with _explained(material):
+        return _stresses(material, mode)(jnp.asarray(stretch), unit.at[:, ~is_linear].set(nonlinear)).T
+
+
+def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:
+    others = [parameter.symbol for parameter in material.parameters if not parameter.is_linear]
+    if shape != (len(others),):
+        raise ModelError(
+            f"the stress of material '{material.name}' is linear in its parameters only at given values of "
+            f"{', '.join(others) or 'nothing else'}, so its basis needs {len(others)} of them: "
+            f"it was given the shape {shape}."
+        )
 
 
 def initial_shear_modulus(material: Material, values: ArrayLike) -> float:

@@ -1,0 +1,53 @@
+"""The derivative of a strain energy without a compiler: an imaginary step, exact to rounding, for few points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import LoadingMode
+from tissuq.mechanics.material import Material
+
+__all__ = ["complex_step_stress"]
+
+FloatArray = NDArray[np.float64]
+
+MOST_VALUES = 10_000
+"""Stresses from which compiled derivatives are quicker."""
+STEP = 1e-30
+"""Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
+REAL_STEP = 1e-5
+AGREEMENT = 1e-6
+"""Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""
+
+
+def complex_step_stress(
+    material: Material, mode: LoadingMode, stretch: FloatArray, values: FloatArray
+) -> FloatArray | None:
+    """Return engineering stresses (m, n) at stretches (n,) for parameter values (m, k), or None.
+
+    None where there are many, or where the energy is not analytic arithmetic of NumPy arrays: written with jax.numpy,
+    or with absolute values, branches or the like, which a real difference quotient tells.
+    """
+    if len(stretch) * len(values) > MOST_VALUES:
+        return None
+    parameters = values.T[:, :, None]
+
+    def energy(points: Any) -> Any:
+        return material.energy(mode.principal_stretches(points), parameters)
+
+    try:
+        with np.errstate(all="ignore"):
+            found, after, before = (energy(stretch + step) for step in (1j * STEP, REAL_STEP, -REAL_STEP))
+    except (TypeError, ValueError):
+        return None
+    if not all(isinstance(each, np.ndarray) for each in (found, after, before)) or not np.iscomplexobj(found):
+        return None
+    slope = np.broadcast_to(found.imag / STEP, (len(values), len(stretch)))
+    quotient = np.broadcast_to((after - before) / (2 * REAL_STEP), slope.shape)
+    size = np.maximum(np.abs(slope), np.abs(slope).max(axis=1, keepdims=True, initial=0.0) * 1e-2)
+    if not (np.abs(slope - quotient) <= AGREEMENT * size + 1e-300).all():
+        return None
+    return np.asarray(slope / mode.loaded_axes)
