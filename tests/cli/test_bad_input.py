@@ -160,3 +160,23 @@ def test_a_column_called_stretch_is_not_taken_for_a_strain(cli, here):
     said = cli("fit", "a.csv", "--column", "strain=stretch")
     assert said.status == 2
     assert "named a stretch but read as a strain" in said.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "--preset with one of"),
+        (["--preset", "all"], "there is no preset 'all'"),
+        (["--preset", "strength", "--noise", "some"], "'known' or 'unknown'"),
+        (["--config", "missing.toml"], "missing.toml"),
+        (["--preset", "strength", "--out", "other"], "not the folder of a campaign"),
+    ],
+)
+def test_a_campaign_refuses_bad_options(cli, here, arguments, words):
+    (here / "other").mkdir()
+    (here / "other" / "file.txt").write_text("mine")
+    said = cli("study", "coverage", *arguments)
+    assert said.status == 2
+    assert words in " ".join(said.err.split())
+    assert "Traceback" not in said.err
+    assert [path.name for path in (here / "other").iterdir()] == ["file.txt"]

@@ -31,6 +31,8 @@ KINDS = [
 class Fixed:
     """A solution whose every draw has the given parameters."""
 
+    drawn_discrepancy = None
+
     def __init__(self, model, values, draws=3000):
         self.model = model
         self.draws = {symbol: np.full((4, draws), values[symbol]) for symbol in model.symbols}
