@@ -137,13 +137,13 @@ class StatisticalModel:
         """The amplitudes of an energy discrepancy."""
         return tuple(p.symbol for p in self.discrepancy.parameters) if self.energy_members else ()
 
-    def basis(self, stretch: FloatArray, bent: ArrayLike = ()) -> FloatArray:
+    def basis(self, stretch: FloatArray, bent: ArrayLike = (), mode: LoadingMode | None = None) -> FloatArray:
         """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,).
 
         Where the material has parameters in which its stress is not linear, ``bent`` holds their values: (s,), or
-        (m, s) for (m, n, k) mean stresses.
+        (m, s) for (m, n, k) mean stresses. ``mode`` is that of the experiment unless another is given.
         """
-        return _basis(self.material, self.discrepancy, self.experiment.mode, stretch, bent)
+        return _basis(self.material, self.discrepancy, mode or self.experiment.mode, stretch, bent)
 
     @property
     def headline(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from tissuq.assessment import Assessment, assess
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
@@ -154,9 +155,15 @@ class Posterior:
         return table
 
     def predict(
-        self, stretch: ArrayLike, *, discrepancy: bool = True, noise: bool = True, prob: float = 0.95
+        self,
+        stretch: ArrayLike,
+        *,
+        discrepancy: bool = True,
+        noise: bool = True,
+        prob: float = 0.95,
+        mode: str | LoadingMode | None = None,
     ) -> pd.DataFrame:
-        """Return the predicted engineering stress at new stretches, in the loading mode of the data.
+        """Return the predicted engineering stress at new stretches.
 
         Parameters
         ----------
@@ -167,6 +174,8 @@ class Posterior:
             For a new measurement, or for the stress itself.
         prob : float
             Probability between low and high, equal tails.
+        mode : str or LoadingMode, optional
+            Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy.
 
         Returns
         -------
@@ -175,7 +184,8 @@ class Posterior:
         """
         import pandas as pd
 
-        return pd.DataFrame(vars(predict_band(self.solution, stretch, discrepancy=discrepancy, noise=noise, prob=prob)))
+        options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
+        return pd.DataFrame(vars(predict_band(self.solution, stretch, **options)))
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""

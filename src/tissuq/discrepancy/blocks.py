@@ -16,6 +16,8 @@ __all__ = ["EnergyBlock", "LogBlock", "SplineBlock", "TaylorBlock", "ValanisLand
 
 FloatArray = NDArray[np.float64]
 
+LARGEST_EXPONENT = 200.0
+"""So far beyond the data that nothing is known there."""
 GRID = 400
 """Points over the data's range among which the pivots of a process are chosen."""
 
@@ -151,7 +153,7 @@ class TaylorBlock(InvariantBlock):
         return x
 
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
-        return np.asarray(np.expm1(first * second / length**2))
+        return np.asarray(np.expm1(np.minimum(first * second / length**2, LARGEST_EXPONENT)))
 
 
 class LogBlock(InvariantBlock):

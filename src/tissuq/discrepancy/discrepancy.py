@@ -34,6 +34,8 @@ class Discrepancy(ABC):
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     shape_symbols: ClassVar[tuple[str, ...]] = ()
     """The parameters on which the correlation depends."""
+    is_energy: ClassVar[bool] = False
+    """Whether what it has learnt in one loading mode holds in others."""
     caution: ClassVar[str] = ""
     """What a reader of its result must know about the material's parameters."""
 

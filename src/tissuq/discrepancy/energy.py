@@ -72,6 +72,7 @@ class EnergyDiscrepancy(Discrepancy):
     """
 
     source = SOURCE
+    is_energy = True
     sums: ClassVar[tuple[tuple[EnergyBlock | None, ...], ...]]
     """Blocks in the order of the amplitudes; None where a sum has no block with that amplitude."""
 

@@ -22,6 +22,7 @@ class HyperelasticTerms(IndependentError):
 
     material: ClassVar[Material]
     terms: ClassVar[tuple[Parameter, ...]]
+    is_energy = True
 
     def mean_basis(self, mode: LoadingMode, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         columns = [self.material.parameters.index(term) for term in self.terms]

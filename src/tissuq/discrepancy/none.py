@@ -11,6 +11,7 @@ class NoDiscrepancy(Discrepancy):
     name = "none"
     formula = "0"
     source = "Zeraatpisheh et al. 2021, eq. 12"
+    is_energy = True
     caution = (
         "If the material is wrong, its parameters are over-confident: the interval does not show it, the check may."
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import stress_moments
 
@@ -38,6 +39,7 @@ def predict_band(
     discrepancy: bool = True,
     noise: bool = True,
     prob: float = 0.95,
+    mode: str | LoadingMode | None = None,
 ) -> Band:
     """Return the mean stress and the interval that holds ``prob`` of it, at each stretch.
 
@@ -46,29 +48,40 @@ def predict_band(
     solution : Solution
         The posterior.
     stretch : (g,) array, dimensionless
-        Where to predict, in the loading mode of the data.
+        Where to predict.
     discrepancy : bool
         With the discrepancy's share (eq. 27), or the model alone (eq. 28).
     noise : bool
         For a new measurement, or for the stress itself.
     prob : float
         Probability between the ends, equal tails.
+    mode : str or LoadingMode, optional
+        Another loading mode than that of the data.
 
     Raises
     ------
     InputError
-        When a stretch is not positive or prob is not between 0 and 1.
+        When a stretch is not positive, prob is not between 0 and 1, or the discrepancy says nothing about the mode.
     """
     points = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
     if points.ndim != 1 or not (np.isfinite(points) & (points > 0)).all():
         raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    asked = loading_mode(mode) if mode is not None else solution.model.experiment.mode
+    if discrepancy and asked != solution.model.experiment.mode and not solution.model.discrepancy.is_energy:
+        raise InputError(
+            f"discrepancy '{solution.model.discrepancy.name}' is an error of the {solution.model.experiment.mode.name} "
+            f"stress and says nothing about the {asked.name} one: predict without it, or fit with one that is an "
+            "energy, such as 'auto'."
+        )
     components = solution.components.thinned(FEW if len(points) > BLOCK else MANY)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
     curves = []
     for block in np.array_split(points, max(1, len(points) // BLOCK)):
-        mean, variance = stress_moments(solution.model, components, block, discrepancy=discrepancy, noise=noise)
+        mean, variance = stress_moments(
+            solution.model, components, block, discrepancy=discrepancy, noise=noise, mode=asked
+        )
         ends = [_mixture_quantile(tail, components.weights, mean, variance) for tail in tails]
         curves.append([components.weights @ mean, *ends])
     return Band(points, *np.concatenate(curves, axis=1))

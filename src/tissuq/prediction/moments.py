@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Components
 from tissuq.model import StatisticalModel
@@ -63,11 +64,13 @@ def coefficients(model: StatisticalModel, components: Components) -> tuple[Float
     return mean, root
 
 
-def basis_of(model: StatisticalModel, stretch: FloatArray, settings: FloatArray) -> FloatArray:
+def basis_of(
+    model: StatisticalModel, stretch: FloatArray, settings: FloatArray, mode: LoadingMode | None = None
+) -> FloatArray:
     """Return the mean stresses of unit coefficients: (g, k), or (M, g, k) where they depend on settings (M, d)."""
     if not model.bent_symbols:
-        return model.basis(stretch)
-    return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]])
+        return model.basis(stretch, mode=mode)
+    return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]], mode)
 
 
 def mean_stress(model: StatisticalModel, coefficients: FloatArray, settings: FloatArray) -> FloatArray:
@@ -105,16 +108,23 @@ def correlated_parts(model: StatisticalModel, settings: FloatArray) -> Iterator[
 
 
 def stress_moments(
-    model: StatisticalModel, components: Components, stretch: FloatArray, *, discrepancy: bool, noise: bool
+    model: StatisticalModel,
+    components: Components,
+    stretch: FloatArray,
+    *,
+    discrepancy: bool,
+    noise: bool,
+    mode: LoadingMode | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean (M, g) and variance (M, g) of the stress at stretches (g,), for every component.
 
     Without the discrepancy it is the model alone (eq. 28); with it, a correlated discrepancy is conditioned on
-    the data (eq. 27; differs from the source, whose GP is drawn from its prior).
+    the data (eq. 27; differs from the source, whose GP is drawn from its prior). In another loading mode than that
+    of the data only a discrepancy that is an energy has a meaning.
     """
     values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
-    basis = basis_of(model, stretch, components.settings)
+    basis = basis_of(model, stretch, components.settings, mode)
     if not discrepancy:
         basis = basis * np.isin(model.column_symbols, model.material_symbols)
     mean = (basis @ mean_b[:, :, None])[:, :, 0]
@@ -127,7 +137,7 @@ def stress_moments(
             root[part.chosen] -= np.einsum("mgk,mkp->mgp", pull, root_b[part.chosen])
             extra[part.chosen] += variance
     if discrepancy and components.member is not None:
-        for shift, spread, variance, own in _energies(model, components, stretch):
+        for shift, spread, variance, own in _energies(model, components, stretch, mode):
             mean[own] += shift
             root[own] += spread
             extra[own] += variance
@@ -179,13 +189,13 @@ def _condition_jointly(
 
 
 def _energies(
-    model: StatisticalModel, components: Components, stretch: FloatArray
+    model: StatisticalModel, components: Components, stretch: FloatArray, mode: LoadingMode | None = None
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
     """Yield means (N, g), roots (N, g, p) and further variances (N, g) of energy discrepancies, and whose they are.
 
     What the terms that serve the data leave of the discrepancy elsewhere is independent of the data.
     """
-    mode, start = model.experiment.mode, len(model.linear)
+    mode, start = mode or model.experiment.mode, len(model.linear)
     assert components.member is not None  # noqa: S101 (the caller has looked)
     for place in np.unique(components.member):
         member, own = model.energy_members[place], np.flatnonzero(components.member == place)
