@@ -249,3 +249,19 @@ def test_an_energy_among_a_hundred_thousand_points():
     c10 = posterior.summary().loc["C10"]
     assert abs(c10["mean"] - 0.4) < 5 * c10["sd"]
     assert c10["sd"] < 1e-2
+
+
+def test_the_noise_has_the_marginal_of_its_dense_grid():
+    data = measured(seed=2)
+    priors = {"C10": tq.Uniform(0, 50), "noise_sd": tq.Uniform(0, 2)}
+    found = tq.fit(data, discrepancy="taylor", priors=priors).solution.marginals["noise_sd"]
+    noise = np.exp(np.arange(np.log(0.01), np.log(1.0), 0.03))
+    evidences = np.array([dense("taylor", data, sd)[0] for sd in noise])
+    weights = np.exp(evidences - evidences.max()) * noise
+    weights /= weights.sum()
+    mean = weights @ noise
+    sd = np.sqrt(weights @ (noise - mean) ** 2)
+    assert found.mean == pytest.approx(mean, rel=5e-3)
+    assert found.sd == pytest.approx(sd, rel=2e-2)
+    low, high = np.interp([0.025, 0.975], np.cumsum(weights) - 0.5 * weights, noise)
+    assert found.quantile([0.025, 0.975]) == pytest.approx([low, high], rel=2e-2)

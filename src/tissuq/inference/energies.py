@@ -29,11 +29,14 @@ __all__ = ["EnergySolution", "solve_energies", "why_no_energies"]
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-NOISE_STEP, NOISE_REACH = 0.8, 6.0
-"""Of the lattice of log noise_sd, in standard deviations from its conditional mode."""
-IRRELEVANT = 22.0
+NOISE_STEP, NOISE_BELOW, NOISE_ABOVE = 1.0, 5.0, 20.0
+"""Of the lattice of log noise_sd: in standard deviations from its conditional mode, which are 1 / sqrt(2 freedom), the
+distance of its points, and its reach below; above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
+IRRELEVANT = 18.0
 """Log density below the largest, at the best noise, at which a point of the lattice is left out at once."""
-LIGHT = 1e-8
+NOISE_RATIOS, FINE = 1000, 0.15
+"""Ratios of the amplitudes, and spacing, from which the marginal of the noise is computed."""
+LIGHT = 1e-7
 """Share of the posterior that may be left out."""
 TOUCHED = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
@@ -203,8 +206,26 @@ class EnergySolution(Solution):
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:
             return self._bounded.marginal(self.model.linear.index(symbol))
+        if symbol not in self.model.energy_symbols:
+            return self._noise_marginal()
         values = self._settings(self._points)[:, self.model.nonlinear.index(symbol)]
-        return marginal_of_logs(values, self._weights, STEP if symbol in self.model.energy_symbols else 0.0)
+        return marginal_of_logs(values, self._weights, STEP)
+
+    def _noise_marginal(self) -> Marginal:
+        """Return the marginal of the noise from a finer lattice of it, for some of the ratios."""
+        points, side = self._points, 1 + max(max(map(len, lattice.ratios)) for lattice in self._lattices)
+        keys, group = np.unique((points.lattice * side + points.second) * side + points.first, return_inverse=True)
+        shares_of_keys = np.asarray(np.bincount(group, self._weights), dtype=np.float64)
+        chosen = keys[systematic(shares_of_keys[None], NOISE_RATIOS)[0]]
+        values, shares = [], []
+        for place in np.unique(chosen // side**2):
+            own, width = chosen[chosen // side**2 == place], len(self._lattices[place].ratios[0])
+            fine = self._all_noise(self._best_noise(int(place))[own // side % side * width + own % side], FINE)
+            row = np.repeat(np.arange(len(own)), len(fine.noise_sd) // len(own))
+            weight = np.exp(fine.log_weight - fine.log_weight.max())
+            values.append(fine.noise_sd)
+            shares.append(weight / np.bincount(row, weight)[row])
+        return marginal_of_logs(np.concatenate(values), np.concatenate(shares), 0.0)
 
     def _settings(self, points: _Points) -> FloatArray:
         """Return the nonlinear parameters (M, d)."""
@@ -230,7 +251,10 @@ class EnergySolution(Solution):
         every = [self._best_noise(place) for place in range(len(self._lattices))]
         top = max(float(points.log_weight.max()) for points in every)
         every = [points[points.log_weight > top - IRRELEVANT] for points in every]
-        points = _Points.joined(every if known else [self._all_noise(each) for each in every if len(each.lattice)])
+        if not known:
+            every = [self._all_noise(each, NOISE_STEP) for each in every if len(each.lattice)]
+            every = [each[np.isfinite(each.log_weight)] for each in every]
+        points = _Points.joined(every)
         mass = np.exp(points.log_weight - points.log_weight.max())
         coarse = 0.0
         for place, lattice in enumerate(self._lattices):
@@ -252,19 +276,21 @@ class EnergySolution(Solution):
         best = np.sqrt(lattice.misfit[second, first, self._index] / lattice.freedom)
         return self._weighed(place, second, first, np.clip(best, low * (1 + 1e-9), high * (1 - 1e-9)))
 
-    def _all_noise(self, points: _Points) -> _Points:
-        """Return the points of a lattice with a lattice of the noise around the best of each."""
+    def _all_noise(self, points: _Points, spacing: float) -> _Points:
+        """Return the points of a lattice with a lattice of the noise around the best of each, row by row."""
         place = int(points.lattice[0])
-        step = NOISE_STEP / np.sqrt(2 * self._lattices[place].freedom)
-        count = int(NOISE_REACH / NOISE_STEP)
-        noise_sd = (points.noise_sd[:, None] * np.exp(step * np.arange(-count, count + 1))).ravel()
-        second, first = (np.repeat(each, 2 * count + 1) for each in (points.second, points.first))
+        freedom = self._lattices[place].freedom
+        step, above = spacing / np.sqrt(2 * freedom), NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)
+        below, above = int(NOISE_BELOW / spacing), int(above / spacing)
+        steps = np.exp(step * np.arange(-below, above + 1))
+        noise_sd = (points.noise_sd[:, None] * steps).ravel()
+        second, first = (np.repeat(each, len(steps)) for each in (points.second, points.first))
         prior = self.model.priors["noise_sd"]
         low, high = prior.support
+        found = self._weighed(place, second, first, noise_sd)
+        log_cell = prior.log_density(noise_sd) + np.log(step * noise_sd)
         within = (noise_sd > low) & (noise_sd < high)
-        found = self._weighed(place, second[within], first[within], noise_sd[within])
-        log_cell = prior.log_density(found.noise_sd) + np.log(step * found.noise_sd)
-        return replace(found, log_weight=found.log_weight + log_cell)
+        return replace(found, log_weight=np.where(within, found.log_weight + log_cell, -np.inf))
 
     def _weighed(self, place: int, second: Places, first: Places, noise_sd: FloatArray) -> _Points:
         """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
