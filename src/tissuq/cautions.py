@@ -12,6 +12,8 @@ __all__ = ["warnings_about"]
 
 INSEPARABLE = 0.1
 """Noise and discrepancy are inseparable when either may be less than this share of both (5 % of the draws each)."""
+ROUGH = 0.1
+"""Error of the log evidence, by integration, above which nothing rests on it."""
 HIGH = 0.1
 """Density at a bound, relative to the largest, above which the bound decides."""
 
@@ -29,6 +31,12 @@ def warnings_about(solution: Solution) -> Iterator[str]:
         yield (
             "the data do not tell noise from discrepancy: the more there is of one, the less of the other. Read "
             "neither alone, or give the noise (repeated measurements at one stretch tell it)."
+        )
+    error = solution.log_evidence_error
+    if error is not None and error > ROUGH and solution.diagnostics is None:
+        yield (
+            f"the sums behind this posterior are rough (the log evidence is off by about {error:.1g}), as where the "
+            "noise that was given is far smaller than the scatter of the data: give a larger one, or leave it unknown."
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:

@@ -265,3 +265,36 @@ def test_the_noise_has_the_marginal_of_its_dense_grid():
     assert found.sd == pytest.approx(sd, rel=2e-2)
     low, high = np.interp([0.025, 0.975], np.cumsum(weights) - 0.5 * weights, noise)
     assert found.quantile([0.025, 0.975]) == pytest.approx([low, high], rel=2e-2)
+
+
+UNUSUAL = {
+    "a tenth of a percent of strain": (np.linspace(0.999, 1.001, 20), 0.01),
+    "a wide range": (np.linspace(0.2, 8, 40), 0.1),
+    "three stretches, many times": (np.repeat([0.8, 1.2, 1.5], 6), 0.02),
+    "five points": (np.array([0.8, 0.9, 1.1, 1.2, 1.4]), 0.05),
+    "far from the reference": (np.linspace(1.5, 3, 20), 0.1),
+    "more noise than signal": (np.linspace(0.7, 1.8, 20), 20.0),
+    "the wrong sign": (np.linspace(0.7, 1.8, 20), -0.1),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("noise", ["known", "unknown"])
+@pytest.mark.parametrize("case", UNUSUAL)
+def test_unusual_data_give_finite_numbers_without_a_murmur(case, noise):
+    stretch, sd = UNUSUAL[case]
+    sign = np.sign(sd)
+    data = tq.simulate("neo-hookean", {"C10": 1.0}, stretch, noise_sd=abs(sd), seed=1)
+    data = tq.Experiment("uniaxial", stretch, sign * data.stress)
+    posterior = tq.fit(data, discrepancy="auto", noise_sd=abs(sd) if noise == "known" else "unknown")
+    assert np.isfinite(posterior.summary().to_numpy()).all()
+    assert np.isfinite(posterior.predict([0.9, 1.2]).to_numpy()).all()
+    low, high = posterior.summary().loc["C10", ["hdi_low", "hdi_high"]]
+    assert 0 <= low < high
+    assert low <= 1.0 <= high or sign < 0
+
+
+def test_noise_that_is_far_too_small_is_told():
+    stretch = np.linspace(0.7, 1.8, 20)
+    data = tq.simulate("neo-hookean", {"C10": 1.0}, stretch, noise_sd=5.0, seed=1)
+    assert any("rough" in text for text in tq.fit(data, discrepancy="auto", noise_sd=0.05).warnings)

@@ -69,7 +69,7 @@ class Bounded:
         """Return the marginal of one linear parameter: in closed form where at most one bound cuts."""
         bounds = float(self.box.lower[0, place]), float(self.box.upper[0, place])
         parts = []
-        if len(self.free.weights):
+        if self.free.weights.sum() > 0:
             sds = np.sqrt((self.free.root[:, place] ** 2).sum(axis=1))
             marginal = marginal_of_mixture(self.free.weights, self.free.mean[:, place], sds)
             parts.append((self.free.weights.sum(), marginal))
