@@ -1,5 +1,6 @@
 """tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
+from tissuq.assessment import Assessment, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments import datasets
@@ -17,6 +18,7 @@ from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Assessment",
     "ConvergenceError",
     "Discrepancy",
     "Experiment",
@@ -41,6 +43,7 @@ __all__ = [
     "TissuqError",
     "Uniform",
     "UnknownNoise",
+    "compare",
     "datasets",
     "discrepancies",
     "engineering_stress",

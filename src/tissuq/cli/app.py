@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, fit, paper, show, study
+from tissuq.cli import catalogue, compare, fit, paper, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -24,6 +24,7 @@ app = typer.Typer(
 )
 app.command("paper")(paper.paper)
 app.command("fit")(fit.fit)
+app.command("compare")(compare.compare)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)
 app.command("discrepancies")(catalogue.discrepancies)

@@ -1,0 +1,66 @@
+"""Fits side by side: against refitting without each measurement, and what must be refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+STRETCH = np.linspace(0.7, 1.9, 14)
+DATA = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, STRETCH, noise_sd=0.05, seed=1)
+NAMES = ("none", "yeoh", "taylor", "gp")
+
+
+@pytest.fixture(scope="module")
+def fits():
+    return {name: tq.fit(DATA, discrepancy=name, noise_sd=0.05) for name in NAMES}
+
+
+def test_evidence_and_probability_are_those_of_the_fits(fits):
+    table = tq.compare(fits)
+    for name, posterior in fits.items():
+        assert table.loc[name, "log_evidence"] == pytest.approx(posterior.log_evidence)
+    assert table["probability"].sum() == pytest.approx(1)
+    assert table["log_bayes_factor"].iloc[0] == 0
+    assert table["log_evidence"].is_monotonic_decreasing
+    assert table["stacking"].sum() == pytest.approx(1, abs=1e-6)
+    assert table.index[-1] == "none"
+
+
+@pytest.mark.parametrize("name", ["yeoh", "taylor"])
+def test_leave_one_out_is_that_of_refitting(fits, name):
+    density = 0.0
+    for out in range(len(STRETCH)):
+        rest = np.delete(np.arange(len(STRETCH)), out)
+        data = tq.Experiment("uniaxial", STRETCH[rest], DATA.stress[rest])
+        solution = tq.fit(data, discrepancy=name, noise_sd=0.05, priors=fits[name].model.priors).solution
+        from tissuq.prediction.moments import stress_moments
+
+        parts = solution.components
+        at = np.array([STRETCH[out]])
+        mean, variance = stress_moments(solution.model, parts, at, discrepancy=True, noise=True)
+        each = np.exp(-0.5 * (DATA.stress[out] - mean[:, 0]) ** 2 / variance[:, 0]) / np.sqrt(
+            2 * np.pi * variance[:, 0]
+        )
+        density += float(np.log(parts.weights @ each))
+    assert tq.compare({name: fits[name], "none": fits["none"]}).loc[name, "elpd"] == pytest.approx(density, abs=0.7)
+
+
+def test_saved_posteriors_compare_like_those_in_memory(fits, tmp_path):
+    import xarray as xr
+
+    trees = {}
+    for name in ("none", "yeoh"):
+        fits[name].save(tmp_path / f"{name}.nc")
+        trees[name] = xr.open_datatree(tmp_path / f"{name}.nc", engine="h5netcdf").load()
+    first, second = tq.compare(trees), tq.compare({name: fits[name] for name in trees})
+    np.testing.assert_allclose(first.drop(columns="is_rough"), second.drop(columns="is_rough"), rtol=1e-10)
+
+
+def test_fits_of_other_data_and_single_fits_are_refused(fits):
+    with pytest.raises(tq.InputError, match="two fits or more"):
+        tq.compare({"none": fits["none"]})
+    other = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.05, seed=2)
+    with pytest.raises(tq.InputError, match="different measurements"):
+        tq.compare({"none": fits["none"], "other": tq.fit(other, discrepancy="none", noise_sd=0.05)})
