@@ -6,8 +6,6 @@ import csv
 
 import pytest
 
-from tissuq.errors import TissuqError
-
 
 @pytest.fixture
 def two_runs(cli, here, specimen):
@@ -37,7 +35,6 @@ def test_what_is_no_run_is_refused(cli, here, arguments, words):
     assert said.status == 2
     assert words in said.err
     assert "Traceback" not in said.err
-    assert issubclass(TissuqError, Exception)
 
 
 def test_a_file_that_is_no_posterior_is_refused(cli, here):
