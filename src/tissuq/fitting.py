@@ -31,7 +31,7 @@ METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
 def fit(
     data: Experiment,
     *,
-    discrepancy: str | Discrepancy,
+    discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
     noise_sd: float | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
@@ -46,7 +46,8 @@ def fit(
     data : Experiment
         The measurements.
     discrepancy : str or Discrepancy
-        What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object.
+        What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object; ``"auto"`` is
+        an average of strain energies that leave the initial shear modulus alone, by the evidence.
     material : str or Material
         The material whose parameters are wanted.
     noise_sd : float or "unknown"
@@ -105,7 +106,7 @@ def fit(
 def fit_many(
     datasets: Sequence[Experiment],
     *,
-    discrepancy: str | Discrepancy,
+    discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
     noise_sd: float | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,

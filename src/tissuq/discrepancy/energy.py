@@ -73,6 +73,10 @@ class EnergyDiscrepancy(Discrepancy):
 
     source = SOURCE
     is_energy = True
+    caution = (
+        "The initial shear modulus is the material's own; its other parameters (such as C20) share their meaning with "
+        "the discrepancy. It covers an error of the material, not of the test: a wrong area or gauge length scales all."
+    )
     sums: ClassVar[tuple[tuple[EnergyBlock | None, ...], ...]]
     """Blocks in the order of the amplitudes; None where a sum has no block with that amplitude."""
 
