@@ -286,8 +286,8 @@ class StatisticalModel:
         It only sets the scale of priors: the same data in another unit give the same answer in that unit.
         """
         unit, _ = invariant_rates(self.experiment.mode, self.experiment.stretch)
-        strained = np.abs(unit) > 1e-3 * np.abs(unit).max()
-        return float(np.median(np.abs(self.experiment.stress[strained] / unit[strained])))
+        used = (np.abs(unit) > 1e-3 * np.abs(unit).max()) & (self.experiment.stress != 0)
+        return float(np.median(np.abs(self.experiment.stress[used] / unit[used])))
 
     def _default_boxes(self) -> dict[str, Prior]:
         """Return uniform priors that hold the least-squares solution with a margin, whatever the units.

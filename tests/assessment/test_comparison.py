@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.stats import norm
 
 import tissuq as tq
@@ -46,8 +47,6 @@ def test_leave_one_out_is_that_of_refitting(fits, name):
 
 
 def test_saved_posteriors_compare_like_those_in_memory(fits, tmp_path):
-    import xarray as xr
-
     trees = {}
     for name in ("none", "yeoh"):
         fits[name].save(tmp_path / f"{name}.nc")
@@ -62,3 +61,8 @@ def test_fits_of_other_data_and_single_fits_are_refused(fits):
     other = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.05, seed=2)
     with pytest.raises(tq.InputError, match="different measurements"):
         tq.compare({"none": fits["none"], "other": tq.fit(other, discrepancy="none", noise_sd=0.05)})
+    planar = tq.fit(tq.Experiment("planar", STRETCH, DATA.stress), discrepancy="none", noise_sd=0.05)
+    with pytest.raises(tq.InputError, match="loading modes"):
+        tq.compare({"none": fits["none"], "planar": planar})
+    with pytest.raises(tq.InputError, match="no posterior of tissuq"):
+        tq.compare({"none": fits["none"], "foreign": xr.DataTree()})

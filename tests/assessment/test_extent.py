@@ -97,3 +97,14 @@ def test_the_design_is_judged(stretch, words):
     found = list(design_warnings(data))
     assert len(found) == len(words)
     assert all(word in text and "measure" in text for word, text in zip(words, found, strict=True))
+
+
+def test_a_parameter_that_is_not_linear_is_assessed_too(data):
+    posterior = tq.fit(data, discrepancy="yeoh", noise_sd=0.02, priors={"C10": tq.HalfNormal(2.0)})
+    assert posterior.assess().between == 0
+
+
+def test_a_sampler_that_has_nothing_to_sample_without_discrepancy_gives_no_comparison(data):
+    found = tq.fit(data, discrepancy="constant", noise_sd=0.02, method="smc").assess()
+    assert found.probability_of_none is None
+    assert found.width_against_none is None

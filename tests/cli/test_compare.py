@@ -42,3 +42,13 @@ def test_a_file_that_is_no_posterior_is_refused(cli, here):
     said = cli("compare", "broken.nc", "broken.nc")
     assert said.status == 2
     assert "cannot be read" in said.err
+
+
+def test_runs_of_one_name_are_kept_apart(cli, two_runs):
+    (two_runs / "other").mkdir()
+    (two_runs / "first").rename(two_runs / "other" / "run")
+    (two_runs / "second").rename(two_runs / "run")
+    assert cli("compare", "other/run", "run", "--out", "table.csv").status == 0
+    assert len((two_runs / "table.csv").read_text().splitlines()) == 4
+    assert cli("compare", "other/run/posterior/none.nc", "other/run", "--out", "again.csv").status == 0
+    assert len((two_runs / "again.csv").read_text().splitlines()) == 4

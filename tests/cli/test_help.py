@@ -54,5 +54,5 @@ def test_ctrl_c_ends_with_status_130_and_leaves_nothing(cli, here, specimen, mon
     monkeypatch.setattr("tissuq.report.specimen.write_tables", interrupt)
     said = cli("fit", specimen, "--discrepancy", "none", "--no-figures")
     assert said.status == 130
-    assert said.err == "tissuq: stopped; no run was written.\n"
+    assert said.err == "tissuq: stopped; no run was written (a campaign goes on with the same command).\n"
     assert [path.name for path in here.iterdir()] == [specimen.name]

@@ -232,6 +232,9 @@ def test_the_reference_state_is_left_alone():
         ({"discrepancy": "auto", "noise": "proportional"}, "proportional"),
         ({"discrepancy": "auto", "priors": {"C10": tq.Normal(1, 1)}}, "Gaussian"),
         ({"discrepancy": "auto", "method": "nuts"}, "exactly"),
+        ({"discrepancy": "taylor", "priors": {"c1": tq.Uniform(0, 0.05)}}, "bound or is narrow"),
+        ({"discrepancy": "taylor", "priors": {"c1": tq.Normal(1, 1, 0)}}, "bound or is narrow"),
+        ({"discrepancy": "taylor", "priors": {"c1": tq.LogNormal(0.7, 0.05)}}, "bound or is narrow"),
         ({"discrepancy": "taylor+gp"}, "gp"),
         ({"discrepancy": "taylor+taylor"}, "different"),
     ],
@@ -297,3 +300,67 @@ def test_noise_that_is_far_too_small_is_told():
     stretch = np.linspace(0.7, 1.8, 20)
     data = tq.simulate("neo-hookean", {"C10": 1.0}, stretch, noise_sd=5.0, seed=1)
     assert any("rough" in text for text in tq.fit(data, discrepancy="auto", noise_sd=0.05).warnings)
+
+
+@pytest.mark.parametrize(
+    "prior",
+    [
+        tq.Uniform(0.06, 0.061),
+        tq.Uniform(0.01, 0.02),
+        tq.Uniform(0.0, 2.0),
+        tq.LogNormal(0.01, 0.05),
+        tq.LogNormal(0.05, 0.02),
+        tq.HalfCauchy(0.05),
+        tq.HalfNormal(0.01),
+    ],
+    ids=str,
+)
+def test_any_prior_of_the_noise_is_integrated(prior):
+    # Against evenly spaced values of the logarithm within the prior, each with the noise known.
+    data = measured(seed=2)
+    fixed = {"C10": tq.Uniform(0, 50)}
+    posterior = tq.fit(data, discrepancy="taylor", priors=fixed | {"noise_sd": prior})
+    low, high = np.log(np.clip(prior.quantile(np.array([1e-9, 1 - 1e-9])), 4e-3, 2.0))
+    edges = np.linspace(low, high, 301)
+    noise = np.exp(0.5 * (edges[1:] + edges[:-1]))
+    evidences = [tq.fit(data, discrepancy="taylor", noise_sd=float(sd), priors=fixed).log_evidence for sd in noise]
+    log_weight = np.array(evidences) + prior.log_density(noise) + np.log(noise * np.diff(edges))
+    weight = np.exp(log_weight - log_weight.max())
+    assert posterior.log_evidence == pytest.approx(log_weight.max() + np.log(weight.sum()), abs=5e-3)
+    found = posterior.solution.marginals["noise_sd"]
+    assert found.mean == pytest.approx(weight @ noise / weight.sum(), rel=5e-3)
+    drawn = posterior.solution.draws["noise_sd"]
+    assert prior.support[0] <= drawn.min()
+    assert drawn.max() <= prior.support[1]
+
+
+def test_a_block_without_stress_in_a_mode_changes_nothing():
+    stretch = np.linspace(1.05, 2, 12)
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.2, seed=1, mode="planar")
+    evidence = {
+        name: tq.fit(data, discrepancy=name, noise_sd=0.2).log_evidence
+        for name in ("none", "zero-modulus", "taylor", "taylor+zero-modulus")
+    }
+    assert evidence["zero-modulus"] == pytest.approx(evidence["none"], abs=2e-3)
+    assert evidence["taylor+zero-modulus"] == pytest.approx(evidence["taylor"], abs=2e-3)
+
+
+def test_in_much_noise_a_discrepancy_is_worth_as_much_as_none():
+    data = measured(noise=1e4)
+    priors = {"C10": tq.Uniform(0, 5), "c1": tq.HalfCauchy(0.5)}
+    evidence = [
+        tq.fit(data, discrepancy=name, noise_sd=1e4, priors=dict(list(priors.items())[:count])).log_evidence
+        for name, count in (("none", 1), ("taylor", 2))
+    ]
+    assert evidence[1] == pytest.approx(evidence[0], abs=0.05)
+
+
+def test_a_toe_region_of_zero_stress_is_fitted():
+    stress = np.array([0, 0, 0, 0, 0, 0, 0.1, 0.3, 0.6, 1.0, 1.5, 2.2])
+    data = tq.Experiment("uniaxial", np.linspace(1.02, 1.4, 12), stress)
+    assert np.isfinite(tq.fit(data).summary().loc["C10"]).all()
+
+
+def test_a_flat_prior_leaves_no_evidence():
+    posterior = tq.fit(measured(), discrepancy="taylor", noise_sd=NOISE_SD, priors={"C10": tq.Flat(0, 5)})
+    assert posterior.log_evidence is None

@@ -117,3 +117,15 @@ def test_four_bounds_go_by_points_and_sweeps():
     kept = free[(free >= 0).all(axis=1)]
     assert np.abs(drawn.mean(axis=0) - kept.mean(axis=0)).max() < 0.06
     assert np.abs(np.cov(drawn.T) - np.cov(kept.T)).max() < 0.06
+
+
+def test_four_bounds_among_parameters_with_roots_of_less_rank():
+    root = np.zeros((1, 6, 6))
+    root[0, :4, :4] = np.linalg.cholesky(0.5 * np.ones((4, 4)) + 0.5 * np.eye(4))
+    root[0, 4, 4] = 1.0
+    lower = np.array([[0.0, 0.0, 0.0, 0.0, -np.inf, -np.inf]])
+    box = Boxes(lower, np.full((1, 6), np.inf))
+    drawn = box.draws(np.zeros((1, 6)), root, np.random.default_rng(0).random((1, 2000, 6)))[0]
+    assert (drawn[:, :4] >= 0).all()
+    assert drawn[:, 4].std() == pytest.approx(1.0, abs=0.1)
+    assert np.abs(drawn[:, 5]).max() < 1e-6

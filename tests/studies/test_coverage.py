@@ -171,6 +171,12 @@ def test_presets_are_valid(name):
         ({"designs": [DESIGN | {"low": 3.0}]}, "must be less than high"),
         ({"designs": [DESIGN | {"mode": "torsion"}]}, "torsion"),
         ({"replicates": 0}, "greater than or equal to 1"),
+        ({"replicates": 10**12}, "less than or equal to"),
+        ({"formulations": ["none", "none"]}, "there twice"),
+        ({"designs": [DESIGN | {"high": float("inf")}]}, "less than or equal to 10"),
+        ({"designs": [DESIGN | {"noise_sd": float("inf")}]}, "finite"),
+        ({"designs": [DESIGN | {"high": 8.0}]}, "Gent materials lock"),
+        ({"strengths": [2.0]}, "less than or equal to 1"),
         ({"noise": "some"}, "'known' or 'unknown'"),
     ],
 )

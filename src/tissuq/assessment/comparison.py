@@ -84,8 +84,13 @@ def _check(trees: Mapping[str, Any]) -> None:
     if len(trees) < 2:
         raise InputError("give two fits or more to compare.")
     names = list(trees)
+    for name, tree in trees.items():
+        if not {"observed_data", "constant_data", "log_likelihood"} <= set(tree.children):
+            raise InputError(f"'{name}' is no posterior of tissuq: it has no measurements or no log likelihood.")
     first = trees[names[0]]
     for name in names[1:]:
+        if trees[name].attrs.get("loading_mode") != first.attrs.get("loading_mode"):
+            raise InputError(f"'{names[0]}' and '{name}' are fits of different loading modes.")
         for group, variable in (("observed_data", "stress"), ("constant_data", "stretch")):
             one, other = first[group][variable].to_numpy(), trees[name][group][variable].to_numpy()
             if one.shape != other.shape or not np.array_equal(one, other):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.design import design_warnings
 from tissuq.discrepancy import discrepancy_named
+from tissuq.errors import ModelError
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
@@ -47,7 +48,7 @@ class Assessment:
         Share of the initial stiffness that the discrepancy carries, likewise: what it could have taken from the
         parameter. Zero for an energy discrepancy.
     amplitudes : dict of str to float
-        Posterior mean of each amplitude of an energy discrepancy over that of the parameter.
+        Posterior median of each amplitude of an energy discrepancy over the mean of the parameter.
     members : dict of str to float
         Posterior probabilities of the sums that an average is made of.
     between : float
@@ -127,7 +128,9 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
         parameter=model.headline,
         share=share,
         initial_share=initial_share,
-        amplitudes={symbol: solution.marginals[symbol].mean / marginal.mean for symbol in model.energy_symbols},
+        amplitudes={
+            symbol: float(solution.marginals[symbol].quantile(0.5)) / marginal.mean for symbol in model.energy_symbols
+        },
         members=dict(solution.members),
         between=_between(solution, marginal),
         probability_of_none=_probability_of_none(solution, none),
@@ -142,8 +145,12 @@ def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
     nothing = discrepancy_named("none")
     if model.discrepancy == nothing:
         return None
-    own = {symbol: prior for symbol, prior in model.priors.items() if symbol in (*model.material_symbols, "noise_sd")}
-    return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None)])[0]
+    kept = (*model.material_symbols, *(parameter.symbol for parameter in model.noise.parameters))
+    own = {symbol: prior for symbol, prior in model.priors.items() if symbol in kept}
+    try:
+        return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None)])[0]
+    except ModelError:  # a sampler that was asked for has nothing left to sample
+        return None
 
 
 def _rescaled(model: StatisticalModel, solve: Solve, factor: float) -> Solution:
@@ -170,9 +177,10 @@ def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
 
 def _between(solution: Solution, marginal: Marginal) -> float:
     """Return the share of the headline parameter's variance that is between the members of an average."""
-    parts, place = solution.components, solution.model.linear.index(solution.model.headline)
+    parts = solution.components
     if parts.member is None:
         return 0.0
+    place = solution.model.linear.index(solution.model.headline)
     names = np.array([member.name for member in solution.model.energy_members])[parts.member]
     explained = 0.0
     for name in np.unique(names):

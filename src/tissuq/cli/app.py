@@ -44,5 +44,5 @@ def main() -> None:
         sys.exit(2)
     except SystemExit as end:
         if end.code == INTERRUPTED:
-            typer.echo("tissuq: stopped; no run was written.", err=True)
+            typer.echo("tissuq: stopped; no run was written (a campaign goes on with the same command).", err=True)
         raise

@@ -58,7 +58,9 @@ def _trees(runs: list[Path]) -> dict[str, xr.DataTree]:
         found = sorted((run / "posterior").glob("*.nc")) if run.is_dir() else [run]
         if not found or not all(path.is_file() for path in found):
             raise InputError(f"there is no posterior in '{run}': give the folder of a run, or an .nc file in one.")
-        files |= {f"{run.name}/{path.stem}" if run.is_dir() and len(runs) > 1 else path.stem: path for path in found}
+        for path in found:
+            name = f"{run.name}/{path.stem}" if run.is_dir() and len(runs) > 1 else path.stem
+            files[name if name not in files else str(path)] = path
     try:
         return {name: xr.open_datatree(path, engine="h5netcdf").load() for name, path in files.items()}
     except (OSError, ValueError, KeyError) as error:

@@ -98,13 +98,14 @@ class Boxes:
         active = self.beyond(mean, root) > TOUCHED
         for kept, rows in _by_pattern(active, np.ones(len(mean), dtype=bool)):
             every, k = self[rows], len(kept)
-            if k > MOST_NESTED:
-                values[rows] = every._gibbs(mean[rows], root[rows], uniforms[rows])
-                continue
             order = np.concatenate([kept, np.setdiff1d(np.arange(mean.shape[1]), kept)])
             triangle, own = lower_triangle(root[rows][:, order]), uniforms[rows]
             scores = ndtri(own)
-            if k:
+            if k > MOST_NESTED:
+                part = Boxes(every.lower[:, kept], every.upper[:, kept])
+                drawn = part._gibbs(mean[rows][:, kept], triangle[:, :k, :k], own[:, :, :k]) - mean[rows][:, None, kept]
+                scores[:, :, :k] = np.linalg.solve(triangle[:, :k, :k], drawn.swapaxes(1, 2)).swapaxes(1, 2)
+            elif k:
                 low, high = ((bound - mean[rows])[:, kept] for bound in (every.lower, every.upper))
                 scores[:, :, :k] = nested_draws(triangle[:, :k, :k], low, high, own[:, :, :k])
             values[rows[:, None, None], np.arange(own.shape[1])[:, None], order] = mean[rows][

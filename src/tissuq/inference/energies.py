@@ -23,6 +23,7 @@ from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Components, Marginals, Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
+from tissuq.priors import Flat, Prior
 
 __all__ = ["EnergySolution", "solve_energies", "why_no_energies"]
 
@@ -32,12 +33,20 @@ Places = NDArray[np.intp]
 NOISE_STEP, NOISE_BELOW, NOISE_ABOVE = 1.0, 5.0, 20.0
 """Of the lattice of log noise_sd: in standard deviations from its conditional mode, which are 1 / sqrt(2 freedom), the
 distance of its points, and its reach below; above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
+SMALLER = STEP / (1 - np.exp(-STEP))
+"""Width of the first point's cell: of all points below it, weighted by their amplitudes."""
 IRRELEVANT = 18.0
 """Log density below the largest, at the best noise, at which a point of the lattice is left out at once."""
+CUT_NODES = 24
+"""Values of the noise where its prior cuts or is narrow."""
+LIKELY, POSSIBLE = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
+"""Probabilities of the noise's prior between which it is likely, and between which it is at all."""
+TINY = 1e-200
 NOISE_RATIOS, FINE = 1000, 0.15
 """Ratios of the amplitudes, and spacing, from which the marginal of the noise is computed."""
 LIGHT = 1e-7
 """Share of the posterior that may be left out."""
+MOST_PRIOR_ERROR = 0.01
 TOUCHED = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
 REPRESENTED = 3000
@@ -52,10 +61,26 @@ def why_no_energies(model: StatisticalModel) -> str:
     others = [symbol for symbol in model.nonlinear if symbol not in (*model.energy_symbols, "noise_sd")]
     if others or model.noise.depends_on_level or model.noise.shares_discrepancy:
         return f"noise '{model.noise.name}' or a prior leaves more than amplitudes and noise_sd to integrate"
+    for symbol in model.energy_symbols:
+        if _lattice_error(model.priors[symbol]) > MOST_PRIOR_ERROR:
+            return (
+                f"the prior {model.priors[symbol]} of {symbol} has a bound or is narrow, where a wide positive one is"
+            )
     gaussians = (model.priors[symbol].gaussian for symbol in model.linear)
     if any(each is not None and each[1] for each in gaussians):
         return "a linear parameter has a Gaussian prior, where only uniform and flat ones are integrated"
     return ""
+
+
+def _lattice_error(prior: Prior) -> float:
+    """Return by how much the mass of a prior is wrong on every second point of the lattice, wherever this begins."""
+    if prior.support != (0.0, np.inf):
+        return np.inf
+    middle = np.log(prior.quantile(0.5))
+    starts = middle + 2 * STEP * np.arange(8)[:, None] / 8
+    amplitudes = np.exp(starts + 2 * STEP * np.arange(-60, 61))
+    masses = (2 * STEP * amplitudes * np.exp(prior.log_density(amplitudes))).sum(axis=1)
+    return float(np.abs(masses - 1).max())
 
 
 def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[EnergySolution]:
@@ -126,7 +151,7 @@ class EnergySolution(Solution):
         total = np.exp(log_weights - top).sum()
         self._points, self._weights = points, np.exp(log_weights - top) / total
         self._bounded = bounded(Components(self._weights, self._settings(points), mean, root), beyond, self._box)
-        if np.isfinite(supports).all():
+        if not any(isinstance(prior, Flat) for prior in model.priors.values()):
             self.log_evidence = float(top + np.log(total) - np.log(np.diff(supports, axis=1)).sum())
             self.log_evidence_error = float(error + self._weights @ error_of_mass + LIGHT)
 
@@ -253,7 +278,6 @@ class EnergySolution(Solution):
         every = [points[points.log_weight > top - IRRELEVANT] for points in every]
         if not known:
             every = [self._all_noise(each, NOISE_STEP) for each in every if len(each.lattice)]
-            every = [each[np.isfinite(each.log_weight)] for each in every]
         points = _Points.joined(every)
         mass = np.exp(points.log_weight - points.log_weight.max())
         coarse = 0.0
@@ -272,34 +296,52 @@ class EnergySolution(Solution):
         second, first = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
         if not noise.parameters:
             return self._weighed(place, second, first, np.full(len(second), float(noise.sd({}, 0.0))))
-        low, high = self.model.priors["noise_sd"].support
-        best = np.sqrt(lattice.misfit[second, first, self._index] / lattice.freedom)
-        return self._weighed(place, second, first, np.clip(best, low * (1 + 1e-9), high * (1 - 1e-9)))
+        low, high = self.model.priors["noise_sd"].quantile(LIKELY)
+        return self._weighed(place, second, first, np.clip(self._noise_modes(place, second, first), low, high))
+
+    def _noise_modes(self, place: int, second: Places, first: Places) -> FloatArray:
+        lattice = self._lattices[place]
+        return np.asarray(np.sqrt(lattice.misfit[second, first, self._index] / lattice.freedom))
 
     def _all_noise(self, points: _Points, spacing: float) -> _Points:
-        """Return the points of a lattice with a lattice of the noise around the best of each, row by row."""
+        """Return the points of a lattice with several values of the noise for each, row by row.
+
+        They are evenly spaced in its logarithm where likelihood and prior are wide; where the prior cuts the likelihood
+        or is narrower, they are those of a Gauss-Legendre rule on what it leaves.
+        """
         place = int(points.lattice[0])
-        freedom = self._lattices[place].freedom
-        step, above = spacing / np.sqrt(2 * freedom), NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)
-        below, above = int(NOISE_BELOW / spacing), int(above / spacing)
-        steps = np.exp(step * np.arange(-below, above + 1))
-        noise_sd = (points.noise_sd[:, None] * steps).ravel()
-        second, first = (np.repeat(each, len(steps)) for each in (points.second, points.first))
-        prior = self.model.priors["noise_sd"]
-        low, high = prior.support
+        prior, freedom = self.model.priors["noise_sd"], self._lattices[place].freedom
+        ends = np.log(np.maximum(prior.quantile(POSSIBLE), TINY))
+        unit = 1 / np.sqrt(2 * freedom)
+        mode = np.log(np.maximum(self._noise_modes(place, points.second, points.first), TINY))
+        low, high = mode - NOISE_BELOW * unit, mode + (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
+        is_cut = bool(((low < ends[0]) | (high > ends[1])).any())
+        if is_cut:
+            cut = np.maximum(low, ends[0]), np.minimum(high, ends[1])
+            keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
+            low, high = (np.where(keeps, own, end) for own, end in zip(cut, ends, strict=True))
+            nodes, weights = np.polynomial.legendre.leggauss(int(CUT_NODES / spacing))
+            nodes, weights = 0.5 * (1 + nodes), 0.5 * weights
+        else:
+            nodes = np.linspace(0, 1, int((high[0] - low[0]) / (spacing * unit)) + 1)
+            weights = np.full(len(nodes), nodes[1])
+        width = (high - low)[:, None]
+        noise_sd = np.exp(low[:, None] + width * nodes).ravel()
+        second, first = (np.repeat(each, len(nodes)) for each in (points.second, points.first))
         found = self._weighed(place, second, first, noise_sd)
-        log_cell = prior.log_density(noise_sd) + np.log(step * noise_sd)
-        within = (noise_sd > low) & (noise_sd < high)
-        return replace(found, log_weight=np.where(within, found.log_weight + log_cell, -np.inf))
+        log_cell = prior.log_density(noise_sd) + np.log(noise_sd * (width * weights).ravel())
+        return replace(found, log_weight=found.log_weight + log_cell)
 
     def _weighed(self, place: int, second: Places, first: Places, noise_sd: FloatArray) -> _Points:
         """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
         lattice, symbols = self._lattices[place], self.model.energy_symbols
         amplitudes = np.zeros((len(first), len(symbols)))
         log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
-        ratios = lattice.ratios[0][first], lattice.ratios[1][second]
-        for which, ratio in zip(lattice.member.places, ratios, strict=False):
-            amplitudes[:, which] = ratio * noise_sd
+        chosen = ((lattice.ratios[0], first), (lattice.ratios[1], second))
+        for which, (grid, place_on_grid) in zip(lattice.member.places, chosen, strict=False):
+            amplitudes[:, which] = grid[place_on_grid] * noise_sd
             prior = self.model.priors[symbols[which]]
-            log_weight += prior.log_density(amplitudes[:, which]) + np.log(STEP * amplitudes[:, which])
+            # The first point stands for all smaller amplitudes, too, among which the density is constant.
+            cell = np.where(place_on_grid == 0, SMALLER, STEP)
+            log_weight += prior.log_density(amplitudes[:, which]) + np.log(cell * amplitudes[:, which])
         return _Points(np.full(len(first), place), second, first, noise_sd, amplitudes, log_weight)

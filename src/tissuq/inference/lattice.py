@@ -23,7 +23,8 @@ Places = NDArray[np.intp]
 STEP = 0.4
 """Of log g. The posterior of an amplitude that r directions tell has an sd of about 1 / sqrt(2 r) in its logarithm."""
 SMALLEST, LARGEST = 1e-3, 1e6
-"""Ratios of the discrepancy's stress (root mean square) to the noise between which the lattice lies."""
+"""Ratios of the discrepancy's stress (root mean square) to the noise between which the lattice lies, at least; and the
+probability of the amplitudes' priors below which it may begin."""
 
 
 class Lattice:
@@ -57,8 +58,10 @@ class Lattice:
         basis, self._triangle = np.linalg.qr(np.hstack([model.design, *self.features]))
         self._data = basis.T @ stresses
         outside = ((stresses - basis @ self._data) ** 2).sum(axis=0)
-        least = 1e-3 * float(np.sqrt((model.design**2).mean()))  # a block may have no stress at all in this mode
-        grids = [*(_grid(each, least) for each in self.features), *[np.zeros(1)] * 2]
+        least = float(np.sqrt((model.design**2).mean()))  # a block may have no stress at all in this mode
+        sizes = (max(float(np.sqrt((each**2).sum(axis=1).mean())), least) for each in self.features)
+        pairs = zip(sizes, _unlikely_ratios(models, member), strict=True)
+        grids = [*(_grid(size, unlikely) for size, unlikely in pairs), *[np.zeros(1)] * 2]
         self.ratios = grids[0], grids[1]
 
         p, r = self._p, self.features[0].shape[1] if self.features else 0
@@ -122,7 +125,24 @@ class Lattice:
         return mean * scale, root * scale[:, :, None]
 
 
-def _grid(features: FloatArray, least: float) -> FloatArray:
-    size = max(float(np.sqrt((features**2).sum(axis=1).mean())), least)
-    count = int(log(LARGEST / SMALLEST) / STEP) + 1
-    return np.asarray(SMALLEST / size * np.exp(STEP * np.arange(count)))
+def _unlikely_ratios(models: Sequence[StatisticalModel], member: Member) -> list[float]:
+    """Return for each block a ratio below which its amplitude is not likely to be before the data."""
+    found = []
+    for place in member.places:
+        symbol = models[0].energy_symbols[place]
+        noise = (_noise(model) for model in models)
+        found.append(min(float(m.priors[symbol].quantile(SMALLEST)) / sd for m, sd in zip(models, noise, strict=True)))
+    return found
+
+
+def _noise(model: StatisticalModel) -> float:
+    """Return the noise, or the most that it can be."""
+    if not model.noise.parameters:
+        return float(model.noise.sd({}, 0.0))
+    return float(np.sqrt((model.experiment.stress**2).mean()))
+
+
+def _grid(size: float, unlikely: float) -> FloatArray:
+    """Return the ratios of a block whose terms have a stress of some size (root mean square)."""
+    smallest, largest = min(SMALLEST / size, unlikely), LARGEST / size
+    return np.asarray(smallest * np.exp(STEP * np.arange(int(log(largest / smallest) / STEP) + 1)))

@@ -181,7 +181,7 @@ def _fits(data: list[Experiment], formulation: str, noise_sd: Any, prob: float) 
     """Return ends, mean and sd of C10 for every data set; one by one where all together fail."""
     try:
         posteriors = fit_many(data, discrepancy=formulation, noise_sd=noise_sd)
-    except TissuqError:
+    except (TissuqError, np.linalg.LinAlgError):
         if len(data) == 1:
             return [None]
         return [row for each in data for row in _fits([each], formulation, noise_sd, prob)]

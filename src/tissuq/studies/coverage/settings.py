@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from importlib.resources import files
-from typing import Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.modes import loading_mode
-from tissuq.studies.coverage.truths import FAMILIES
+from tissuq.mechanics.path import invariants
+from tissuq.studies.coverage.truths import FAMILIES, LEAST_LIMIT
 
 __all__ = ["PRESETS", "CoverageSettings", "Design", "preset"]
 
@@ -27,10 +28,10 @@ class Design(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    low: float = Field(gt=0)
-    high: float = Field(gt=0)
+    low: float = Field(ge=0.1, le=10)
+    high: float = Field(ge=0.1, le=10)
     points: int = Field(ge=3, le=10_000)
-    noise_sd: float = Field(gt=0)
+    noise_sd: float = Field(gt=0, allow_inf_nan=False)
     mode: str = "uniaxial"
 
     @model_validator(mode="after")
@@ -71,11 +72,30 @@ class CoverageSettings(BaseModel):
     families: tuple[str, ...] = Field(tuple(FAMILIES), min_length=1)
     designs: tuple[Design, ...] = Field(min_length=1)
     formulations: tuple[str, ...] = Field(("none", "yeoh", "gp", "auto"), min_length=1)
-    strengths: tuple[float, ...] = Field((1.0,), min_length=1)
-    replicates: int = Field(50, ge=1)
+    strengths: tuple[Annotated[float, Field(ge=0, le=1)], ...] = Field((1.0,), min_length=1)
+    replicates: int = Field(50, ge=1, le=100_000)
     noise: Literal["known", "unknown"] = "known"
     prob: float = Field(0.95, gt=0, lt=1)
     seed: int = Field(0, ge=0)
+
+    @field_validator("families", "designs", "formulations", "strengths")
+    @classmethod
+    def _each_once(cls, given: tuple[Any, ...]) -> tuple[Any, ...]:
+        for place, each in enumerate(given):
+            if each in given[:place]:
+                raise ValueError(f"{each} is there twice, which would count the same fits twice")
+        return given
+
+    @model_validator(mode="after")
+    def _within_reach(self) -> Self:
+        for design in self.designs if "gent" in self.families else ():
+            reach = float(invariants(loading_mode(design.mode), design.stretch)[0].max())
+            if reach >= 0.95 * LEAST_LIMIT:
+                raise ValueError(
+                    f"design {design.label}: I1 - 3 reaches {reach:.3g}, and Gent materials lock at {LEAST_LIMIT:g} or "
+                    "above; measure less far, or leave out the family gent"
+                )
+        return self
 
     @field_validator("families")
     @classmethod

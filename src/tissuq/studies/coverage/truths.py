@@ -24,6 +24,8 @@ Derivatives = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 """dW/dI1 and dW/dI2 as functions of I1 - 3 and I2 - 3; together one half at the reference, times two C10."""
 
 ARRUDA_BOYCE = 1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750
+LEAST_LIMIT = 20.0
+"""The smallest I1 - 3 at which a Gent material locks."""
 C10_SPREAD = 0.5
 """Standard deviation of log C10 (MPa)."""
 
@@ -96,7 +98,7 @@ def _ogden_two(generator: Generator) -> Callable[..., FloatArray]:
 
 
 def _gent(generator: Generator) -> Callable[..., FloatArray]:
-    limit = generator.uniform(20, 60)
+    limit = generator.uniform(LEAST_LIMIT, 60)
     return _of_invariants(lambda x, y: (limit / (limit - x), 0 * x))
 
 
