@@ -1,4 +1,4 @@
-"""True materials of a campaign: random members of families, most of which the library cannot fit.
+"""True materials of a campaign: random members of families, half of which the library cannot fit.
 
 A family draws the parameters of a material with C10 = 1 from a random generator and returns the material as its
 stress in any loading mode; the campaign scales it. Everything follows from the seed, so that every worker draws the
