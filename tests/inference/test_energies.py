@@ -101,20 +101,12 @@ def discrepancy_sum(names):
     return [type(block) for block in discrepancy_named(names).sums[0]]
 
 
-@pytest.mark.parametrize("names", ["taylor", "log", "zero-modulus", "valanis-landel"])
-def test_a_single_energy_is_its_dense_covariance(names):
+EACH = ["taylor", "log", "zero-modulus", "valanis-landel", "taylor+zero-modulus", "log+zero-modulus"]
+
+
+@pytest.mark.parametrize("names", EACH)
+def test_an_energy_or_a_sum_of_two_is_its_dense_covariance(names):
     data = measured()
-    posterior = tq.fit(data, discrepancy=names, noise_sd=NOISE_SD, priors={"C10": tq.Uniform(0, 50)})
-    evidence, mean, sd = dense(names, data, NOISE_SD)
-    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
-    c10 = posterior.summary().loc["C10"]
-    assert abs(c10["mean"] - mean) < 2e-3 * sd
-    assert abs(c10["sd"] / sd - 1) < 2e-3
-
-
-@pytest.mark.parametrize("names", ["taylor+zero-modulus", "log+zero-modulus"])
-def test_a_sum_of_energies_is_its_dense_covariance(names):
-    data = measured(seed=1)
     posterior = tq.fit(data, discrepancy=names, noise_sd=NOISE_SD, priors={"C10": tq.Uniform(0, 50)})
     evidence, mean, sd = dense(names, data, NOISE_SD)
     assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
