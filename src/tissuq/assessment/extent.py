@@ -29,6 +29,8 @@ STEP = 1e-4
 """Of the stretch, for the initial slope."""
 SCALES = (0.25, 4.0)
 """Factors of the amplitudes' prior scale with which its influence is told."""
+NOTHING = 1e-3
+"""Share of the initial stiffness that is as good as none."""
 SENSITIVE = 0.5
 """Shift of the mean, in standard deviations, from which the prior of the amplitudes matters."""
 
@@ -81,13 +83,13 @@ class Assessment:
         """The numbers as a person reads them."""
         mean, low, high = self.share
         found = [f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"]
-        if max(map(abs, self.initial_share)) < 1e-6:
+        if max(map(abs, self.initial_share)) < NOTHING:
             found.append(f"it has no initial stiffness, so it has taken nothing from {self.parameter}")
         else:
             mean, low, high = self.initial_share
             found.append(
-                f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), which "
-                f"{self.parameter} may lack"
+                f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), by which "
+                f"{self.parameter} may be off"
             )
         if self.width_against_none is not None:
             found.append(f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy")
