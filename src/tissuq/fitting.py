@@ -179,7 +179,7 @@ class _Recipe:
 
     def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
         """Solve models on the same stretches: together by the exact route, one by one by the others."""
-        if models[0].energy_members:
+        if models[0].energy_symbols:
             if self.method not in ("auto", "exact"):
                 raise ModelError(
                     f"the method '{self.method}' does not apply: discrepancy '{self.discrepancy.name}' is integrated "

@@ -135,7 +135,8 @@ class StatisticalModel:
     @property
     def energy_symbols(self) -> tuple[str, ...]:
         """The amplitudes of an energy discrepancy."""
-        return tuple(p.symbol for p in self.discrepancy.parameters) if self.energy_members else ()
+        is_energy = isinstance(self.discrepancy, EnergyDiscrepancy)
+        return tuple(p.symbol for p in self.discrepancy.parameters) if is_energy else ()
 
     def basis(self, stretch: FloatArray, bent: ArrayLike = (), mode: LoadingMode | None = None) -> FloatArray:
         """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,).

@@ -97,6 +97,14 @@ def dense(names, data, noise_sd, columns=UNIT[:, None], log_noise_prior=None):
     return evidence, mean, np.sqrt(weight @ (variances + (means - mean) ** 2))
 
 
+def assert_is(posterior, evidence, mean, sd):
+    """Hold log evidence, and mean and sd of C10, against those of dense covariances."""
+    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
+    c10 = posterior.summary().loc["C10"]
+    assert abs(c10["mean"] - mean) < 2e-3 * sd
+    assert abs(c10["sd"] / sd - 1) < 2e-3
+
+
 def discrepancy_sum(names):
     return [type(block) for block in discrepancy_named(names).sums[0]]
 
@@ -108,11 +116,7 @@ EACH = ["taylor", "log", "zero-modulus", "valanis-landel", "taylor+zero-modulus"
 def test_an_energy_or_a_sum_of_two_is_its_dense_covariance(names):
     data = measured()
     posterior = tq.fit(data, discrepancy=names, noise_sd=NOISE_SD, priors={"C10": tq.Uniform(0, 50)})
-    evidence, mean, sd = dense(names, data, NOISE_SD)
-    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
-    c10 = posterior.summary().loc["C10"]
-    assert abs(c10["mean"] - mean) < 2e-3 * sd
-    assert abs(c10["sd"] / sd - 1) < 2e-3
+    assert_is(posterior, *dense(names, data, NOISE_SD))
 
 
 def test_unknown_noise_is_integrated_too():
@@ -132,11 +136,7 @@ def test_a_material_with_three_parameters_keeps_them_apart():
     columns = np.column_stack([UNIT, 2 * X * UNIT, 3 * X**2 * UNIT])
     priors = {"C10": tq.Uniform(0, 50)} | dict.fromkeys(("C20", "C30"), tq.Uniform(-25, 25))
     posterior = tq.fit(data, material="yeoh", discrepancy="zero-modulus", noise_sd=NOISE_SD, priors=priors)
-    evidence, mean, sd = dense("zero-modulus", data, NOISE_SD, columns)
-    assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 1e-3
-    c10 = posterior.summary().loc["C10"]
-    assert abs(c10["mean"] - mean) < 2e-3 * sd
-    assert abs(c10["sd"] / sd - 1) < 2e-3
+    assert_is(posterior, *dense("zero-modulus", data, NOISE_SD, columns))
 
 
 def test_auto_is_the_mixture_of_its_sums():

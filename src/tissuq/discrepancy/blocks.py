@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -102,7 +103,7 @@ class ProcessBlock(EnergyBlock):
         self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
     ) -> FloatArray:
         scale = length * (reach[1] - reach[0])
-        pivots, triangle = self._pivots(reach, scale)
+        pivots, triangle = _pivots(self, reach, scale)
         z, v = self.coordinates(mode, stretch)
         values = np.linalg.solve(triangle, self.covariance(pivots[:, None], z.ravel()[None], scale))
         return np.asarray(np.einsum("rnm,nm->nr", values.reshape(len(pivots), *z.shape), v))
@@ -115,19 +116,24 @@ class ProcessBlock(EnergyBlock):
             covariance = self.covariance(z[:, :, None], z[:, None, :], length * (reach[1] - reach[0]))
         return np.asarray(np.einsum("nm,nmk,nk->n", v, covariance, v))
 
-    def _pivots(self, reach: tuple[float, float], scale: float) -> tuple[FloatArray, FloatArray]:
-        """Return r pivots and the lower triangle (r, r) of their covariance's Cholesky decomposition."""
-        grid = reach[0] + (reach[1] - reach[0]) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
-        remaining = self.covariance(grid, grid, scale)
-        least = self.tolerance * remaining.max()
-        chosen: list[int] = []
-        columns = np.zeros((GRID, 0))
-        while (pivot := int(remaining.argmax())) not in chosen and remaining[pivot] > least:
-            own = self.covariance(grid, grid[pivot], scale) - columns @ columns[pivot]
-            columns = np.column_stack([columns, own / np.sqrt(remaining[pivot])])
-            remaining = remaining - columns[:, -1] ** 2
-            chosen.append(pivot)
-        return grid[chosen], np.tril(columns[chosen])
+
+@lru_cache(maxsize=256)
+def _pivots(block: ProcessBlock, reach: tuple[float, float], scale: float) -> tuple[FloatArray, FloatArray]:
+    """Return r pivots and the lower triangle (r, r) of their covariance's Cholesky decomposition.
+
+    Remembered, because every sum of which the block is a part asks for the same.
+    """
+    grid = reach[0] + (reach[1] - reach[0]) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
+    remaining = block.covariance(grid, grid, scale)
+    least = block.tolerance * remaining.max()
+    chosen: list[int] = []
+    columns = np.zeros((GRID, 0))
+    while (pivot := int(remaining.argmax())) not in chosen and remaining[pivot] > least:
+        own = block.covariance(grid, grid[pivot], scale) - columns @ columns[pivot]
+        columns = np.column_stack([columns, own / np.sqrt(remaining[pivot])])
+        remaining = remaining - columns[:, -1] ** 2
+        chosen.append(pivot)
+    return grid[chosen], np.tril(columns[chosen])
 
 
 class InvariantBlock(ProcessBlock):

@@ -105,7 +105,7 @@ class Bounded:
         return found
 
     def _boxes(self, components: Components) -> Boxes:
-        return self.box[np.zeros(len(components.weights), dtype=int)]
+        return self.box.repeated(len(components.weights))
 
     def _drawn(self, components: Components) -> Components:
         """Return draws within the bounds, as components without extent."""

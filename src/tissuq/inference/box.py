@@ -48,6 +48,10 @@ class Boxes:
     def __getitem__(self, chosen: Any) -> Boxes:
         return Boxes(self.lower[chosen], self.upper[chosen])
 
+    def repeated(self, count: int) -> Boxes:
+        """Return the bounds of the first data set for each of some Gaussians."""
+        return self[np.zeros(count, dtype=int)]
+
     def ceiling(self, mean: FloatArray, root: FloatArray) -> FloatArray:
         """Return an upper bound on the log mass inside, (M,) for M Gaussians: the least over single parameters."""
         if not np.isfinite(self.lower).any() and not np.isfinite(self.upper).any():

@@ -20,7 +20,7 @@ from tissuq.inference.box import Boxes
 from tissuq.inference.lattice import STEP, Lattice
 from tissuq.inference.marginal import Marginal, marginal_of_logs
 from tissuq.inference.resampling import systematic
-from tissuq.inference.solution import Components, Marginals, Solution
+from tissuq.inference.solution import Components, Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
 from tissuq.priors import Flat, Prior
@@ -51,7 +51,6 @@ TOUCHED = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
 REPRESENTED = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
-CHAINS, DRAWS = 4, 1000
 
 
 def why_no_energies(model: StatisticalModel) -> str:
@@ -144,7 +143,7 @@ class EnergySolution(Solution):
         beyond = self._box.beyond(mean, root)
         near = np.flatnonzero(beyond.sum(axis=1) > TOUCHED)
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
-        every = self._box[np.zeros(len(near), dtype=int)]
+        every = self._box.repeated(len(near))
         log_mass[near], error_of_mass[near] = every.log_mass(mean[near], root[near])
         log_weights = points.log_weight + log_mass
         top = log_weights.max()
@@ -195,11 +194,6 @@ class EnergySolution(Solution):
         return bounded(whole, box.beyond(mean, root), box).components()
 
     @cached_property
-    def marginals(self) -> Marginals:
-        """The marginal posterior of every parameter."""
-        return Marginals(self.model.symbols, self._marginal)
-
-    @cached_property
     def draws(self) -> dict[str, FloatArray]:
         """Independent draws of every parameter."""
         chosen, linear = self._drawn
@@ -213,7 +207,7 @@ class EnergySolution(Solution):
         chosen, linear = self._drawn
         assert self.components.member is not None  # noqa: S101 (this solution's components have one)
         member, start = self.components.member[chosen], len(self.model.linear)
-        values = np.zeros((CHAINS, DRAWS, len(self.model.experiment)))
+        values = np.zeros((*chosen.shape, len(self.model.experiment)))
         for place in np.unique(member):
             features = np.hstack([np.zeros((values.shape[2], 0)), *self._lattices[place].features])
             own = member == place
@@ -223,10 +217,7 @@ class EnergySolution(Solution):
     @cached_property
     def _drawn(self) -> tuple[Places, FloatArray]:
         """The component of every draw, and its linear parameters and weights."""
-        generator, parts = np.random.default_rng(self._seed), self.components
-        chosen = generator.choice(len(parts.weights), size=(CHAINS, DRAWS), p=parts.weights)
-        noise = generator.standard_normal((CHAINS, DRAWS, parts.root.shape[2]))
-        return chosen, parts.mean[chosen] + np.einsum("cdij,cdj->cdi", parts.root[chosen], noise)
+        return self.components.drawn(self._seed)
 
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:

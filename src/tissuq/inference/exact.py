@@ -13,7 +13,7 @@ from tissuq.inference.bounds import bounded
 from tissuq.inference.conditional import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_quadrature
 from tissuq.inference.quadrature import MAX_DIMENSION, Quadrature, integrate
-from tissuq.inference.solution import Components, Marginals, Solution
+from tissuq.inference.solution import Components, Solution
 from tissuq.inference.survey import log_prior_density, survey
 from tissuq.inference.threads import one_thread
 from tissuq.inference.warp import Warp, warp_along
@@ -24,7 +24,6 @@ __all__ = ["ExactSolution", "solve_exactly", "why_not_exact"]
 
 FloatArray = NDArray[np.float64]
 
-CHAINS, DRAWS = 4, 1000
 TOGETHER = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
 IRRELEVANT = 14.0
@@ -155,7 +154,7 @@ class ExactSolution(Solution):
         if any(isinstance(prior, Flat) for prior in self.model.priors.values()):
             return
         heavy = np.flatnonzero((weights > HEAVY) & (beyond.sum(axis=1) > HEAVY))
-        log_mass, error = box[np.zeros(len(heavy), dtype=int)].log_mass(parts.mean[heavy], parts.root[heavy])
+        log_mass, error = box.repeated(len(heavy)).log_mass(parts.mean[heavy], parts.root[heavy])
         error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(beyond.sum(axis=1), HEAVY))
         if error_of_mass > MOST_ERROR:
             raise ConvergenceError(
@@ -184,18 +183,10 @@ class ExactSolution(Solution):
         return f"{linear}; {rest}{cut}"
 
     @cached_property
-    def marginals(self) -> Marginals:
-        """The marginal posterior of every parameter."""
-        return Marginals(self.model.symbols, self._marginal)
-
-    @cached_property
     def draws(self) -> dict[str, FloatArray]:
         """Independent draws of every parameter."""
-        generator, parts = np.random.default_rng(self._seed), self.components
-        chosen = generator.choice(len(parts.weights), size=(CHAINS, DRAWS), p=parts.weights)
-        noise = generator.standard_normal((CHAINS, DRAWS, parts.root.shape[2]))
-        linear = parts.mean[chosen] + np.einsum("cdij,cdj->cdi", parts.root[chosen], noise)
-        columns = np.moveaxis(np.concatenate([parts.settings[chosen], linear], axis=2), 2, 0)
+        chosen, linear = self.components.drawn(self._seed)
+        columns = np.moveaxis(np.concatenate([self.components.settings[chosen], linear], axis=2), 2, 0)
         named = dict(zip((*self.model.nonlinear, *self.model.linear), columns, strict=True))
         return {symbol: named[symbol] for symbol in self.model.symbols}
 

@@ -18,7 +18,7 @@ from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, ma
 from tissuq.inference.nuts import NutsDraws, NutsSettings, sample_nuts
 from tissuq.inference.resampling import resampled_at_random
 from tissuq.inference.smc import SmcDraws, SmcSettings, sample_smc
-from tissuq.inference.solution import Components, Diagnostics, Marginals, Solution
+from tissuq.inference.solution import Components, Diagnostics, Solution
 from tissuq.model import StatisticalModel
 from tissuq.priors import Flat
 
@@ -207,11 +207,6 @@ class SampledSolution(Solution):
             for symbols in (self.model.nonlinear, self.model.linear)
         )
         return Components(np.full(count, 1 / count), settings, mean, np.zeros((count, mean.shape[1], mean.shape[1])))
-
-    @cached_property
-    def marginals(self) -> Marginals:
-        """The marginal posterior of every parameter: of the Gaussians for a linear one, else of the draws."""
-        return Marginals(self.model.symbols, self._marginal)
 
     def _marginal(self, symbol: str) -> Marginal:
         model, parts = self.model, self.components

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -18,6 +19,9 @@ from tissuq.model import StatisticalModel
 __all__ = ["Components", "Diagnostics", "Marginals", "Solution"]
 
 FloatArray = NDArray[np.float64]
+
+CHAINS, DRAWS = 4, 1000
+"""Of the draws from a mixture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,13 @@ class Components:
         is_average = self.member is not None and other.member is not None
         names = ("weights", "settings", "mean", "root", *(["member"] if is_average else []))
         return Components(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def drawn(self, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return the component (chains, draws) of every draw, and its linear parameters (chains, draws, p)."""
+        generator = np.random.default_rng(seed)
+        chosen = generator.choice(len(self.weights), size=(CHAINS, DRAWS), p=self.weights)
+        noise = generator.standard_normal((CHAINS, DRAWS, self.root.shape[2]))
+        return chosen, self.mean[chosen] + np.einsum("cdij,cdj->cdi", self.root[chosen], noise)
 
     def weighted(self, weights: FloatArray) -> Components:
         """Return the same components with other weights (M,)."""
@@ -149,10 +160,14 @@ class Solution(ABC):
     drawn_discrepancy: FloatArray | None = None
     members: Mapping[str, float] = MappingProxyType({})
 
-    @property
-    @abstractmethod
+    @cached_property
     def marginals(self) -> Marginals:
         """The marginal posterior of every parameter."""
+        return Marginals(self.model.symbols, self._marginal)
+
+    @abstractmethod
+    def _marginal(self, symbol: str) -> Marginal:
+        """Return the marginal posterior of one parameter."""
 
     @property
     @abstractmethod

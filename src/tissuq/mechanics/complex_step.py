@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.material import Material
+from tissuq.mechanics.path import STEP
 
 __all__ = ["complex_step_stress"]
 
@@ -16,8 +17,6 @@ FloatArray = NDArray[np.float64]
 
 MOST_VALUES = 10_000
 """Stresses from which compiled derivatives are quicker."""
-STEP = 1e-30
-"""Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
 REAL_STEP = 1e-5
 AGREEMENT = 1e-6
 """Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""

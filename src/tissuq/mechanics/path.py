@@ -7,12 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.experiments.modes import LoadingMode
 
-__all__ = ["invariant_rates", "invariants", "log_stretches"]
+__all__ = ["STEP", "invariant_rates", "invariants", "log_stretches"]
 
 FloatArray = NDArray[np.float64]
 
 STEP = 1e-30
-"""Imaginary step of the derivative: without subtraction, so without loss of digits."""
+"""Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
 
 
 def log_stretches(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
