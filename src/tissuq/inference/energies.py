@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +30,9 @@ __all__ = ["EnergySolution", "solve_energies", "why_no_energies"]
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-NOISE_STEP, NOISE_BELOW, NOISE_ABOVE = 1.0, 5.0, 20.0
-"""Of the lattice of log noise_sd: in standard deviations from its conditional mode, which are 1 / sqrt(2 freedom), the
-distance of its points, and its reach below; above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
+NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
+"""Of the noise given the rest: values, and the reach of its logarithm around its mode, in standard deviations
+1 / sqrt(2 freedom); above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
 SMALLER = STEP / (1 - np.exp(-STEP))
 """Width of the first point's cell: of all points below it, weighted by their amplitudes."""
 IRRELEVANT = 18.0
@@ -42,9 +42,9 @@ CUT_NODES = 24
 LIKELY, POSSIBLE = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
 """Probabilities of the noise's prior between which it is likely, and between which it is at all."""
 TINY = 1e-200
-NOISE_RATIOS, FINE = 1000, 0.15
-"""Ratios of the amplitudes, and spacing, from which the marginal of the noise is computed."""
-LIGHT = 1e-7
+NOISE_RATIOS, MANY_NODES = 1000, 100
+"""Ratios of the amplitudes, and values of the noise for each, from which the marginal of the noise is computed."""
+LIGHT = 1e-6
 """Share of the posterior that may be left out."""
 MOST_PRIOR_ERROR = 0.01
 TOUCHED = 1e-10
@@ -236,7 +236,7 @@ class EnergySolution(Solution):
         values, shares = [], []
         for place in np.unique(chosen // side**2):
             own, width = chosen[chosen // side**2 == place], len(self._lattices[place].ratios[0])
-            fine = self._all_noise(self._best_noise(int(place))[own // side % side * width + own % side], FINE)
+            fine = self._all_noise(self._best_noise(int(place))[own // side % side * width + own % side], finely=True)
             row = np.repeat(np.arange(len(own)), len(fine.noise_sd) // len(own))
             weight = np.exp(fine.log_weight - fine.log_weight.max())
             values.append(fine.noise_sd)
@@ -263,12 +263,13 @@ class EnergySolution(Solution):
 
     def _weigh(self) -> tuple[_Points, float]:
         """Return the points that matter, and the error of their sum: from that of every second point."""
-        known = not self.model.noise.parameters
         every = [self._best_noise(place) for place in range(len(self._lattices))]
         top = max(float(points.log_weight.max()) for points in every)
         every = [points[points.log_weight > top - IRRELEVANT] for points in every]
-        if not known:
-            every = [self._all_noise(each, NOISE_STEP) for each in every if len(each.lattice)]
+        least = _least_that_matters(np.concatenate([np.exp(points.log_weight - top) for points in every]))
+        every = [points[np.exp(points.log_weight - top) >= least] for points in every]
+        if self.model.noise.parameters:
+            every = [self._all_noise(each) for each in every if len(each.lattice)]
         points = _Points.joined(every)
         mass = np.exp(points.log_weight - points.log_weight.max())
         coarse = 0.0
@@ -277,9 +278,7 @@ class EnergySolution(Solution):
             for grid, places in zip(lattice.ratios, (points.first, points.second), strict=True):
                 own = own & ((places % 2 == 0) | (len(grid) == 1))
             coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[own].sum()
-        order = np.argsort(mass)
-        heavy = order[np.cumsum(mass[order]) > LIGHT * mass.sum()]
-        return points[heavy], float(abs(coarse / mass.sum() - 1) ** 1.5)
+        return points[mass >= _least_that_matters(mass)], float(abs(coarse / mass.sum() - 1) ** 1.5)
 
     def _best_noise(self, place: int) -> _Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
@@ -294,33 +293,31 @@ class EnergySolution(Solution):
         lattice = self._lattices[place]
         return np.asarray(np.sqrt(lattice.misfit[second, first, self._index] / lattice.freedom))
 
-    def _all_noise(self, points: _Points, spacing: float) -> _Points:
+    def _all_noise(self, points: _Points, finely: bool = False) -> _Points:
         """Return the points of a lattice with several values of the noise for each, row by row.
 
-        They are evenly spaced in its logarithm where likelihood and prior are wide; where the prior cuts the likelihood
-        or is narrower, they are those of a Gauss-Legendre rule on what it leaves.
+        They are those of a Gauss rule for the likelihood's own shape. Where the prior cuts that or is narrower, and
+        where many are asked for, they are those of a Gauss-Legendre rule on what the prior leaves.
         """
         place = int(points.lattice[0])
         prior, freedom = self.model.priors["noise_sd"], self._lattices[place].freedom
         ends = np.log(np.maximum(prior.quantile(POSSIBLE), TINY))
-        unit = 1 / np.sqrt(2 * freedom)
-        mode = np.log(np.maximum(self._noise_modes(place, points.second, points.first), TINY))
-        low, high = mode - NOISE_BELOW * unit, mode + (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
-        is_cut = bool(((low < ends[0]) | (high > ends[1])).any())
-        if is_cut:
+        mode = np.log(np.maximum(self._noise_modes(place, points.second, points.first), TINY))[:, None]
+        below, above = _reach(freedom)
+        low, high = mode - below, mode + above
+        if not finely and (low >= ends[0]).all() and (high <= ends[1]).all():
+            nodes, cells = _noise_rule(freedom)
+            logs = mode + nodes
+        else:
             cut = np.maximum(low, ends[0]), np.minimum(high, ends[1])
             keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
             low, high = (np.where(keeps, own, end) for own, end in zip(cut, ends, strict=True))
-            nodes, weights = np.polynomial.legendre.leggauss(int(CUT_NODES / spacing))
-            nodes, weights = 0.5 * (1 + nodes), 0.5 * weights
-        else:
-            nodes = np.linspace(0, 1, int((high[0] - low[0]) / (spacing * unit)) + 1)
-            weights = np.full(len(nodes), nodes[1])
-        width = (high - low)[:, None]
-        noise_sd = np.exp(low[:, None] + width * nodes).ravel()
+            nodes, cells = _legendre(MANY_NODES if finely else CUT_NODES)
+            logs, cells = low + (high - low) * 0.5 * (1 + nodes), (high - low) * 0.5 * cells
+        noise_sd = np.exp(logs).ravel()
         second, first = (np.repeat(each, len(nodes)) for each in (points.second, points.first))
         found = self._weighed(place, second, first, noise_sd)
-        log_cell = prior.log_density(noise_sd) + np.log(noise_sd * (width * weights).ravel())
+        log_cell = prior.log_density(noise_sd) + np.log(noise_sd * np.broadcast_to(cells, logs.shape).ravel())
         return replace(found, log_weight=found.log_weight + log_cell)
 
     def _weighed(self, place: int, second: Places, first: Places, noise_sd: FloatArray) -> _Points:
@@ -336,3 +333,47 @@ class EnergySolution(Solution):
             cell = np.where(place_on_grid == 0, SMALLER, STEP)
             log_weight += prior.log_density(amplitudes[:, which]) + np.log(cell * amplitudes[:, which])
         return _Points(np.full(len(first), place), second, first, noise_sd, amplitudes, log_weight)
+
+
+def _least_that_matters(mass: FloatArray) -> float:
+    """Return the mass below which points hold next to nothing together."""
+    order = np.sort(mass)
+    return float(order[np.searchsorted(np.cumsum(order), LIGHT * order.sum())])
+
+
+def _reach(freedom: int) -> tuple[float, float]:
+    """Return how far log noise_sd reaches below its mode and above, given the ratios."""
+    unit = 1 / np.sqrt(2 * freedom)
+    return NOISE_BELOW * unit, (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
+
+
+@lru_cache(maxsize=2)
+def _legendre(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights of the Gauss-Legendre rule between -1 and 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return nodes, weights
+
+
+@lru_cache(maxsize=64)
+def _noise_rule(freedom: int) -> tuple[FloatArray, FloatArray]:
+    """Return nodes, as log noise_sd from its mode, and weights of the Gauss rule whose weight is the likelihood.
+
+    Given the ratios it is noise_sd^-f exp(-misfit / (2 noise_sd^2)): the same shape about its mode whatever the misfit.
+    It is divided out of the weights again. By the Stieltjes procedure and the Jacobi matrix (Golub & Welsch 1969).
+    """
+    below, above = _reach(freedom)
+    grid, step = np.linspace(-below, above, 4001, retstep=True)
+    share = np.exp(_log_shape(grid, freedom))
+    diagonal, beside = np.zeros(NOISE_NODES), np.zeros(NOISE_NODES)
+    before, now = np.zeros(len(grid)), np.full(len(grid), 1 / np.sqrt(share.sum()))
+    for k in range(NOISE_NODES):
+        diagonal[k] = (share * grid * now**2).sum()
+        further = (grid - diagonal[k]) * now - beside[k - 1] * before
+        beside[k] = np.sqrt((share * further**2).sum())
+        before, now = now, further / beside[k]
+    nodes, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1))
+    return nodes, step * share.sum() * vectors[0] ** 2 * np.exp(-_log_shape(nodes, freedom))
+
+
+def _log_shape(log_noise: FloatArray, freedom: int) -> FloatArray:
+    return np.asarray(-freedom * (log_noise + 0.5 * np.expm1(-2 * log_noise)))

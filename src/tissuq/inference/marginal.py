@@ -36,6 +36,8 @@ FAR = 15.0
 FINE = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MANY_LINES = 2000
+MANY_BINS = 10_000
+"""In which the logarithms of many values are sorted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,16 +225,18 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, 
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))
 
 
-def marginal_of_points(points: FloatArray, weights: FloatArray, bounds: tuple[float, float]) -> Marginal:
+def marginal_of_points(
+    points: FloatArray, weights: FloatArray, bounds: tuple[float, float], bandwidth: float | None = None
+) -> Marginal:
     """Return the marginal of weighted points within bounds, by a kernel estimate that keeps their variance.
 
-    Silverman's bandwidth; points near a bound are mirrored there, and elsewhere drawn towards the mean by what the
+    Silverman's bandwidth, unless another is given; points near a bound are mirrored there, and elsewhere drawn towards the mean by what the
     kernel adds to the variance.
     """
     weights = weights / weights.sum()
     mean = float(weights @ points)
     sd = float(np.sqrt(weights @ (points - mean) ** 2))
-    bandwidth = 0.9 * sd * float(weights @ weights) ** 0.2
+    bandwidth = bandwidth or 0.9 * sd * float(weights @ weights) ** 0.2
     low, high = max(bounds[0], points.min() - 4 * bandwidth), min(bounds[1], points.max() + 4 * bandwidth)
     is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
     if not is_cut:
@@ -257,9 +261,14 @@ def marginal_of_logs(values: FloatArray, weights: FloatArray, step: float) -> Ma
     sd = float(np.sqrt(weights @ (values - mean) ** 2))
     if not positive.any():
         return Marginal(mean, sd, np.array([0.0, 1e-300]), np.ones(2), np.array([0.0, 1.0]))
-    spread = step * ((np.arange(8) + 0.5) / 8 - 0.5)
-    logs = (np.log(values[positive])[:, None] + spread).ravel()
-    smooth = marginal_of_points(logs, np.repeat(weights[positive], 8), (-np.inf, np.inf))
+    logs, shares = np.log(values[positive]), weights[positive]
+    if step:
+        heights, edges = np.histogram(logs, bins=MANY_BINS, weights=shares)
+        filled = np.flatnonzero(heights)
+        spread = step * ((np.arange(8) + 0.5) / 8 - 0.5)
+        logs = (0.5 * (edges[filled] + edges[filled + 1])[:, None] + spread).ravel()
+        shares = np.repeat(heights[filled], 8)
+    smooth = marginal_of_points(logs, shares, (-np.inf, np.inf), 0.25 * step)
     points = np.exp(smooth.points)
     share = float(weights[positive].sum())
     return Marginal(mean, sd, points, share * smooth.density / points, _proper(1 - share + share * smooth.cumulative))
