@@ -2,23 +2,32 @@
 
 Given a member and the ratios g = c / noise_sd of its amplitudes, everything is linear and Gaussian
 (`tissuq.inference.lattice`). The integrand is smooth in log g and log noise_sd, so that equally spaced points integrate
-it with an error that falls exponentially with their number.
+it with an error that falls exponentially with their number. Parameters that are left, such as exponents, take the
+values of weighted quasi-random points (`tissuq.inference.outer`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
+from tissuq.inference.amplitudes import (
+    LIGHT,
+    Points,
+    log_prior_of_amplitude,
+    log_prior_of_noise,
+    noise_grid,
+)
 from tissuq.inference.bounds import bounded
 from tissuq.inference.box import Boxes
-from tissuq.inference.lattice import STEP, Lattice
-from tissuq.inference.marginal import Marginal, marginal_of_logs
+from tissuq.inference.lattice import STEP, Reduced
+from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
+from tissuq.inference.nodes import OUTER_STEP, Node, features_of, single_nodes, weighted_nodes
+from tissuq.inference.outer import Outer
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Components, Solution
 from tissuq.inference.threads import one_thread
@@ -30,36 +39,19 @@ __all__ = ["EnergySolution", "solve_energies", "why_no_energies"]
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
-"""Of the noise given the rest: values, and the reach of its logarithm around its mode, in standard deviations
-1 / sqrt(2 freedom); above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
-SMALLER = STEP / (1 - np.exp(-STEP))
-"""Width of the first point's cell: of all points below it, weighted by their amplitudes."""
-IRRELEVANT = 18.0
-"""Log density below the largest, at the best noise, at which a point of the lattice is left out at once."""
-CUT_NODES = 24
-"""Values of the noise where its prior cuts or is narrow."""
-LIKELY, POSSIBLE = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
-"""Probabilities of the noise's prior between which it is likely, and between which it is at all."""
-TINY = 1e-200
-NOISE_RATIOS, MANY_NODES = 1000, 100
-"""Ratios of the amplitudes, and values of the noise for each, from which the marginal of the noise is computed."""
-LIGHT = 1e-6
-"""Share of the posterior that may be left out."""
 MOST_PRIOR_ERROR = 0.01
 TOUCHED = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
 REPRESENTED = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
+NOISE_ROWS, NOISES = 1000, 400
+"""Points, and values of the noise for each, from which the marginal of the noise is computed."""
 
 
 def why_no_energies(model: StatisticalModel) -> str:
     """Return why an energy discrepancy cannot be integrated with the rest of a model, or nothing where it can."""
-    if model.bent_symbols:
-        return f"the material's stress is not linear in {', '.join(model.bent_symbols)}"
-    others = [symbol for symbol in model.nonlinear if symbol not in (*model.energy_symbols, "noise_sd")]
-    if others or model.noise.depends_on_level or model.noise.shares_discrepancy:
-        return f"noise '{model.noise.name}' or a prior leaves more than amplitudes and noise_sd to integrate"
+    if not model.linear:
+        return "no parameter is left that is linear with such a prior"
     for symbol in model.energy_symbols:
         if _lattice_error(model.priors[symbol]) > MOST_PRIOR_ERROR:
             return (
@@ -88,7 +80,8 @@ def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[En
     Parameters
     ----------
     models : sequence of StatisticalModel
-        With the same material, discrepancy and noise on the same stretches: they share every decomposition.
+        With the same material, discrepancy and noise on the same stretches: they share every decomposition, unless
+        parameters are left that no lattice sums over.
     seed : int
         Of the draws; nothing else is random.
 
@@ -96,48 +89,48 @@ def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[En
     ------
     ModelError
         When the model has parameters that this route does not integrate.
+    ConvergenceError
+        When it is not found where the parameters lie that no lattice sums over.
     """
     reason = why_no_energies(models[0])
     if reason:
         raise ModelError(
-            f"discrepancy '{models[0].discrepancy.name}' needs a material that is linear in its parameters, uniform or "
-            "flat priors on them, and noise that is known, or unknown but the same everywhere. Here "
-            f"{reason}: choose otherwise, or another discrepancy."
+            f"discrepancy '{models[0].discrepancy.name}' needs uniform or flat priors on the parameters in which the "
+            f"stress is linear, and wide positive ones on its amplitudes. Here {reason}: choose otherwise, or another "
+            "discrepancy."
         )
     with one_thread():
-        lattices = [Lattice(models, member) for member in models[0].energy_members]
-        return [EnergySolution(model, lattices, index, seed) for index, model in enumerate(models)]
-
-
-@dataclass(frozen=True, eq=False)
-class _Points:
-    """M points of the lattices: which lattice, where in it, what noise, both amplitudes, log p(data and point)."""
-
-    lattice: Places
-    second: Places
-    first: Places
-    noise_sd: FloatArray
-    amplitudes: FloatArray
-    log_weight: FloatArray
-
-    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> _Points:
-        return _Points(*(array[chosen] for array in vars(self).values()))
-
-    @classmethod
-    def joined(cls, parts: Sequence[_Points]) -> _Points:
-        """Return all points of several sets."""
-        return cls(*(np.concatenate(arrays) for arrays in zip(*(vars(part).values() for part in parts), strict=True)))
+        if Outer(models[0]).symbols:
+            return [EnergySolution(model, *weighted_nodes(model), seed) for model in models]
+        nodes = single_nodes(models)
+        return [EnergySolution(m, [node], np.zeros(1), 0.0, seed) for m, node in zip(models, nodes, strict=True)]
 
 
 class EnergySolution(Solution):
-    """The posterior of one data set under an energy discrepancy."""
+    """The posterior of one data set under an energy discrepancy.
+
+    Parameters
+    ----------
+    model : StatisticalModel
+    nodes : sequence of Node
+        At weighted values of the outer parameters.
+    log_weights : (K,) array
+        Of the nodes: priors of the outer parameters over the density of the values taken.
+    error : float
+        Relative error of the nodes' sum.
+    seed : int
+    """
 
     route = "exact"
 
-    def __init__(self, model: StatisticalModel, lattices: Sequence[Lattice], index: int, seed: int) -> None:
-        self.model, self._lattices, self._index, self._seed = model, lattices, index, seed
-        points, error = self._weigh()
-        mean, root = self._linear(points)
+    def __init__(
+        self, model: StatisticalModel, nodes: Sequence[Node], log_weights: FloatArray, error: float, seed: int
+    ) -> None:
+        self.model, self._nodes, self._seed = model, nodes, seed
+        self._step = STEP if len(nodes) == 1 else OUTER_STEP
+        points = Points.joined([node.points for node in nodes])
+        self._node = np.repeat(np.arange(len(nodes)), [len(node.points.lattice) for node in nodes])
+        mean, root = (np.concatenate([getattr(node, name) for node in nodes]) for name in ("mean", "root"))
         supports = np.array([model.priors[symbol].support for symbol in model.linear])
         self._box = Boxes(supports[None, :, 0], supports[None, :, 1])
         beyond = self._box.beyond(mean, root)
@@ -145,50 +138,62 @@ class EnergySolution(Solution):
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
         every = self._box.repeated(len(near))
         log_mass[near], error_of_mass[near] = every.log_mass(mean[near], root[near])
-        log_weights = points.log_weight + log_mass
-        top = log_weights.max()
-        total = np.exp(log_weights - top).sum()
-        self._points, self._weights = points, np.exp(log_weights - top) / total
-        self._bounded = bounded(Components(self._weights, self._settings(points), mean, root), beyond, self._box)
+        masses = points.log_weight + log_weights[self._node] + log_mass
+        top = masses.max()
+        total = np.exp(masses - top).sum()
+        self._points, self._weights = points, np.exp(masses - top) / total
+        settings = self._settings(points, self._node)
+        self._bounded = bounded(Components(self._weights, settings, mean, root), beyond, self._box)
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
             self.log_evidence = float(top + np.log(total) - np.log(np.diff(supports, axis=1)).sum())
-            self.log_evidence_error = float(error + self._weights @ error_of_mass + LIGHT)
+            of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
+            self.log_evidence_error = float(error + of_sums + self._weights @ error_of_mass + LIGHT)
 
     @property
     def reason(self) -> str:  # type: ignore[override]  # computed, where others store it
         """What was done."""
-        model = self.model
-        return (
+        model, outer = self.model, Outer(self.model).symbols
+        inner = ", ".join(symbol for symbol in model.nonlinear if symbol not in outer)
+        done = (
             f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
-            f"{len(self._lattices)} energies and lattices of {', '.join(model.nonlinear)}"
+            f"{len(model.energy_members)} energies and lattices of {inner}"
+        )
+        shares = np.bincount(self._node, self._weights, minlength=len(self._nodes))
+        effective = 1 / (shares @ shares)
+        return done + (
+            f", and over {len(shares)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
         )
 
     @cached_property
     def members(self) -> dict[str, float]:  # type: ignore[override]  # a cached property
         """The posterior probability of every sum of blocks, its length scales together."""
         found: dict[str, float] = {}
-        shares = np.bincount(self._points.lattice, self._weights, minlength=len(self._lattices))
-        for lattice, share in zip(self._lattices, shares, strict=True):
-            found[lattice.member.name] = found.get(lattice.member.name, 0.0) + float(share)
+        every = self.model.energy_members
+        shares = np.bincount(self._points.lattice, self._weights, minlength=len(every))
+        for member, share in zip(every, shares, strict=True):
+            found[member.name] = found.get(member.name, 0.0) + float(share)
         return found
 
     @cached_property
     def components(self) -> Components:  # type: ignore[override]  # a cached property
         """The posterior as a mixture; after the material's parameters come the weights of the discrepancy."""
-        points, weights = self._points, self._weights
+        points, node, weights = self._points, self._node, self._weights
         if len(weights) > REPRESENTED:
-            order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice))  # neighbours are alike
-            points = points[order[systematic(weights[order][None], REPRESENTED)[0]]]
-            weights = np.full(REPRESENTED, 1 / REPRESENTED)
-        width = len(self.model.linear) + max(sum(f.shape[1] for f in each.features) for each in self._lattices)
+            order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice, node))
+            chosen = order[systematic(weights[order][None], REPRESENTED)[0]]  # neighbours are alike
+            points, node, weights = points[chosen], node[chosen], np.full(REPRESENTED, 1 / REPRESENTED)
+        features = {int(place): features_of(self.model, place) for place in np.unique(points.lattice)}
+        width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
-        for place in np.unique(points.lattice):
-            lattice, own = self._lattices[place], np.flatnonzero(points.lattice == place)
-            amplitudes = points.amplitudes[own][:, list(lattice.member.places)]
-            found, found_root = lattice.everything(self._index, amplitudes, points.noise_sd[own])
-            q = found.shape[1]
-            mean[own, :q], root[own, :q, :q] = found, found_root
-        whole = Components(weights, self._settings(points), mean, root, points.lattice)
+        for number in np.unique(node):
+            rows = Outer(self.model).rows(self._nodes[number].outer)
+            for place in np.unique(points.lattice[node == number]):
+                own = np.flatnonzero((node == number) & (points.lattice == place))
+                amplitudes = points.amplitudes[own][:, list(self.model.energy_members[place].places)]
+                found, found_root = Reduced(rows, features[place]).everything(0, amplitudes, points.noise_sd[own])
+                q = found.shape[1]
+                mean[own, :q], root[own, :q, :q] = found, found_root
+        whole = Components(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
         return bounded(whole, box.beyond(mean, root), box).components()
@@ -209,7 +214,7 @@ class EnergySolution(Solution):
         member, start = self.components.member[chosen], len(self.model.linear)
         values = np.zeros((*chosen.shape, len(self.model.experiment)))
         for place in np.unique(member):
-            features = np.hstack([np.zeros((values.shape[2], 0)), *self._lattices[place].features])
+            features = np.hstack([np.zeros((values.shape[2], 0)), *features_of(self.model, place)])
             own = member == place
             values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
         return values
@@ -222,158 +227,39 @@ class EnergySolution(Solution):
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:
             return self._bounded.marginal(self.model.linear.index(symbol))
-        if symbol not in self.model.energy_symbols:
+        if symbol == "noise_sd":
             return self._noise_marginal()
-        values = self._settings(self._points)[:, self.model.nonlinear.index(symbol)]
-        return marginal_of_logs(values, self._weights, STEP)
+        values = self._settings(self._points, self._node)[:, self.model.nonlinear.index(symbol)]
+        if symbol in self.model.energy_symbols:
+            return marginal_of_logs(values, self._weights, self._step)
+        if symbol not in self._nodes[0].ratios:  # one value at each node
+            first = np.flatnonzero(np.diff(self._node, prepend=-1))
+            shares = np.add.reduceat(self._weights, first)
+            return marginal_of_points(values[first], shares, self.model.priors[symbol].support)
+        return marginal_of_points(values, self._weights, self.model.priors[symbol].support)
 
     def _noise_marginal(self) -> Marginal:
-        """Return the marginal of the noise from a finer lattice of it, for some of the ratios."""
-        points, side = self._points, 1 + max(max(map(len, lattice.ratios)) for lattice in self._lattices)
-        keys, group = np.unique((points.lattice * side + points.second) * side + points.first, return_inverse=True)
-        shares_of_keys = np.asarray(np.bincount(group, self._weights), dtype=np.float64)
-        chosen = keys[systematic(shares_of_keys[None], NOISE_RATIOS)[0]]
-        values, shares = [], []
-        for place in np.unique(chosen // side**2):
-            own, width = chosen[chosen // side**2 == place], len(self._lattices[place].ratios[0])
-            fine = self._all_noise(self._best_noise(int(place))[own // side % side * width + own % side], finely=True)
-            row = np.repeat(np.arange(len(own)), len(fine.noise_sd) // len(own))
-            weight = np.exp(fine.log_weight - fine.log_weight.max())
-            values.append(fine.noise_sd)
-            shares.append(weight / np.bincount(row, weight)[row])
-        return marginal_of_logs(np.concatenate(values), np.concatenate(shares), 0.0)
+        """Return the marginal of the noise from its densities given the rest, at some of the points."""
+        chosen = systematic(self._weights[None], NOISE_ROWS)[0]
+        points, freedom = self._points[chosen], len(self.model.experiment) - len(self.model.linear)
+        logs = np.log(noise_grid(self.model, points, freedom, NOISES))
+        noise_sd, step = np.exp(logs), logs[1] - logs[0]
+        log_density = -freedom * logs - 0.5 * points.misfit[:, None] / noise_sd**2
+        for number in np.unique(self._node[chosen]):
+            own = self._node[chosen] == number
+            log_density[own] += log_prior_of_noise(self.model, self._nodes[number].ratios, noise_sd)
+        for place, symbol in enumerate(self.model.energy_symbols):
+            own = points.amplitudes[:, place] > 0
+            ratios = points.amplitudes[own, place] / points.noise_sd[own]
+            log_density[own] += log_prior_of_amplitude(self.model.priors[symbol], ratios[:, None] * noise_sd)
+        density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+        density /= density.sum(axis=1, keepdims=True) * step
+        return marginal_of_table(noise_sd, density.mean(axis=0) / noise_sd)
 
-    def _settings(self, points: _Points) -> FloatArray:
+    def _settings(self, points: Points, node: Places) -> FloatArray:
         """Return the nonlinear parameters (M, d)."""
         columns = dict(zip(self.model.energy_symbols, points.amplitudes.T, strict=True)) | {"noise_sd": points.noise_sd}
+        for place, symbol in enumerate(Outer(self.model).symbols):
+            values = np.array([each.outer[place] for each in self._nodes])[node]
+            columns[symbol] = values * (points.noise_sd if symbol in self._nodes[0].ratios else 1.0)
         return np.column_stack([columns[symbol] for symbol in self.model.nonlinear])
-
-    def _linear(self, points: _Points) -> tuple[FloatArray, FloatArray]:
-        """Return means (M, p) and roots (M, p, p) of the linear parameters, before their bounds."""
-        p = len(self.model.linear)
-        mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
-        for place in np.unique(points.lattice):
-            own = np.flatnonzero(points.lattice == place)
-            # Points that differ in the noise alone have the same mean, and roots in proportion.
-            size = len(self._lattices[place].ratios[0])
-            pair, group = np.unique(points.second[own] * size + points.first[own], return_inverse=True)
-            found, found_root = self._lattices[place].linear(self._index, pair // size, pair % size)
-            mean[own], root[own] = found[group], found_root[group] * points.noise_sd[own, None, None]
-        return mean, root
-
-    def _weigh(self) -> tuple[_Points, float]:
-        """Return the points that matter, and the error of their sum: from that of every second point."""
-        every = [self._best_noise(place) for place in range(len(self._lattices))]
-        top = max(float(points.log_weight.max()) for points in every)
-        every = [points[points.log_weight > top - IRRELEVANT] for points in every]
-        least = _least_that_matters(np.concatenate([np.exp(points.log_weight - top) for points in every]))
-        every = [points[np.exp(points.log_weight - top) >= least] for points in every]
-        if self.model.noise.parameters:
-            every = [self._all_noise(each) for each in every if len(each.lattice)]
-        points = _Points.joined(every)
-        mass = np.exp(points.log_weight - points.log_weight.max())
-        coarse = 0.0
-        for place, lattice in enumerate(self._lattices):
-            own = points.lattice == place
-            for grid, places in zip(lattice.ratios, (points.first, points.second), strict=True):
-                own = own & ((places % 2 == 0) | (len(grid) == 1))
-            coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[own].sum()
-        return points[mass >= _least_that_matters(mass)], float(abs(coarse / mass.sum() - 1) ** 1.5)
-
-    def _best_noise(self, place: int) -> _Points:
-        """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
-        lattice, noise = self._lattices[place], self.model.noise
-        second, first = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
-        if not noise.parameters:
-            return self._weighed(place, second, first, np.full(len(second), float(noise.sd({}, 0.0))))
-        low, high = self.model.priors["noise_sd"].quantile(LIKELY)
-        return self._weighed(place, second, first, np.clip(self._noise_modes(place, second, first), low, high))
-
-    def _noise_modes(self, place: int, second: Places, first: Places) -> FloatArray:
-        lattice = self._lattices[place]
-        return np.asarray(np.sqrt(lattice.misfit[second, first, self._index] / lattice.freedom))
-
-    def _all_noise(self, points: _Points, finely: bool = False) -> _Points:
-        """Return the points of a lattice with several values of the noise for each, row by row.
-
-        They are those of a Gauss rule for the likelihood's own shape. Where the prior cuts that or is narrower, and
-        where many are asked for, they are those of a Gauss-Legendre rule on what the prior leaves.
-        """
-        place = int(points.lattice[0])
-        prior, freedom = self.model.priors["noise_sd"], self._lattices[place].freedom
-        ends = np.log(np.maximum(prior.quantile(POSSIBLE), TINY))
-        mode = np.log(np.maximum(self._noise_modes(place, points.second, points.first), TINY))[:, None]
-        below, above = _reach(freedom)
-        low, high = mode - below, mode + above
-        if not finely and (low >= ends[0]).all() and (high <= ends[1]).all():
-            nodes, cells = _noise_rule(freedom)
-            logs = mode + nodes
-        else:
-            cut = np.maximum(low, ends[0]), np.minimum(high, ends[1])
-            keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
-            low, high = (np.where(keeps, own, end) for own, end in zip(cut, ends, strict=True))
-            nodes, cells = _legendre(MANY_NODES if finely else CUT_NODES)
-            logs, cells = low + (high - low) * 0.5 * (1 + nodes), (high - low) * 0.5 * cells
-        noise_sd = np.exp(logs).ravel()
-        second, first = (np.repeat(each, len(nodes)) for each in (points.second, points.first))
-        found = self._weighed(place, second, first, noise_sd)
-        log_cell = prior.log_density(noise_sd) + np.log(noise_sd * np.broadcast_to(cells, logs.shape).ravel())
-        return replace(found, log_weight=found.log_weight + log_cell)
-
-    def _weighed(self, place: int, second: Places, first: Places, noise_sd: FloatArray) -> _Points:
-        """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
-        lattice, symbols = self._lattices[place], self.model.energy_symbols
-        amplitudes = np.zeros((len(first), len(symbols)))
-        log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
-        chosen = ((lattice.ratios[0], first), (lattice.ratios[1], second))
-        for which, (grid, place_on_grid) in zip(lattice.member.places, chosen, strict=False):
-            amplitudes[:, which] = grid[place_on_grid] * noise_sd
-            prior = self.model.priors[symbols[which]]
-            # The first point stands for all smaller amplitudes, too, among which the density is constant.
-            cell = np.where(place_on_grid == 0, SMALLER, STEP)
-            log_weight += prior.log_density(amplitudes[:, which]) + np.log(cell * amplitudes[:, which])
-        return _Points(np.full(len(first), place), second, first, noise_sd, amplitudes, log_weight)
-
-
-def _least_that_matters(mass: FloatArray) -> float:
-    """Return the mass below which points hold next to nothing together."""
-    order = np.sort(mass)
-    return float(order[np.searchsorted(np.cumsum(order), LIGHT * order.sum())])
-
-
-def _reach(freedom: int) -> tuple[float, float]:
-    """Return how far log noise_sd reaches below its mode and above, given the ratios."""
-    unit = 1 / np.sqrt(2 * freedom)
-    return NOISE_BELOW * unit, (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
-
-
-@lru_cache(maxsize=2)
-def _legendre(count: int) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights of the Gauss-Legendre rule between -1 and 1."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return nodes, weights
-
-
-@lru_cache(maxsize=64)
-def _noise_rule(freedom: int) -> tuple[FloatArray, FloatArray]:
-    """Return nodes, as log noise_sd from its mode, and weights of the Gauss rule whose weight is the likelihood.
-
-    Given the ratios it is noise_sd^-f exp(-misfit / (2 noise_sd^2)): the same shape about its mode whatever the misfit.
-    It is divided out of the weights again. By the Stieltjes procedure and the Jacobi matrix (Golub & Welsch 1969).
-    """
-    below, above = _reach(freedom)
-    grid, step = np.linspace(-below, above, 4001, retstep=True)
-    share = np.exp(_log_shape(grid, freedom))
-    diagonal, beside = np.zeros(NOISE_NODES), np.zeros(NOISE_NODES)
-    before, now = np.zeros(len(grid)), np.full(len(grid), 1 / np.sqrt(share.sum()))
-    for k in range(NOISE_NODES):
-        diagonal[k] = (share * grid * now**2).sum()
-        further = (grid - diagonal[k]) * now - beside[k - 1] * before
-        beside[k] = np.sqrt((share * further**2).sum())
-        before, now = now, further / beside[k]
-    nodes, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1))
-    return nodes, step * share.sum() * vectors[0] ** 2 * np.exp(-_log_shape(nodes, freedom))
-
-
-def _log_shape(log_noise: FloatArray, freedom: int) -> FloatArray:
-    return np.asarray(-freedom * (log_noise + 0.5 * np.expm1(-2 * log_noise)))

@@ -1,21 +1,20 @@
 """One energy discrepancy on one design: the linear parameters given the ratios of its amplitudes to the noise.
 
-What costs anything, two decompositions for each ratio of the second block, depends on the stretches alone and serves
-all data sets; the ratio of the first block and the noise then enter by sums over a few directions.
+What costs most, a decomposition for each ratio of the second block, depends on the stretches alone: it serves all data
+sets and all exponents of the material. The ratio of the first block and the noise enter by sums over few directions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from math import log, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy import Member
-from tissuq.model import StatisticalModel
 
-__all__ = ["STEP", "Lattice"]
+__all__ = ["STEP", "Directions", "Lattice", "Reduced", "Rows"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -23,23 +22,131 @@ Places = NDArray[np.intp]
 STEP = 0.4
 """Of log g. The posterior of an amplitude that r directions tell has an sd of about 1 / sqrt(2 r) in its logarithm."""
 SMALLEST, LARGEST = 1e-3, 1e6
-"""Ratios of the discrepancy's stress (root mean square) to the noise between which the lattice lies, at least; and the
-probability of the amplitudes' priors below which it may begin."""
+"""Ratios of the discrepancy's stress (root mean square) to the noise between which the lattice lies, at least."""
 
 
-class Lattice:
-    """The posteriors of B data sets under one member, at every pair of ratios g = c / noise_sd of its amplitudes.
-
-    Points of the lattice are addressed by the places of the second block's ratio and of the first one's, (M,) each. A
-    block that is missing has the one ratio zero.
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Measurements over their relative noise, with everything given but linear parameters, amplitudes and noise_sd.
 
     Attributes
     ----------
-    member : Member
+    design : (n, p) array
+        Stresses of unit linear parameters.
+    stresses : (n, B) array
+        Of B data sets.
+    scale : (n,) array
+        Noise of every measurement over noise_sd; stresses are divided by it already.
+    """
+
+    design: FloatArray
+    stresses: FloatArray
+    scale: FloatArray
+
+    @property
+    def log_scale(self) -> float:
+        """Log of what division by the relative noise makes of a density."""
+        return float(np.log(self.scale).sum())
+
+
+class Reduced:
+    """The rows of B data sets and the features of one member, as a QR triangle.
+
+    Parameters
+    ----------
+    rows : Rows
     features : list of (n, r) arrays
         The stresses of each block's terms at the measurements.
+    """
+
+    def __init__(self, rows: Rows, features: list[FloatArray]) -> None:
+        self._parameters = rows.design.shape[1]
+        self._sizes = [each.shape[1] for each in features]
+        columns = np.hstack([rows.design, *(each / rows.scale[:, None] for each in features)])
+        basis, self._triangle = np.linalg.qr(columns)
+        self._data = basis.T @ rows.stresses
+
+    def everything(self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return means (M, q) and roots (M, q, q) of the material's parameters and the discrepancy's weights.
+
+        For any amplitudes (M, blocks) and noise (M,).
+        """
+        p, k, q = self._parameters, len(self._triangle), self._parameters + sum(self._sizes)
+        scale = np.ones((len(noise_sd), q))
+        scale[:, p:] = np.repeat(amplitudes, self._sizes, axis=1)
+        rows = np.zeros((len(noise_sd), k + q - p, q + 1))
+        rows[:, :k, :q] = self._triangle * (scale / noise_sd[:, None])[:, None]
+        rows[:, :k, q] = self._data[:, data_set] / noise_sd[:, None]
+        rows[:, k:, p:q] = np.eye(q - p)
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+        root = np.asarray(np.linalg.inv(triangle[:, :q, :q]), dtype=np.float64)
+        mean = (root @ triangle[:, :q, q:])[:, :, 0]
+        return mean * scale, root * scale[:, :, None]
+
+
+class Directions:
+    """One member on one design: directions in which its errors are independent, for every pair of ratios.
+
+    Parameters
+    ----------
+    member : Member
+    features : list of (n, r) arrays
+        The stresses of each block's terms at the measurements, over their relative noise.
+    least : float
+        A stress that counts as that of a block without stress in this mode.
+    unlikely : list of float
+        For each block, a ratio g = c / noise_sd below which it is not likely to be before the data.
+    step, shift : float
+        Of log g: between points of the lattice, and from where it would begin.
+
+    Attributes
+    ----------
     ratios : tuple of (G1,) and (G2,) arrays
-        Of the first and the second block.
+        Of the first and the second block; a block that is missing has the one ratio zero.
+    step : float
+    """
+
+    def __init__(
+        self,
+        member: Member,
+        features: list[FloatArray],
+        least: float,
+        unlikely: list[float],
+        step: float = STEP,
+        shift: float = 0.0,
+    ) -> None:
+        self.member, self.step = member, step
+        sizes = (max(float(np.sqrt((each**2).sum(axis=1).mean())), least) for each in features)
+        pairs = zip(sizes, unlikely, strict=True)
+        grids = [*(_grid(size, low, step, shift) for size, low in pairs), *[np.zeros(1)] * 2]
+        self.ratios = grids[0], grids[1]
+        n, r = len(features[0]) if features else 0, features[0].shape[1] if features else 0
+        self.basis, triangle = np.linalg.qr(np.hstack([np.zeros((n, 0)), *features]))
+        first, second = np.split(triangle, [r], axis=1)
+        # White in the second block, for all of its ratios, and then in the first.
+        values, vectors = np.linalg.eigh(second @ second.T)
+        scale = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
+        left, singular, _ = np.linalg.svd((vectors.T @ first) / np.sqrt(scale)[:, :, None])
+        self.white = left.swapaxes(1, 2) @ (vectors.T / np.sqrt(scale)[:, :, None])
+        beyond = np.zeros((len(singular), scale.shape[1] - singular.shape[1]))
+        self.variance = 1 + (self.ratios[0][:, None] * np.hstack([singular, beyond])[:, None]) ** 2
+        self.log_size = 0.5 * (np.log(scale).sum(axis=1)[:, None] + np.log(self.variance).sum(axis=2))
+
+
+class Lattice:
+    """The posteriors of B data sets under one member, at every pair of ratios of its amplitudes to the noise.
+
+    Points of the lattice are addressed by the places of the second block's ratio and of the first one's, (M,) each.
+
+    Parameters
+    ----------
+    directions : Directions
+    rows : Rows
+
+    Attributes
+    ----------
+    parameters : int
+        Number of linear parameters.
     freedom : int
         Measurements less linear parameters.
     misfit : (G2, G1, B) array, MPa^2
@@ -48,45 +155,29 @@ class Lattice:
         Half the log determinant of everything but the noise.
     """
 
-    def __init__(self, models: Sequence[StatisticalModel], member: Member) -> None:
-        model = models[0]
-        self.member = member
-        self.features = member.stress_features(model.experiment.mode, model.experiment.stretch)
-        self._p = model.design.shape[1]
-        self.freedom = len(model.experiment) - self._p
-        stresses = np.array([each.experiment.stress for each in models]).T
-        basis, self._triangle = np.linalg.qr(np.hstack([model.design, *self.features]))
-        self._data = basis.T @ stresses
-        outside = ((stresses - basis @ self._data) ** 2).sum(axis=0)
-        least = float(np.sqrt((model.design**2).mean()))  # a block may have no stress at all in this mode
-        sizes = (max(float(np.sqrt((each**2).sum(axis=1).mean())), least) for each in self.features)
-        pairs = zip(sizes, _unlikely_ratios(models, member), strict=True)
-        grids = [*(_grid(size, unlikely) for size, unlikely in pairs), *[np.zeros(1)] * 2]
-        self.ratios = grids[0], grids[1]
-
-        p, r = self._p, self.features[0].shape[1] if self.features else 0
-        material, first, second = np.split(self._triangle, [p, p + r], axis=1)
-        # White in the second block, for all of its ratios.
-        values, vectors = np.linalg.eigh(second @ second.T)
-        scale = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
-        material, first, data = (
-            (vectors.T @ columns) / np.sqrt(scale)[:, :, None] for columns in (material, first, self._data)
-        )
-        # Without the material, of which the prior is flat.
-        basis, triangle = np.linalg.qr(material)
-        project = basis.swapaxes(1, 2)
-        on_first, self._on_data = project @ first, project @ data
-        rest = data - basis @ self._on_data
-        left, self._singular, right = np.linalg.svd(first - basis @ on_first, full_matrices=False)
-        self._along = left.swapaxes(1, 2) @ rest
-        self._tilt = on_first @ right.swapaxes(1, 2)
-        self._inverse = np.linalg.inv(triangle)
-        # White in the first block, direction by direction.
-        self._variance = 1 + (self.ratios[0][:, None] * self._singular[:, None]) ** 2
-        beyond = ((rest - left @ self._along) ** 2).sum(axis=1) + outside
-        self.misfit = beyond[:, None] + np.einsum("sfr,srb->sfb", 1 / self._variance, self._along**2)
-        size = 0.5 * np.log(scale).sum(axis=1) + np.log(np.abs(np.einsum("sii->si", triangle))).sum(axis=1)
-        self.log_size = size[:, None] + 0.5 * np.log(self._variance).sum(axis=2)
+    def __init__(self, directions: Directions, rows: Rows) -> None:
+        self.member, self.ratios, self.step = directions.member, directions.ratios, directions.step
+        n, self.parameters = rows.design.shape
+        self.freedom = n - self.parameters
+        # The material's part of the data and what it leaves, within the span of the features and outside.
+        basis, triangle = np.linalg.qr(rows.design)
+        self._inverse, self._fit = np.linalg.inv(triangle), basis.T @ rows.stresses
+        columns = np.hstack([basis, rows.stresses - basis @ self._fit])
+        inside = directions.basis.T @ columns
+        outside = columns - directions.basis @ inside
+        own, rest = np.split(directions.white @ inside, [self.parameters], axis=2)
+        own_outside, rest_outside = np.split(outside, [self.parameters], axis=1)
+        weight = 1 / directions.variance
+        weighted = weight[:, :, :, None] * own[:, None]
+        precision = weighted.swapaxes(2, 3) @ own[:, None] + own_outside.T @ own_outside
+        pull = weighted.swapaxes(2, 3) @ rest[:, None] + own_outside.T @ rest_outside
+        size = weight @ rest**2 + (rest_outside**2).sum(axis=0)
+        tiny = 1e-15 * np.trace(precision, axis1=2, axis2=3)[:, :, None, None] * np.eye(self.parameters)
+        self._root = np.linalg.inv(np.linalg.cholesky(precision + tiny)).swapaxes(2, 3)
+        self._pulled = self._root.swapaxes(2, 3) @ pull
+        self.misfit = np.maximum(size - (self._pulled**2).sum(axis=2), 0.0)
+        log_root = np.log(np.einsum("sfpp->sfp", self._root)).sum(axis=2)
+        self.log_size = directions.log_size - log_root + np.log(np.abs(np.diag(triangle))).sum() + rows.log_scale
 
     def log_likelihood(self, data_set: int, second: Places, first: Places, noise_sd: FloatArray) -> FloatArray:
         """Return log p(y | ratios, noise_sd) (M,), the linear parameters integrated with density one."""
@@ -96,53 +187,12 @@ class Lattice:
 
     def linear(self, data_set: int, second: Places, first: Places) -> tuple[FloatArray, FloatArray]:
         """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise."""
-        variance, square = self._variance[second, first], self.ratios[0][first, None] ** 2
-        tilt, inverse = self._tilt[second], self._inverse[second]
-        weights = square * self._singular[second] / variance * self._along[second, :, data_set]
-        mean = self._on_data[second, :, data_set] - np.einsum("mpr,mr->mp", tilt, weights)
-        spread = tilt * np.sqrt(square / variance)[:, None]
-        eye = np.broadcast_to(np.eye(self._p), (len(second), self._p, self._p))
-        wide = inverse @ np.concatenate([eye, spread], axis=2)
-        triangle = np.asarray(np.linalg.qr(wide.swapaxes(1, 2), mode="r"), dtype=np.float64)
-        return np.einsum("mpq,mq->mp", inverse, mean), triangle.swapaxes(1, 2)
-
-    def everything(self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return means (M, q) and roots (M, q, q) of the material's parameters and the discrepancy's weights.
-
-        For any amplitudes (M, blocks) and noise (M,); the weights are those of `features`.
-        """
-        sizes = [each.shape[1] for each in self.features]
-        k, q = len(self._triangle), self._p + sum(sizes)
-        scale = np.ones((len(noise_sd), q))
-        scale[:, self._p :] = np.repeat(amplitudes, sizes, axis=1)
-        rows = np.zeros((len(noise_sd), k + q - self._p, q + 1))
-        rows[:, :k, :q] = self._triangle * (scale / noise_sd[:, None])[:, None]
-        rows[:, :k, q] = self._data[:, data_set] / noise_sd[:, None]
-        rows[:, k:, self._p : q] = np.eye(q - self._p)
-        triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
-        root = np.asarray(np.linalg.inv(triangle[:, :q, :q]), dtype=np.float64)
-        mean = (root @ triangle[:, :q, q:])[:, :, 0]
-        return mean * scale, root * scale[:, :, None]
+        root = self._root[second, first]
+        shift = (root @ self._pulled[second, first, :, data_set][:, :, None])[:, :, 0]
+        return (self._fit[:, data_set] + shift) @ self._inverse.T, self._inverse @ root
 
 
-def _unlikely_ratios(models: Sequence[StatisticalModel], member: Member) -> list[float]:
-    """Return for each block a ratio below which its amplitude is not likely to be before the data."""
-    found = []
-    for place in member.places:
-        symbol = models[0].energy_symbols[place]
-        noise = (_noise(model) for model in models)
-        found.append(min(float(m.priors[symbol].quantile(SMALLEST)) / sd for m, sd in zip(models, noise, strict=True)))
-    return found
-
-
-def _noise(model: StatisticalModel) -> float:
-    """Return the noise, or the most that it can be."""
-    if not model.noise.parameters:
-        return float(model.noise.sd({}, 0.0))
-    return float(np.sqrt((model.experiment.stress**2).mean()))
-
-
-def _grid(size: float, unlikely: float) -> FloatArray:
+def _grid(size: float, unlikely: float, step: float, shift: float) -> FloatArray:
     """Return the ratios of a block whose terms have a stress of some size (root mean square)."""
-    smallest, largest = min(SMALLEST / size, unlikely), LARGEST / size
-    return np.asarray(smallest * np.exp(STEP * np.arange(int(log(largest / smallest) / STEP) + 1)))
+    smallest, largest = min(SMALLEST / size, unlikely) * np.exp(shift), LARGEST / size
+    return np.asarray(smallest * np.exp(step * np.arange(int(log(largest / smallest) / step) + 1)))

@@ -21,6 +21,7 @@ __all__ = [
     "marginal_of_mixture",
     "marginal_of_points",
     "marginal_of_quadrature",
+    "marginal_of_table",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -230,8 +231,8 @@ def marginal_of_points(
 ) -> Marginal:
     """Return the marginal of weighted points within bounds, by a kernel estimate that keeps their variance.
 
-    Silverman's bandwidth, unless another is given; points near a bound are mirrored there, and elsewhere drawn towards the mean by what the
-    kernel adds to the variance.
+    Silverman's bandwidth, unless another is given; points near a bound are mirrored there, and elsewhere drawn towards
+    the mean by what the kernel adds to the variance.
     """
     weights = weights / weights.sum()
     mean = float(weights @ points)
@@ -272,6 +273,16 @@ def marginal_of_logs(values: FloatArray, weights: FloatArray, step: float) -> Ma
     points = np.exp(smooth.points)
     share = float(weights[positive].sum())
     return Marginal(mean, sd, points, share * smooth.density / points, _proper(1 - share + share * smooth.cumulative))
+
+
+def marginal_of_table(points: FloatArray, density: FloatArray) -> Marginal:
+    """Return the marginal of which the density (k,) is known at points (k,), up to a factor."""
+    weights = 0.5 * (density[1:] + density[:-1]) * np.diff(points)
+    middle = 0.5 * (points[1:] + points[:-1])
+    mean = float(weights @ middle / weights.sum())
+    sd = float(np.sqrt(weights @ (middle - mean) ** 2 / weights.sum()))
+    cumulative = np.concatenate([[0.0], np.cumsum(weights)])
+    return Marginal(mean, sd, points, density / weights.sum(), _proper(cumulative))
 
 
 def _grid(values: FloatArray, weights: FloatArray, ends: tuple[float, float], count: int) -> FloatArray:

@@ -1,0 +1,151 @@
+"""Posteriors under an energy discrepancy, given the parameters that no lattice sums over, and where to take these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.amplitudes import Points, Weighing
+from tissuq.inference.lattice import STEP, Directions, Lattice
+from tissuq.inference.outer import Outer, plain_rows, relative_error, weighted_settings
+from tissuq.inference.resampling import systematic
+from tissuq.mechanics.path import invariant_rates
+from tissuq.model import StatisticalModel
+
+__all__ = ["OUTER_STEP", "Node", "features_of", "single_nodes", "weighted_nodes"]
+
+FloatArray = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+UNLIKELY = 1e-3
+"""Probability of an amplitude's prior below which a lattice may begin."""
+OUTER_STEP, BEGINNINGS = 2 * STEP, 4
+"""Step of the lattices at values of the outer parameters, and how many places they begin at in turn: so their errors
+are of either sign and cancel."""
+OF_NODE = 2000
+"""Points kept of each value."""
+SCOUTS = 6
+"""Members, about, whose posterior guides the search for the values."""
+GOLDEN = 0.6180339887
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """The posterior at one value of the outer parameters, (d,): points, of which ``lattice`` is the member's place.
+
+    Attributes
+    ----------
+    mean, root : (M, p) and (M, p, p) arrays
+        Of the linear parameters at the points, before their bounds.
+    error : float
+        Relative error of the points' sum.
+    ratios : mapping of str to float
+        Those of the noise's parameters to noise_sd.
+    """
+
+    points: Points
+    mean: FloatArray
+    root: FloatArray
+    error: float
+    outer: FloatArray = field(default_factory=lambda: np.zeros(0))
+    ratios: Mapping[str, float] = field(default_factory=dict)
+
+
+def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
+    """Return the posteriors of models on the same stretches that have no outer parameters."""
+    rows = plain_rows(models)
+    lattices = [Lattice(_directions(models, rows.scale, place), rows) for place in range(len(models[0].energy_members))]
+    found = []
+    for index, model in enumerate(models):
+        points, error = Weighing(model, lattices, index).points()
+        found.append(Node(points, *_linear(lattices, index, points), error))
+    return found
+
+
+def weighted_nodes(model: StatisticalModel) -> tuple[list[Node], FloatArray, float]:
+    """Return nodes at quasi-random values of the outer parameters, their log weights, and their evidence's error."""
+    outer = Outer(model)
+    members = np.arange(len(model.energy_members))
+    scouts = members[:: -(-len(members) // SCOUTS)]
+    sums = _Sums(model, outer)
+    settings, log_weights = weighted_settings(
+        outer, lambda values: float(np.logaddexp.reduce(sums.points(values, scouts).log_weight))
+    )
+    nodes = [sums.node(values, members) for values in settings]
+    masses = log_weights + np.array([np.logaddexp.reduce(node.points.log_weight) for node in nodes])
+    return nodes, log_weights, relative_error(outer, masses)
+
+
+class _Sums:
+    """The posterior of one model at any value of its outer parameters."""
+
+    def __init__(self, model: StatisticalModel, outer: Outer) -> None:
+        self._model, self._outer, self._calls = model, outer, 0
+        self._known: dict[tuple[int, int], Directions] = {}
+
+    def points(self, settings: FloatArray, members: Places) -> Points:
+        """Return the points that matter; ``lattice`` is a place among the members."""
+        return Weighing(self._model, self._lattices(settings, members), 0, self._outer.ratios(settings)).points()[0]
+
+    def node(self, settings: FloatArray, members: Places) -> Node:
+        """Return the posterior of all but the outer parameters, by at most `OF_NODE` points of the same weight."""
+        lattices, ratios = self._lattices(settings, members), self._outer.ratios(settings)
+        points, error = Weighing(self._model, lattices, 0, ratios).points()
+        if len(points.lattice) > OF_NODE:
+            total = np.logaddexp.reduce(points.log_weight)
+            offset = GOLDEN * self._calls % 1
+            points = points[systematic(np.exp(points.log_weight - total)[None], OF_NODE, offset)[0]]
+            points = replace(points, log_weight=np.full(OF_NODE, total - np.log(OF_NODE)))
+        mean, root = _linear(lattices, 0, points)
+        return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)
+
+    def _lattices(self, settings: FloatArray, members: Places) -> list[Lattice]:
+        rows, turn = self._outer.rows(settings), self._calls % BEGINNINGS
+        self._calls += 1
+        return [Lattice(self._directions(rows.scale, int(place), turn), rows) for place in members]
+
+    def _directions(self, scale: FloatArray, place: int, turn: int) -> Directions:
+        """Return the directions of one member, remembered while the relative noise stays the same."""
+        found = self._known.get((place, turn))
+        if found is None or self._outer.of_noise.any():
+            shift = OUTER_STEP * (turn + 0.5) / BEGINNINGS
+            found = self._known[place, turn] = _directions([self._model], scale, place, OUTER_STEP, shift)
+        return found
+
+
+def _directions(
+    models: Sequence[StatisticalModel], scale: FloatArray, place: int, step: float = STEP, shift: float = 0.0
+) -> Directions:
+    """Return the directions of one member, the same for all models."""
+    member = models[0].energy_members[place]
+    symbols = [models[0].energy_symbols[block] for block in member.places]
+    unlikely = [min(float(m.priors[s].quantile(UNLIKELY)) / _most_noise(m) for m in models) for s in symbols]
+    features = [each / scale[:, None] for each in features_of(models[0], place)]
+    unit, _ = invariant_rates(models[0].experiment.mode, models[0].experiment.stretch)
+    return Directions(member, features, float(np.sqrt((unit**2).mean())), unlikely, step, shift)
+
+
+def features_of(model: StatisticalModel, place: int) -> list[FloatArray]:
+    """Return the stresses (n, r) of each term of a member's blocks at the measurements."""
+    return model.energy_members[place].stress_features(model.experiment.mode, model.experiment.stretch)
+
+
+def _most_noise(model: StatisticalModel) -> float:
+    """Return the noise, or the most that it can be."""
+    if not model.noise.parameters:
+        return float(model.noise.sd({}, 0.0))
+    return float(np.sqrt((model.experiment.stress**2).mean()))
+
+
+def _linear(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[FloatArray, FloatArray]:
+    """Return means (M, p) and roots (M, p, p) of the linear parameters, before their bounds."""
+    p = lattices[0].parameters
+    mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
+    for place in np.unique(points.lattice):
+        own = np.flatnonzero(points.lattice == place)
+        found, found_root = lattices[place].linear(index, points.second[own], points.first[own])
+        mean[own], root[own] = found, found_root * points.noise_sd[own, None, None]
+    return mean, root
