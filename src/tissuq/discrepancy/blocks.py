@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 
-__all__ = ["EnergyBlock", "LogBlock", "SplineBlock", "TaylorBlock", "ValanisLandelBlock", "ZeroModulusBlock"]
+__all__ = [
+    "EnergyBlock",
+    "HenckyBlock",
+    "LogBlock",
+    "SecondInvariantBlock",
+    "SplineBlock",
+    "TaylorBlock",
+    "ValanisLandelBlock",
+    "ZeroModulusBlock",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -154,7 +163,7 @@ class TaylorBlock(InvariantBlock):
 
     name = "taylor"
     formula = "W1 = c g(x), cov g = exp(x x' / L^2) - 1, x = I1 - 3"
-    lengths = (0.4, 0.6, 0.9, 1.4, 2.1, 3.2)
+    lengths = (0.4, 0.8, 1.6, 3.2)
 
     def coordinate(self, x: FloatArray) -> FloatArray:
         return x
@@ -168,7 +177,7 @@ class LogBlock(InvariantBlock):
 
     name = "log"
     formula = "W1 = c g(log(1 + x)), cov g squared exponential given g(0) = 0, x = I1 - 3"
-    lengths = (0.15, 0.25, 0.4, 0.7, 1.2, 2.0)
+    lengths = (0.15, 0.36, 0.83, 2.0)
 
     def coordinate(self, x: FloatArray) -> FloatArray:
         return np.log1p(x)
@@ -193,18 +202,58 @@ class SplineBlock(InvariantBlock):
         return np.asarray(one * other + least**3 + 1.5 * np.abs(one - other) * least**2)
 
 
-class ValanisLandelBlock(ProcessBlock):
-    """dW = sum_k w(l_k) with l w'(l) = c q(ln l): a squared exponential conditioned on q(0) = q'(0) = 0."""
+class SecondInvariantBlock(ProcessBlock):
+    """dW(I2), its initial modulus taken out by I1: W2 = c g(y), W1 = -c g(0) with independent Taylor coefficients of g.
+
+    The zero-modulus Mooney-Rivlin term is its limit for a large length scale.
+    """
+
+    name = "second-invariant"
+    formula = "W2 = c g(y), W1 = -c g(0), cov g = exp(y y' / L^2), y = I2 - 3"
+    lengths = (0.7, 1.6, 3.7)
+
+    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        _, y = invariants(mode, stretch)
+        first, second = invariant_rates(mode, stretch)
+        return np.stack([np.maximum(y, 0.0), np.zeros_like(y)], axis=1), np.stack([second, -first], axis=1)
+
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        return np.asarray(np.exp(np.minimum(first * second / length**2, LARGEST_EXPONENT)))
+
+
+class SeparableBlock(ProcessBlock):
+    """dW = sum_k w(l_k) with l w'(l) = c q(ln l), where q(0) = q'(0) = 0."""
+
+    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return log_stretches(mode, stretch)
+
+
+class HenckyBlock(SeparableBlock):
+    """q has independent normal Taylor coefficients in the logarithmic (Hencky) strain: an infinite Ogden."""
+
+    name = "hencky"
+    formula = "sum_k w(l_k), l w'(l) = c q(e), cov q = exp(e e' / L^2) - 1 - e e' / L^2, e = ln l"
+    lengths = (0.3, 0.65, 1.4)
+
+    def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
+        exponent = np.minimum(first * second / length**2, LARGEST_EXPONENT)
+        return np.asarray(np.where(np.abs(exponent) < 1e-3, _series(exponent), np.expm1(exponent) - exponent))
+
+
+class ValanisLandelBlock(SeparableBlock):
+    """q is a squared exponential conditioned on q(0) = q'(0) = 0."""
 
     name = "valanis-landel"
     formula = "sum_k w(l_k), l w'(l) = c q(ln l), cov q squared exponential given q(0) = q'(0) = 0"
     lengths = (0.2, 0.35, 0.6, 1.0, 1.7)
 
-    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return log_stretches(mode, stretch)
-
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
         return _given_zero(first / length, second / length, 1)
+
+
+def _series(exponent: FloatArray) -> FloatArray:
+    """Return exp(x) - 1 - x for small x, with its digits."""
+    return exponent**2 / 2 * (1 + exponent / 3 * (1 + exponent / 4))
 
 
 def _given_zero(one: FloatArray, other: FloatArray, derivatives: int) -> FloatArray:

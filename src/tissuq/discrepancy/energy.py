@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy.blocks import (
     EnergyBlock,
+    HenckyBlock,
     LogBlock,
+    SecondInvariantBlock,
     SplineBlock,
     TaylorBlock,
     ValanisLandelBlock,
@@ -32,6 +34,13 @@ AMPLITUDES = tuple(
     for symbol, place in (("c1", "first"), ("c2", "second"))
 )
 SOURCE = "tissuq (energy discrepancy)"
+
+
+class Sum(NamedTuple):
+    """Blocks in the order of the amplitudes, None where there is none with that amplitude, and the prior odds."""
+
+    blocks: tuple[EnergyBlock | None, ...]
+    odds: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -67,8 +76,8 @@ class Member:
 class EnergyDiscrepancy(Discrepancy):
     """A random strain energy of zero energy, stress and modulus at the reference, averaged over some sums of blocks.
 
-    Every sum has the same prior probability, and so has every length scale of its blocks; the posterior is the mixture
-    that the evidence weights. Each block has an amplitude, half-Cauchy with the data's pilot modulus as its scale.
+    Every length scale of a sum's blocks has the same prior probability; the posterior is the mixture that the evidence
+    weights. Each block has an amplitude, half-Cauchy with the data's pilot modulus as its scale.
     """
 
     source = SOURCE
@@ -77,18 +86,17 @@ class EnergyDiscrepancy(Discrepancy):
         "The initial shear modulus is the material's own; its other parameters (such as C20) share their meaning with "
         "the discrepancy. It covers an error of the material, not of the test: a wrong area or gauge length scales all."
     )
-    sums: ClassVar[tuple[tuple[EnergyBlock | None, ...], ...]]
-    """Blocks in the order of the amplitudes; None where a sum has no block with that amplitude."""
+    sums: ClassVar[tuple[Sum, ...]]
 
     def members(self, mode: LoadingMode, stretch: FloatArray) -> list[Member]:
         """Return every sum of blocks at every combination of their length scales, over the range of stretches (n,)."""
-        found = []
-        for every in self.sums:
+        found, total = [], sum(each.odds for each in self.sums)
+        for every, odds in self.sums:
             places = tuple(place for place, block in enumerate(every) if block is not None)
             blocks = tuple(block for block in every if block is not None)
             reaches = tuple(block.reach(mode, stretch) for block in blocks)
             choices = list(product(*(block.lengths for block in blocks)))
-            probability = 1 / (len(self.sums) * len(choices))
+            probability = odds / total / len(choices)
             found += [Member(blocks, places, lengths, reaches, probability) for lengths in choices]
         return found
 
@@ -104,7 +112,7 @@ class Taylor(_Single):
 
     name = TaylorBlock.name
     formula = TaylorBlock.formula
-    sums = ((TaylorBlock(),),)
+    sums = (Sum((TaylorBlock(),)),)
 
 
 class Logarithmic(_Single):
@@ -112,7 +120,7 @@ class Logarithmic(_Single):
 
     name = LogBlock.name
     formula = LogBlock.formula
-    sums = ((LogBlock(),),)
+    sums = (Sum((LogBlock(),)),)
 
 
 class Spline(_Single):
@@ -120,7 +128,7 @@ class Spline(_Single):
 
     name = SplineBlock.name
     formula = SplineBlock.formula
-    sums = ((SplineBlock(),),)
+    sums = (Sum((SplineBlock(),)),)
 
 
 class ZeroModulus(_Single):
@@ -128,7 +136,23 @@ class ZeroModulus(_Single):
 
     name = ZeroModulusBlock.name
     formula = ZeroModulusBlock.formula
-    sums = ((ZeroModulusBlock(),),)
+    sums = (Sum((ZeroModulusBlock(),)),)
+
+
+class SecondInvariant(_Single):
+    """An infinite series in I2 - 3, its initial modulus taken out by I1."""
+
+    name = SecondInvariantBlock.name
+    formula = SecondInvariantBlock.formula
+    sums = (Sum((SecondInvariantBlock(),)),)
+
+
+class Hencky(_Single):
+    """A separable function of the principal stretches: an infinite Ogden."""
+
+    name = HenckyBlock.name
+    formula = HenckyBlock.formula
+    sums = (Sum((HenckyBlock(),)),)
 
 
 class ValanisLandel(_Single):
@@ -136,7 +160,7 @@ class ValanisLandel(_Single):
 
     name = ValanisLandelBlock.name
     formula = ValanisLandelBlock.formula
-    sums = ((ValanisLandelBlock(),),)
+    sums = (Sum((ValanisLandelBlock(),)),)
 
 
 @dataclass(frozen=True)
@@ -148,9 +172,9 @@ class EnergySum(EnergyDiscrepancy):
     parameters = AMPLITUDES
 
     @property
-    def sums(self) -> tuple[tuple[EnergyBlock | None, ...], ...]:  # type: ignore[override]  # of the object, not the class
+    def sums(self) -> tuple[Sum, ...]:  # type: ignore[override]  # of the object, not the class
         """The one sum."""
-        return (self.blocks,)
+        return (Sum(self.blocks),)
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -163,40 +187,48 @@ class EnergySum(EnergyDiscrepancy):
         return "; and ".join(block.formula for block in self.blocks)
 
 
-FIRST, SECOND = (TaylorBlock(), LogBlock()), (ZeroModulusBlock(), ValanisLandelBlock())
-PAIRS = tuple(product(FIRST, SECOND))
+FIRST, SECOND = (TaylorBlock(), LogBlock()), (SecondInvariantBlock(), HenckyBlock())
+PAIRS = tuple(Sum(pair) for pair in product(FIRST, SECOND))
+SINGLES: tuple[tuple[EnergyBlock | None, ...], ...] = (
+    *((block, None) for block in FIRST),
+    *((None, block) for block in SECOND),
+)
 
 
 class Auto(EnergyDiscrepancy):
-    """The evidence decides: the average of {taylor, log} x {zero-modulus, valanis-landel}."""
+    """The evidence decides: the average of {taylor, log} + {second-invariant, hencky}, and of their single blocks.
+
+    A single block has a quarter of the prior odds of a sum.
+    """
 
     name = "auto"
-    formula = "average of {taylor, log} + {zero-modulus, valanis-landel}, by evidence"
+    formula = "average of {taylor, log} + {second-invariant, hencky} and, at a quarter of their odds, each one alone"
     parameters = AMPLITUDES
-    sums = PAIRS
+    sums = (*PAIRS, *(Sum(blocks, 0.25) for blocks in SINGLES))
 
 
 class AutoBalanced(EnergyDiscrepancy):
-    """The average of the same sums and of their single blocks: narrower, and more often wrong."""
+    """The average of the same at equal odds: narrower, and more often wrong."""
 
     name = "auto-balanced"
-    formula = "average of auto's sums and their single blocks, by evidence"
+    formula = "average of the sums and single blocks of auto at equal odds"
     parameters = AMPLITUDES
-    sums = (*PAIRS, *((block, None) for block in FIRST), *((None, block) for block in SECOND))
+    sums = (*PAIRS, *map(Sum, SINGLES))
 
 
 class AutoSharp(EnergyDiscrepancy):
     """The average of the same, and of no discrepancy: narrowest, and wrong where a small discrepancy hides in noise."""
 
     name = "auto-sharp"
-    formula = "average of auto-balanced and no discrepancy, by evidence"
+    formula = "average of auto-balanced and no discrepancy"
     parameters = AMPLITUDES
-    sums = (*AutoBalanced.sums, ())
+    sums = (*AutoBalanced.sums, Sum(()))
 
 
 def energy_sum(names: str) -> EnergySum | None:
     """Return the sum of two blocks named with a plus sign between them, or None when these are other names."""
-    known = {block.name: block for block in (*FIRST, *SECOND, SplineBlock())}
+    others = (SplineBlock(), ZeroModulusBlock(), ValanisLandelBlock())
+    known = {block.name: block for block in (*FIRST, *SECOND, *others)}
     parts = [part.strip() for part in names.split("+")]
     if len(parts) < 2 or not any(part in known for part in parts):
         return None

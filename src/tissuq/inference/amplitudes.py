@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.lattice import Lattice
+from tissuq.inference.lattice import Lattice, times_gaussians
 from tissuq.model import StatisticalModel
 from tissuq.priors import Prior
 
@@ -141,6 +141,10 @@ class Weighing:
         lattice, symbols = self._lattices[place], self._model.energy_symbols
         amplitudes = np.zeros((len(first), len(symbols)))
         log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
+        priors = [self._model.priors[symbol] for symbol in self._model.linear]
+        if any(prior.gaussian and prior.gaussian[1] for prior in priors):
+            mean, root = lattice.linear(self._index, second, first)
+            log_weight += times_gaussians(mean, root * noise_sd[:, None, None], priors)[2]
         chosen = ((lattice.ratios[0], first), (lattice.ratios[1], second))
         for which, (grid, place_on_grid) in zip(lattice.member.places, chosen, strict=False):
             amplitudes[:, which] = grid[place_on_grid] * noise_sd

@@ -24,7 +24,7 @@ from tissuq.inference.amplitudes import (
 )
 from tissuq.inference.bounds import bounded
 from tissuq.inference.box import Boxes
-from tissuq.inference.lattice import STEP, Reduced
+from tissuq.inference.lattice import STEP, Reduced, times_gaussians
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
 from tissuq.inference.nodes import OUTER_STEP, Node, features_of, single_nodes, weighted_nodes
 from tissuq.inference.outer import Outer
@@ -50,16 +50,11 @@ NOISE_ROWS, NOISES = 1000, 400
 
 def why_no_energies(model: StatisticalModel) -> str:
     """Return why an energy discrepancy cannot be integrated with the rest of a model, or nothing where it can."""
-    if not model.linear:
-        return "no parameter is left that is linear with such a prior"
     for symbol in model.energy_symbols:
         if _lattice_error(model.priors[symbol]) > MOST_PRIOR_ERROR:
             return (
                 f"the prior {model.priors[symbol]} of {symbol} has a bound or is narrow, where a wide positive one is"
             )
-    gaussians = (model.priors[symbol].gaussian for symbol in model.linear)
-    if any(each is not None and each[1] for each in gaussians):
-        return "a linear parameter has a Gaussian prior, where only uniform and flat ones are integrated"
     return ""
 
 
@@ -95,9 +90,8 @@ def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[En
     reason = why_no_energies(models[0])
     if reason:
         raise ModelError(
-            f"discrepancy '{models[0].discrepancy.name}' needs uniform or flat priors on the parameters in which the "
-            f"stress is linear, and wide positive ones on its amplitudes. Here {reason}: choose otherwise, or another "
-            "discrepancy."
+            f"discrepancy '{models[0].discrepancy.name}' needs wide positive priors on its amplitudes. Here {reason}: "
+            "choose otherwise, or another discrepancy."
         )
     with one_thread():
         if Outer(models[0]).symbols:
@@ -131,7 +125,8 @@ class EnergySolution(Solution):
         points = Points.joined([node.points for node in nodes])
         self._node = np.repeat(np.arange(len(nodes)), [len(node.points.lattice) for node in nodes])
         mean, root = (np.concatenate([getattr(node, name) for node in nodes]) for name in ("mean", "root"))
-        supports = np.array([model.priors[symbol].support for symbol in model.linear])
+        priors = [model.priors[symbol] for symbol in model.linear]
+        supports = np.reshape([prior.support for prior in priors], (-1, 2))
         self._box = Boxes(supports[None, :, 0], supports[None, :, 1])
         beyond = self._box.beyond(mean, root)
         near = np.flatnonzero(beyond.sum(axis=1) > TOUCHED)
@@ -145,7 +140,10 @@ class EnergySolution(Solution):
         settings = self._settings(points, self._node)
         self._bounded = bounded(Components(self._weights, settings, mean, root), beyond, self._box)
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
-            self.log_evidence = float(top + np.log(total) - np.log(np.diff(supports, axis=1)).sum())
+            heights = sum(
+                gaussian[2] for gaussian in (prior.gaussian for prior in priors) if gaussian and not gaussian[1]
+            )
+            self.log_evidence = float(top + np.log(total) + heights)
             of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
             self.log_evidence_error = float(error + of_sums + self._weights @ error_of_mass + LIGHT)
 
@@ -185,12 +183,15 @@ class EnergySolution(Solution):
         features = {int(place): features_of(self.model, place) for place in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
+        priors = [self.model.priors[symbol] for symbol in self.model.linear]
         for number in np.unique(node):
             rows = Outer(self.model).rows(self._nodes[number].outer)
             for place in np.unique(points.lattice[node == number]):
                 own = np.flatnonzero((node == number) & (points.lattice == place))
                 amplitudes = points.amplitudes[own][:, list(self.model.energy_members[place].places)]
-                found, found_root = Reduced(rows, features[place]).everything(0, amplitudes, points.noise_sd[own])
+                reduced = Reduced(rows, features[place])
+                found, found_root = reduced.everything(0, amplitudes, points.noise_sd[own])
+                found, found_root, _ = times_gaussians(found, found_root, priors)
                 q = found.shape[1]
                 mean[own, :q], root[own, :q, :q] = found, found_root
         whole = Components(weights, self._settings(points, node), mean, root, points.lattice)

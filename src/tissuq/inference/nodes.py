@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.amplitudes import Points, Weighing
-from tissuq.inference.lattice import STEP, Directions, Lattice
+from tissuq.inference.lattice import STEP, Directions, Lattice, times_gaussians
 from tissuq.inference.outer import Outer, plain_rows, relative_error, weighted_settings
 from tissuq.inference.resampling import systematic
 from tissuq.mechanics.path import invariant_rates
@@ -61,7 +61,7 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     found = []
     for index, model in enumerate(models):
         points, error = Weighing(model, lattices, index).points()
-        found.append(Node(points, *_linear(lattices, index, points), error))
+        found.append(Node(points, *_linear(model, lattices, index, points), error))
     return found
 
 
@@ -99,7 +99,7 @@ class _Sums:
             offset = GOLDEN * self._calls % 1
             points = points[systematic(np.exp(points.log_weight - total)[None], OF_NODE, offset)[0]]
             points = replace(points, log_weight=np.full(OF_NODE, total - np.log(OF_NODE)))
-        mean, root = _linear(lattices, 0, points)
+        mean, root = _linear(self._model, lattices, 0, points)
         return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)
 
     def _lattices(self, settings: FloatArray, members: Places) -> list[Lattice]:
@@ -140,7 +140,9 @@ def _most_noise(model: StatisticalModel) -> float:
     return float(np.sqrt((model.experiment.stress**2).mean()))
 
 
-def _linear(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[FloatArray, FloatArray]:
+def _linear(
+    model: StatisticalModel, lattices: Sequence[Lattice], index: int, points: Points
+) -> tuple[FloatArray, FloatArray]:
     """Return means (M, p) and roots (M, p, p) of the linear parameters, before their bounds."""
     p = lattices[0].parameters
     mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
@@ -148,4 +150,4 @@ def _linear(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[Fl
         own = np.flatnonzero(points.lattice == place)
         found, found_root = lattices[place].linear(index, points.second[own], points.first[own])
         mean[own], root[own] = found, found_root * points.noise_sd[own, None, None]
-    return mean, root
+    return times_gaussians(mean, root, [model.priors[symbol] for symbol in model.linear])[:2]

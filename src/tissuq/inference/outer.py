@@ -17,7 +17,7 @@ __all__ = ["Outer", "plain_rows", "weighted_settings"]
 FloatArray = NDArray[np.float64]
 
 VALUES, LEAST_EFFECTIVE = 64, 20
-"""Values taken for each of the parameters, and how many must be effective."""
+"""Values taken for each of the parameters, and once more; how many must be effective."""
 RATIO_SPREAD = 3.0
 """Standard deviation of the log of a ratio of noise parameters, in the coordinate that proposes it."""
 
@@ -93,7 +93,7 @@ def weighted_settings(outer: Outer, scout: Callable[[FloatArray], float]) -> tup
     """
     d = len(outer.symbols)
     proposal = adapted(lambda point: scout(outer.settings(point)) + outer.log_base(point), d)
-    points = proposal.points(even_points(d, VALUES * d))
+    points = proposal.points(even_points(d, VALUES * (d + 1)))
     base = np.array([outer.log_base(point) for point in points])
     settings = np.array([outer.settings(point) for point in points])
     return settings, base - proposal.log_density(points) - np.log(len(points))

@@ -1,0 +1,175 @@
+"""Energy discrepancies with exponents, any prior and any noise, against dense sums over everything but C10 or mu1."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import halfcauchy
+
+import tissuq as tq
+from tissuq.errors import ConvergenceError
+from tissuq.inference.importance import Proposal, adapted, even_points
+from tissuq.inference.lattice import times_gaussians
+from tissuq.inference.outer import relative_error
+from tissuq.noise import stress_level
+
+STRETCH = np.linspace(0.7, 1.9, 14)
+UNIT = 2 * (STRETCH - STRETCH**-2)
+ZERO_MODULUS = 2 * (1 - STRETCH**-3) - UNIT
+SCALE = 0.5
+"""Of the amplitude's half-Cauchy prior."""
+NOISE_SD = 0.05
+ERRORS = NOISE_SD * np.random.default_rng(0).standard_normal(len(STRETCH))
+STRESS = 0.5 * UNIT * (1 + 0.05 * (STRETCH**2 + 2 / STRETCH - 3)) + ERRORS
+DATA = tq.Experiment("uniaxial", STRETCH, STRESS)
+LOG_C = np.linspace(np.log(1e-5), np.log(1e4), 500)
+
+
+def ogden(alpha):
+    """The uniaxial stress of mu = 1: d/dl of 2/alpha^2 (l^alpha + 2 l^(-alpha/2) - 3)."""
+    return 2 / alpha * (STRETCH ** (alpha - 1) - STRETCH ** (-alpha / 2 - 1))
+
+
+def conditional(column, noise_sd, width):
+    """Log densities of data and amplitude for a coefficient uniform over a width; its means and variances."""
+    noise_sd, c = np.broadcast_to(noise_sd, len(STRETCH)), np.exp(LOG_C)
+    column, stress, term = column / noise_sd, STRESS / noise_sd, ZERO_MODULUS / noise_sd
+    size = 1 + c**2 * (term @ term)  # the inverse of I + c^2 z z' is I - c^2 z z' / size
+    xx, xy, yy = (
+        one @ other - c**2 * (one @ term) * (term @ other) / size
+        for one, other in ((column, column), (column, stress), (stress, stress))
+    )
+    log_density = -0.5 * (yy - xy**2 / xx) - 0.5 * np.log(size) - np.log(np.sqrt(2 * np.pi) * noise_sd).sum()
+    log_density += 0.5 * np.log(2 * np.pi / xx) - np.log(width) + halfcauchy(scale=SCALE).logpdf(c) + LOG_C
+    return log_density + np.log(LOG_C[1] - LOG_C[0]), xy / xx, 1 / xx
+
+
+def moments(log_weights, mean, variance=0.0):
+    weights = np.exp(log_weights - log_weights.max())
+    weights /= weights.sum()
+    centre = (weights * mean).sum()
+    return centre, np.sqrt((weights * (variance + (mean - centre) ** 2)).sum())
+
+
+def fit(**options):
+    options["priors"] = {"c1": tq.HalfCauchy(SCALE)} | options["priors"]
+    return tq.fit(DATA, discrepancy="zero-modulus", **options)
+
+
+def test_an_exponent_is_integrated():
+    exponents = np.linspace(0.5, 20, 600)
+    log_density, mean, variance = np.moveaxis([conditional(ogden(a), NOISE_SD, 20) for a in exponents], 1, 0)
+    log_density = log_density + np.log(exponents[1] - exponents[0]) - np.log(19.5)
+    found = fit(
+        material="ogden-1", noise_sd=NOISE_SD, priors={"mu1": tq.Uniform(-10, 10), "alpha1": tq.Uniform(0.5, 20)}
+    )
+    evidence = log_density.max() + np.log(np.exp(log_density - log_density.max()).sum())
+    assert abs(found.log_evidence - evidence) < found.log_evidence_error < 0.15
+    table = found.summary()
+    centre, sd = moments(log_density, mean, variance)
+    assert table.loc["mu1", "mean"] == pytest.approx(centre, abs=0.02 * sd)
+    assert table.loc["mu1", "sd"] == pytest.approx(sd, rel=0.04)
+    centre, sd = moments(log_density, exponents[:, None] + 0 * mean)
+    assert table.loc["alpha1", "mean"] == pytest.approx(centre, abs=0.05 * sd)
+    assert table.loc["alpha1", "sd"] == pytest.approx(sd, rel=0.05)
+
+
+def test_proportional_noise_is_integrated():
+    level = stress_level(DATA)
+    noises, shares = np.linspace(1e-4, 0.2, 50), np.linspace(1e-4, 0.3, 50)
+    values = [[conditional(UNIT, s + share * level, 2)[:2] for share in shares] for s in noises]
+    log_density, mean = np.moveaxis(np.array(values), 2, 0)
+    cell = (noises[1] - noises[0]) * (shares[1] - shares[0]) / (0.2 * 0.3)
+    evidence = log_density.max() + np.log(np.exp(log_density - log_density.max()).sum() * cell)
+    found = fit(
+        noise="proportional",
+        priors={"C10": tq.Uniform(0, 2), "noise_sd": tq.Uniform(0, 0.2), "noise_share": tq.Uniform(0, 0.3)},
+    )
+    assert found.log_evidence == pytest.approx(evidence, abs=found.log_evidence_error + 0.03)  # of the coarse grid
+    table = found.summary()
+    for symbol, own in (
+        ("C10", mean),
+        ("noise_sd", noises[:, None, None] + 0 * mean),
+        ("noise_share", shares[None, :, None] + 0 * mean),
+    ):
+        centre, sd = moments(log_density, own)
+        assert table.loc[symbol, "mean"] == pytest.approx(centre, abs=0.1 * sd)
+
+
+@pytest.mark.parametrize("prior", [tq.Normal(0.6, 0.03, 0), tq.LogNormal(0.6, 0.1), tq.HalfNormal(0.3)], ids=str)
+def test_any_prior_of_a_material_parameter_is_integrated(prior):
+    values = np.linspace(0.3, 0.8, 1001)
+    log_density, mean, variance = conditional(UNIT, NOISE_SD, 1.0)
+    given = -0.5 * (values[:, None] - mean) ** 2 / variance - 0.5 * np.log(2 * np.pi * variance)
+    joint = log_density + given + np.array([float(prior.log_density(value)) for value in values])[:, None]
+    centre, sd = moments(joint, values[:, None] + 0 * joint)
+    evidence = joint.max() + np.log(np.exp(joint - joint.max()).sum() * (values[1] - values[0]))
+    found = fit(noise_sd=NOISE_SD, priors={"C10": prior})
+    assert found.summary().loc["C10", "mean"] == pytest.approx(centre, abs=0.05 * sd)
+    assert found.summary().loc["C10", "sd"] == pytest.approx(sd, rel=0.05)
+    assert found.log_evidence == pytest.approx(evidence, abs=found.log_evidence_error + 1e-3)
+    assert np.std(found.solution.draws["C10"]) == pytest.approx(sd, rel=0.06)
+
+
+def test_repeats_tell_the_noise_of_a_function_of_the_stretch():
+    stretch = np.repeat(STRETCH, 3)
+    stress = np.repeat(STRESS, 3) + 0.02 * np.random.default_rng(1).standard_normal(len(stretch))
+    data = tq.Experiment("uniaxial", stretch, stress)
+    tables = [tq.fit(data, discrepancy="taylor", noise=noise).summary() for noise in ("repeats", "unknown")]
+    assert np.array_equal(*tables)
+
+
+@pytest.mark.parametrize("material", ["ogden-1", "ogden-2"])
+def test_auto_takes_materials_with_exponents(material):
+    posterior = tq.fit(DATA, material=material, noise_sd=NOISE_SD)
+    draws = posterior.solution.draws
+    modulus = sum(draws[symbol] for symbol in posterior.model.linear)
+    assert abs(modulus.mean() - 1.0) < 4 * modulus.std()
+    assert modulus.std() < 0.1
+    assert posterior.predictive_coverage() > 0.8
+    assert "effective" in posterior.solution.reason
+
+
+def test_a_narrow_and_skewed_density_is_found():
+    """exp of a log density with a curved ridge, far narrower than the standard normal."""
+
+    def log_density(point):
+        x, y = point
+        return -0.5 * ((x - 1.2) / 0.02) ** 2 - 0.5 * ((y - x**2) / 0.05) ** 2
+
+    proposal = adapted(log_density, 2)
+    points = proposal.points(even_points(2, 2000))
+    log_weights = np.array([log_density(point) for point in points]) - proposal.log_density(points)
+    assert np.exp(log_weights).mean() == pytest.approx(2 * np.pi * 0.02 * 0.05, rel=0.05)
+
+
+def test_the_proposal_is_a_normalised_density():
+    proposal = Proposal(np.array([0.3, -0.2]), np.array([[0.5, 0.0], [0.3, 0.2]]))
+    line = np.linspace(-30, 30, 1501)
+    grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    assert np.exp(proposal.log_density(grid)).sum() * (line[1] - line[0]) ** 2 == pytest.approx(1, abs=2e-3)
+
+
+def test_values_that_are_not_effective_are_said():
+    outer = type("Outer", (), {"symbols": ("alpha1",)})()
+    with pytest.raises(ConvergenceError, match="alpha1 was not found"):
+        relative_error(outer, np.array([0.0, *[-50.0] * 63]))
+
+
+def test_a_product_with_gaussian_priors_is_that_of_precisions():
+    generator = np.random.default_rng(0)
+    root = generator.standard_normal((5, 3, 3))
+    mean = generator.standard_normal((5, 3))
+    found, found_root, log_mass = times_gaussians(
+        mean, root, [tq.Normal(0.5, 0.3), tq.Uniform(-1, 1), tq.Normal(-1, 2)]
+    )
+    for k in range(5):
+        before = np.linalg.inv(root[k] @ root[k].T)
+        precision = before + np.diag([0.3**-2, 0, 2.0**-2])
+        centre = np.linalg.solve(precision, before @ mean[k] + np.array([0.5 / 0.3**2, 0, -1 / 2.0**2]))
+        assert found[k] == pytest.approx(centre)
+        assert found_root[k] @ found_root[k].T == pytest.approx(np.linalg.inv(precision))
+        pair = (root[k] @ root[k].T)[np.ix_([0, 2], [0, 2])] + np.diag([0.3**2, 2.0**2])
+        miss = mean[k][[0, 2]] - [0.5, -1]
+        expected = -0.5 * miss @ np.linalg.solve(pair, miss) - 0.5 * np.linalg.slogdet(2 * np.pi * pair)[1]
+        assert log_mass[k] == pytest.approx(expected)
