@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy.kernels import pinned_squared_exponential
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 
@@ -19,7 +20,6 @@ FloatArray = NDArray[np.float64]
 
 LARGEST_EXPONENT = 200.0
 """So far beyond the data that nothing is known there."""
-SEPARATE = 40.0
 GRID = 400
 """Points over the data's range among which the pivots of a process are chosen."""
 
@@ -174,7 +174,7 @@ class LogBlock(InvariantBlock):
         return np.log1p(x)
 
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
-        return _given_zero(first / length, second / length, 0)
+        return np.asarray(pinned_squared_exponential(first / length, second / length, 0))
 
 
 class SplineBlock(InvariantBlock):
@@ -204,20 +204,4 @@ class ValanisLandelBlock(ProcessBlock):
         return log_stretches(mode, stretch)
 
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
-        return _given_zero(first / length, second / length, 1)
-
-
-def _given_zero(one: FloatArray, other: FloatArray, derivatives: int) -> FloatArray:
-    """Return the squared exponential of scores, given that the process (and its derivative) are zero at zero.
-
-    It is the product of both with zero, times exp(one other) without the first terms of its series; where that
-    exponent is large, what is left out is less than rounding.
-    """
-    product = one * other
-    near = np.minimum(product, SEPARATE)
-    rest = np.expm1(near) - (near if derivatives else 0.0)
-    return np.asarray(np.where(product < SEPARATE, rest * _bell(one) * _bell(other), _bell(one - other)))
-
-
-def _bell(score: FloatArray) -> FloatArray:
-    return np.asarray(np.exp(-0.5 * score**2))
+        return np.asarray(pinned_squared_exponential(first / length, second / length, 1))
