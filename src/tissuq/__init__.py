@@ -1,6 +1,6 @@
 """tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
-from tissuq.assessment import Assessment, compare
+from tissuq.assessment import Assessment, Average, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments import datasets
@@ -19,6 +19,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Assessment",
+    "Average",
     "ConvergenceError",
     "Discrepancy",
     "Experiment",
@@ -43,6 +44,7 @@ __all__ = [
     "TissuqError",
     "Uniform",
     "UnknownNoise",
+    "average",
     "compare",
     "datasets",
     "discrepancies",

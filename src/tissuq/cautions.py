@@ -22,6 +22,8 @@ def warnings_about(solution: Solution) -> Iterator[str]:
     """Yield the warnings that a posterior carries, the gravest first."""
     if solution.is_approximate and solution.diagnostics is not None:
         yield solution.diagnostics.verdict
+    if solution.model.discrepancy.is_best_fit:
+        yield solution.model.discrepancy.caution
     if solution.model.confounds_noise:
         yield (
             "noise_sd and S are both unknown, and only noise_sd^2 + S^2 is in the data: read neither alone, or give "

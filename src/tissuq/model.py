@@ -46,7 +46,7 @@ class StatisticalModel:
     material : Material
         The model whose parameters are wanted.
     discrepancy : Discrepancy
-        What it cannot explain.
+        What it cannot explain; the model holds it as adapted to material and experiment.
     noise : float, str or Noise
         Standard deviation in MPa, or the name of a noise with parameters (``"unknown"``).
     chosen_priors : mapping of str to Prior
@@ -71,6 +71,7 @@ class StatisticalModel:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", noise_named(self.noise))
+        object.__setattr__(self, "discrepancy", self.discrepancy.adapted_to(self.material, self.experiment))
         self._check_parameters()
         self._check_priors()
         self._check_data()
@@ -212,10 +213,14 @@ class StatisticalModel:
         return part(values)
 
     def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
-        """Return the (n, m) correlation of the correlated part between two sets of stretches."""
+        """Return the (n, m) covariance of the correlated part between two sets of stretches, over its variance."""
         if self.is_repeated:
             return 1.0 * (first[:, None] == second[None, :])
         return self.discrepancy.correlation(first, second, values)
+
+    def relative_variance(self, stretch: Any, values: Mapping[str, Any]) -> Any:
+        """Return the (n,) diagonal of `correlation`."""
+        return self.discrepancy.relative_variance(stretch, values)
 
     @property
     def confounds_noise(self) -> bool:

@@ -255,3 +255,12 @@ def test_show_refuses_what_is_not_a_run_folder(cli, specimen, folder):
     said = cli("show", folder)
     assert said.status == 2
     assert f"'{folder}' is not the folder of a complete run" in said.err
+
+
+@pytest.mark.parametrize("discrepancy", ["gp-orthogonal", "gp-scaled"])
+def test_an_estimate_of_the_best_fit_says_so_beside_its_numbers(cli, here, specimen, discrepancy):
+    said = cli("fit", specimen, "--discrepancy", discrepancy, "--noise-sd", 1, "--no-figures")
+    assert said.status == 0, said.err
+    report = (here / "runs" / "specimen" / "report.html").read_text(encoding="utf-8")
+    for text in (said.out + said.err, report, cli("discrepancies").out):
+        assert "not the initial modulus" in " ".join(text.split())

@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+import tissuq
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_mode, loading_modes
 from tissuq.mechanics import MooneyRivlin, Ogden2, Yeoh, engineering_stress
-from tissuq.studies.coverage import PRESETS, CoverageSettings, preset, run_campaign, summarise
+from tissuq.studies.coverage import PRESETS, CoverageSettings, campaign, preset, run_campaign, summarise
 from tissuq.studies.coverage.campaign import RESULTS, carry_out, tasks_of
 from tissuq.studies.coverage.truths import FAMILIES, draw_truth
+from tissuq.studies.paper import FORMULATIONS
 
 STRETCH = np.linspace(0.6, 2.2, 30)
 DESIGN = {"low": 0.7, "high": 2.0, "points": 12, "noise_sd": 0.1}
@@ -124,6 +126,27 @@ def test_the_same_data_meet_every_formulation_and_others_every_family():
     assert found[0]["truth"] == found[1]["truth"] == found[2]["truth"]
     assert found[0]["truth"] != found[3]["truth"]
     assert len({truth for each in found for truth in each["truth"]}) == 4
+
+
+def test_a_formulation_may_be_an_average_of_the_papers_seven():
+    settings = small(families=["yeoh"], formulations=["average-of-seven", "gp"], replicates=2)
+    averaged, single = (carry_out(settings, task) for task in tasks_of(settings))
+    assert averaged["truth"] == single["truth"]
+    data = recorded_data(settings)
+    for experiment, row, alone in zip(data, averaged["fits"], single["fits"], strict=True):
+        fits = {name: tissuq.fit(experiment, discrepancy=name, noise_sd=0.1) for name in FORMULATIONS}
+        expected = tissuq.average(fits).summary().loc["C10", ["hdi_low", "hdi_high", "mean", "sd"]]
+        np.testing.assert_allclose(row, expected, rtol=2e-3)
+        assert row != alone
+
+
+def recorded_data(settings):
+    """Return the data sets that a campaign of one task fits, caught on their way."""
+    found = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign, "marginals_of_c10", lambda name, data, noise_sd: found.extend(data) or [])
+        carry_out(settings, tasks_of(settings)[0])
+    return found
 
 
 def test_the_summary_is_counted_by_hand():

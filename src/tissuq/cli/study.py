@@ -23,7 +23,7 @@ def _study() -> None:
 @study.command("coverage")
 def coverage(
     config: Annotated[Path | None, typer.Option(help="TOML file of the campaign.")] = None,
-    preset: Annotated[str | None, typer.Option(help="Instead: designs, formulations or strength.")] = None,
+    preset: Annotated[str | None, typer.Option(help="Instead: designs, formulations, strength or rivals.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the campaign [runs/coverage-NAME].")] = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every family.")] = None,
     noise: Annotated[str | None, typer.Option(help="known or unknown.")] = None,

@@ -1,14 +1,19 @@
 """The discrepancies, one family a file; importing this package registers them all."""
 
+from tissuq.discrepancy.conditioned import ConditionedProcess
 from tissuq.discrepancy.discrepancy import Discrepancy, discrepancies, discrepancy_named
 from tissuq.discrepancy.energy import Auto, EnergyDiscrepancy, EnergySum, Member
 from tissuq.discrepancy.gaussian_process import GaussianProcess
 from tissuq.discrepancy.hyperelastic import MooneyRivlinTerm, YeohTerms
 from tissuq.discrepancy.none import NoDiscrepancy
+from tissuq.discrepancy.orthogonal import OrthogonalProcess
+from tissuq.discrepancy.pinned import PinnedProcess
 from tissuq.discrepancy.polynomial import Constant, Linear, Quadratic
+from tissuq.discrepancy.scaled import ScaledProcess
 
 __all__ = [
     "Auto",
+    "ConditionedProcess",
     "Constant",
     "Discrepancy",
     "EnergyDiscrepancy",
@@ -18,7 +23,10 @@ __all__ = [
     "Member",
     "MooneyRivlinTerm",
     "NoDiscrepancy",
+    "OrthogonalProcess",
+    "PinnedProcess",
     "Quadratic",
+    "ScaledProcess",
     "YeohTerms",
     "discrepancies",
     "discrepancy_named",

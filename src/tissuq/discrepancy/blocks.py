@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy.kernels import pinned_squared_exponential
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 
@@ -28,7 +29,6 @@ FloatArray = NDArray[np.float64]
 
 LARGEST_EXPONENT = 200.0
 """So far beyond the data that nothing is known there."""
-SEPARATE = 40.0
 GRID = 400
 """Points over the data's range among which the pivots of a process are chosen."""
 
@@ -183,7 +183,7 @@ class LogBlock(InvariantBlock):
         return np.log1p(x)
 
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
-        return _given_zero(first / length, second / length, 0)
+        return np.asarray(pinned_squared_exponential(first / length, second / length, 0))
 
 
 class SplineBlock(InvariantBlock):
@@ -248,25 +248,9 @@ class ValanisLandelBlock(SeparableBlock):
     lengths = (0.2, 0.35, 0.6, 1.0, 1.7)
 
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
-        return _given_zero(first / length, second / length, 1)
+        return np.asarray(pinned_squared_exponential(first / length, second / length, 1))
 
 
 def _series(exponent: FloatArray) -> FloatArray:
     """Return exp(x) - 1 - x for small x, with its digits."""
     return exponent**2 / 2 * (1 + exponent / 3 * (1 + exponent / 4))
-
-
-def _given_zero(one: FloatArray, other: FloatArray, derivatives: int) -> FloatArray:
-    """Return the squared exponential of scores, given that the process (and its derivative) are zero at zero.
-
-    It is the product of both with zero, times exp(one other) without the first terms of its series; where that
-    exponent is large, what is left out is less than rounding.
-    """
-    product = one * other
-    near = np.minimum(product, SEPARATE)
-    rest = np.expm1(near) - (near if derivatives else 0.0)
-    return np.asarray(np.where(product < SEPARATE, rest * _bell(one) * _bell(other), _bell(one - other)))
-
-
-def _bell(score: FloatArray) -> FloatArray:
-    return np.asarray(np.exp(-0.5 * score**2))

@@ -5,13 +5,15 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.mechanics.material import Material
 from tissuq.parameters import Parameter
 from tissuq.registry import find, variants
 
@@ -36,8 +38,14 @@ class Discrepancy(ABC):
     """The parameters on which the correlation depends."""
     is_energy: ClassVar[bool] = False
     """Whether what it has learnt in one loading mode holds in others."""
+    is_best_fit: ClassVar[bool] = False
+    """Whether the material that best fits the data is estimated, rather than that at the reference."""
     caution: ClassVar[str] = ""
     """What a reader of its result must know about the material's parameters."""
+
+    def adapted_to(self, material: Material, experiment: Experiment) -> Self:
+        """Return the discrepancy for this material and experiment: itself, unless its definition needs to know them."""
+        return self
 
     def mean_basis(self, mode: LoadingMode, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the (n, k) mean stresses of unit linear parameters, in their order."""
@@ -48,12 +56,16 @@ class Discrepancy(ABC):
         return 0.0
 
     def correlated_variance(self, values: Mapping[str, Any]) -> Any:
-        """Return the variance (MPa^2) of the correlated part."""
+        """Return the variance (MPa^2) of the correlated part; of a process that is conditioned, before that."""
         return 0.0
 
     def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
-        """Return the (n, m) correlation of the correlated part between two sets of stretches."""
+        """Return the (n, m) covariance of the correlated part between two sets of stretches, over its variance."""
         raise NotImplementedError(f"discrepancy '{self.name}' has no correlated part")
+
+    def relative_variance(self, stretch: Any, values: Mapping[str, Any]) -> Any:
+        """Return the (n,) diagonal of `correlation`: one, unless the process is conditioned on something."""
+        return np.ones(len(stretch))
 
     @property
     def is_scattered(self) -> bool:

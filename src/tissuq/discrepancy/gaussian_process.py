@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from tissuq.discrepancy.discrepancy import Discrepancy
+from tissuq.discrepancy.kernels import squared_exponential
 from tissuq.parameters import Parameter
 from tissuq.priors import Uniform
 
-__all__ = ["GaussianProcess"]
+__all__ = ["GaussianProcess", "c", "psi"]
 
 c = Parameter.scale("c", "standard deviation of the process")
 psi = Parameter("psi", "correlation length", "stretch", (0.0, float("inf")), False, Uniform(0.02, 3.0))
@@ -34,5 +35,4 @@ class GaussianProcess(Discrepancy):
         return values["c"] ** 2
 
     def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
-        exponent = -0.5 * ((first[:, None] - second[None, :]) / values["psi"]) ** 2
-        return exponent.__array_namespace__().exp(exponent)
+        return squared_exponential((first[:, None] - second[None, :]) / values["psi"])

@@ -18,9 +18,9 @@ __all__ = ["FEW_POINTS", "Spectrum", "correlation_spectrum", "scaled_spectrum"]
 FloatArray = NDArray[np.float64]
 
 TOLERANCE = 1e-14
-"""Share of the trace that the factor of many points may leave out."""
+"""Share of the process's variance at all points that the factor of many may leave out."""
 ROUNDING = 1e-17
-"""Eigenvalue, relative to the trace, below which the decomposition of few points gives only rounding errors."""
+"""Eigenvalue, relative to that, below which the decomposition of few points gives only rounding errors."""
 FEW_POINTS = 128
 
 
@@ -82,15 +82,17 @@ def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float,
             spectrum, vectors = np.linalg.eigh(discrepancy.correlation(points, points, values))
         kept = spectrum > ROUNDING * len(points)
         return Spectrum(vectors[:, kept], spectrum[kept])
-    root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points)
+    variance = np.asarray(discrepancy.relative_variance(points, values))
+    root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points, variance)
     vectors, singular, _ = np.linalg.svd(root, full_matrices=False)
     return Spectrum(vectors, singular**2)
 
 
-def _pivoted_root(correlation: Callable[[FloatArray, FloatArray], FloatArray], points: FloatArray) -> FloatArray:
+def _pivoted_root(
+    correlation: Callable[[FloatArray, FloatArray], FloatArray], points: FloatArray, remaining: FloatArray
+) -> FloatArray:
     n = len(points)
     root = np.zeros((n, n if n <= 64 else 64))
-    remaining = np.ones(n)
     for rank in range(n):
         pivot = int(remaining.argmax())
         if remaining.sum() <= TOLERANCE * n or remaining[pivot] <= 0:

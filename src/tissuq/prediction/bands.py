@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import stress_moments
 
-__all__ = ["Band", "predict_band", "share_inside"]
+__all__ = ["Band", "predict_average", "predict_band", "share_inside"]
 
 FloatArray = NDArray[np.float64]
 
@@ -63,27 +64,43 @@ def predict_band(
     InputError
         When a stretch is not positive, prob is not between 0 and 1, or the discrepancy says nothing about the mode.
     """
+    return predict_average([(1.0, solution)], stretch, discrepancy=discrepancy, noise=noise, prob=prob, mode=mode)
+
+
+def predict_average(
+    parts: Sequence[tuple[float, Solution]],
+    stretch: ArrayLike,
+    *,
+    discrepancy: bool = True,
+    noise: bool = True,
+    prob: float = 0.95,
+    mode: str | LoadingMode | None = None,
+) -> Band:
+    """Return the band of a mixture of posteriors of the same data, with weights that sum to one.
+
+    All else is as for `predict_band`.
+    """
     points = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
     if points.ndim != 1 or not (np.isfinite(points) & (points > 0)).all():
         raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    asked = loading_mode(mode) if mode is not None else solution.model.experiment.mode
-    if discrepancy and asked != solution.model.experiment.mode and not solution.model.discrepancy.is_energy:
-        raise InputError(
-            f"discrepancy '{solution.model.discrepancy.name}' is an error of the {solution.model.experiment.mode.name} "
-            f"stress and says nothing about the {asked.name} one: predict without it, or fit with one that is an "
-            "energy, such as 'auto'."
-        )
-    components = solution.components.thinned(FEW if len(points) > BLOCK else MANY)
+    asked = loading_mode(mode) if mode is not None else parts[0][1].model.experiment.mode
+    for _, solution in parts if discrepancy else ():
+        _check_mode(solution, asked)
+    count = FEW if len(points) > BLOCK else MANY
+    mixture = [(weight, solution.model, solution.components.thinned(count)) for weight, solution in parts]
+    weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
     curves = []
     for block in np.array_split(points, max(1, len(points) // BLOCK)):
-        mean, variance = stress_moments(
-            solution.model, components, block, discrepancy=discrepancy, noise=noise, mode=asked
-        )
-        ends = [_mixture_quantile(tail, components.weights, mean, variance) for tail in tails]
-        curves.append([components.weights @ mean, *ends])
+        moments = [
+            stress_moments(model, components, block, discrepancy=discrepancy, noise=noise, mode=asked)
+            for _, model, components in mixture
+        ]
+        mean, variance = (np.concatenate(each) for each in zip(*moments, strict=True))
+        ends = [_mixture_quantile(tail, weights, mean, variance) for tail in tails]
+        curves.append([weights @ mean, *ends])
     return Band(points, *np.concatenate(curves, axis=1))
 
 
@@ -92,6 +109,16 @@ def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -
     data = solution.model.experiment
     band = predict_band(solution, data.stretch, discrepancy=discrepancy, prob=prob)
     return float(np.mean((band.low <= data.stress) & (data.stress <= band.high)))
+
+
+def _check_mode(solution: Solution, asked: LoadingMode) -> None:
+    model = solution.model
+    if asked != model.experiment.mode and not model.discrepancy.is_energy:
+        raise InputError(
+            f"discrepancy '{model.discrepancy.name}' is an error of the {model.experiment.mode.name} "
+            f"stress and says nothing about the {asked.name} one: predict without it, or fit with one that is an "
+            "energy, such as 'auto'."
+        )
 
 
 def _mixture_quantile(probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:

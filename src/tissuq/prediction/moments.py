@@ -227,5 +227,6 @@ def _condition(
     smoothed = np.einsum("gr,nr,rk->ngk", inside, gain, vectors.T @ columns)
     pull, of_data = smoothed[:, :, :-1], smoothed[:, :, -1]
     explained = gain @ (inside**2).T
-    variance = np.maximum(part.amplitude[:, None] * (1 - explained), 0.0)
+    before = model.relative_variance(stretch, part.shape)
+    variance = np.maximum(part.amplitude[:, None] * (before - explained), 0.0)
     return of_data - np.einsum("ngk,nk->ng", pull, mean_b), pull, variance

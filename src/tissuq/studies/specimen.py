@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.assessment import Assessment, design_warnings
-from tissuq.discrepancy import Auto, EnergyDiscrepancy, discrepancies, discrepancy_named
+from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import read_experiment
@@ -192,7 +192,8 @@ def run_specimen(
 
 
 def _every() -> list[str]:
-    return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, EnergyDiscrepancy)]
+    others = EnergyDiscrepancy, ConditionedProcess
+    return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, others)]
 
 
 def _parameters(settings: SpecimenSettings, discrepancy: str) -> tuple[Parameter, ...]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
-from tissuq.fitting import fit_many
+from tissuq.studies.coverage.formulations import marginals_of_c10
 from tissuq.studies.coverage.settings import BLOCK, CoverageSettings
 from tissuq.studies.coverage.truths import FAMILIES, draw_truth
 
@@ -180,10 +180,9 @@ def carry_out(settings: CoverageSettings, task: Task) -> dict[str, Any]:
 def _fits(data: list[Experiment], formulation: str, noise_sd: Any, prob: float) -> list[list[float] | None]:
     """Return ends, mean and sd of C10 for every data set; one by one where all together fail."""
     try:
-        posteriors = fit_many(data, discrepancy=formulation, noise_sd=noise_sd)
+        marginals = marginals_of_c10(formulation, data, noise_sd)
     except (TissuqError, np.linalg.LinAlgError):
         if len(data) == 1:
             return [None]
         return [row for each in data for row in _fits([each], formulation, noise_sd, prob)]
-    marginals = [posterior.solution.marginals["C10"] for posterior in posteriors]
     return [[*marginal.hdi(prob), marginal.mean, marginal.sd] for marginal in marginals]

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.path import invariants
+from tissuq.studies.coverage.formulations import check_formulation
 from tissuq.studies.coverage.truths import FAMILIES, LEAST_LIMIT
 
 __all__ = ["PRESETS", "CoverageSettings", "Design", "preset"]
 
-PRESETS = ("designs", "formulations", "strength")
+PRESETS = ("designs", "formulations", "strength", "rivals")
 BLOCK = 50
 """Data sets of one task."""
 
@@ -110,7 +110,7 @@ class CoverageSettings(BaseModel):
     def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
             try:
-                discrepancy_named(name)
+                check_formulation(name)
             except TissuqError as error:
                 raise ValueError(str(error)) from error
         return names
