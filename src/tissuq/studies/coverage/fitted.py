@@ -1,0 +1,74 @@
+"""The fits of a campaign: a neo-Hookean material with a formulation of its error, on many data sets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.discrepancy import discrepancy_named
+from tissuq.errors import TissuqError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import loading_mode
+from tissuq.fitting import fit_many
+from tissuq.inference.energies import why_no_energies
+from tissuq.mechanics import NeoHookean, engineering_stress
+from tissuq.model import StatisticalModel
+from tissuq.noise import noise_named
+from tissuq.posterior import Posterior
+from tissuq.priors import Prior
+
+__all__ = ["fit_all", "why_not_fitted"]
+
+NoiseSd = float | str
+"""In MPa, or ``"unknown"``."""
+
+
+def fit_all(
+    data: Sequence[Experiment], formulation: str, noise_sd: Sequence[NoiseSd], priors: Mapping[str, Prior]
+) -> list[Posterior | None]:
+    """Return the posterior of every data set, None where a fit failed.
+
+    Data sets of the same noise are fitted together, and one by one where all together fail.
+    """
+    found: list[Posterior | None] = [None] * len(data)
+    for level in dict.fromkeys(noise_sd):
+        places = [place for place, own in enumerate(noise_sd) if own == level]
+        own = _own_priors(formulation, level, priors)
+        posteriors = _fit_together([data[place] for place in places], formulation, level, own)
+        for place, posterior in zip(places, posteriors, strict=True):
+            found[place] = posterior
+    return found
+
+
+def why_not_fitted(
+    formulation: str, mode: str, stretch: NDArray[np.float64], noise_sd: NoiseSd, priors: Mapping[str, Prior]
+) -> str:
+    """Return why a formulation cannot be fitted to data on these stretches, or nothing where it can."""
+    stress = engineering_stress(NeoHookean(), loading_mode(mode), stretch, [1.0])
+    try:
+        own = _own_priors(formulation, noise_sd, priors)
+        model = StatisticalModel(
+            Experiment(mode, stretch, stress), NeoHookean(), discrepancy_named(formulation), noise_named(noise_sd), own
+        )
+        return why_no_energies(model) if model.energy_symbols else ""
+    except TissuqError as error:
+        return str(error)
+
+
+def _own_priors(formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]) -> dict[str, Prior]:
+    """Return those priors whose parameters a formulation has."""
+    every = (*NeoHookean.parameters, *discrepancy_named(formulation).parameters, *noise_named(noise_sd).parameters)
+    return {p.symbol: priors[p.symbol] for p in every if p.symbol in priors}
+
+
+def _fit_together(
+    data: Sequence[Experiment], formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]
+) -> list[Posterior | None]:
+    try:
+        return list(fit_many(data, discrepancy=formulation, noise=noise_named(noise_sd), priors=priors))
+    except (TissuqError, np.linalg.LinAlgError):
+        if len(data) == 1:
+            return [None]
+        return [each for one in data for each in _fit_together([one], formulation, noise_sd, priors)]
