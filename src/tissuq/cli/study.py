@@ -31,7 +31,7 @@ def coverage(
     config: Config = None,
     preset: Annotated[
         str | None,
-        typer.Option(help="Instead: paper, panel, random-materials, strength, formulations or transfer."),
+        typer.Option(help="Instead: paper, panel, random-materials, strength, formulations, transfer, or sbc."),
     ] = None,
     out: Out = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every family.")] = None,
@@ -46,8 +46,11 @@ def coverage(
     from tissuq.studies.coverage import PRESETS, CoverageSettings, run_campaign
     from tissuq.studies.coverage.campaign import tasks_of
 
+    if preset == "sbc" and config is None and noise is None:
+        sbc(None, out, replicates, seed, workers, scheduler)
+        return
     if (config is None) == (preset is None):
-        raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}.")
+        raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}, sbc.")
     options: dict[str, Any] = {"replicates": replicates, "noise": noise, "seed": seed}
     settings = load_settings(CoverageSettings, config, _with_preset(preset, options))
     folder = out or Path("runs") / f"coverage-{preset or (config or Path()).stem}"
@@ -55,6 +58,29 @@ def coverage(
     summary = write_campaign(settings, results, folder)
     print_rows("Coverage of C10", *readable_coverage(summary))
     print(f"± are Monte Carlo standard errors. Report: {folder / 'report.html'}")
+
+
+@study.command("sbc")
+def sbc(
+    config: Config = None,
+    out: Out = None,
+    replicates: Annotated[int | None, typer.Option(help="Data sets of every formulation.")] = None,
+    seed: Seed = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+) -> None:
+    """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
+    from tissuq.cli.tables import print_rows
+    from tissuq.report.sbc import readable_ranks, write_sbc
+    from tissuq.studies.sbc import SbcSettings, run_sbc
+    from tissuq.studies.sbc.campaign import tasks_of
+
+    settings = load_settings(SbcSettings, config, {"replicates": replicates, "seed": seed})
+    folder = out or Path("runs") / (config.stem if config else "sbc")
+    results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_sbc)
+    table = write_sbc(settings, results, folder)
+    print_rows("Ranks of the truth", *readable_ranks(table))
+    print(f"Report: {folder / 'report.html'}")
 
 
 def _with_preset(name: str | None, options: dict[str, Any]) -> dict[str, Any]:

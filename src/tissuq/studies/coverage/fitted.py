@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy import discrepancy_named
-from tissuq.errors import TissuqError
+from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
 from tissuq.fitting import fit_many
@@ -19,7 +19,7 @@ from tissuq.noise import noise_named
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior
 
-__all__ = ["fit_all", "why_not_fitted"]
+__all__ = ["fit_all", "model_of"]
 
 NoiseSd = float | str
 """In MPa, or ``"unknown"``."""
@@ -42,19 +42,24 @@ def fit_all(
     return found
 
 
-def why_not_fitted(
+def model_of(
     formulation: str, mode: str, stretch: NDArray[np.float64], noise_sd: NoiseSd, priors: Mapping[str, Prior]
-) -> str:
-    """Return why a formulation cannot be fitted to data on these stretches, or nothing where it can."""
+) -> StatisticalModel:
+    """Return the model that is fitted to data on these stretches, with a stress that does not matter.
+
+    Raises
+    ------
+    TissuqError
+        When such data cannot be fitted.
+    """
     stress = engineering_stress(NeoHookean(), loading_mode(mode), stretch, [1.0])
-    try:
-        own = _own_priors(formulation, noise_sd, priors)
-        model = StatisticalModel(
-            Experiment(mode, stretch, stress), NeoHookean(), discrepancy_named(formulation), noise_named(noise_sd), own
-        )
-        return why_no_energies(model) if model.energy_symbols else ""
-    except TissuqError as error:
-        return str(error)
+    own, noise = _own_priors(formulation, noise_sd, priors), noise_named(noise_sd)
+    data = Experiment(loading_mode(mode), stretch, stress)
+    model = StatisticalModel(data, NeoHookean(), discrepancy_named(formulation), noise, own)
+    why = why_no_energies(model) if model.energy_symbols else ""
+    if why:
+        raise ModelError(f"'{formulation}' cannot be integrated: {why}")
+    return model
 
 
 def _own_priors(formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]) -> dict[str, Prior]:

@@ -17,7 +17,7 @@ from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.path import invariants
 from tissuq.priors import Prior, prior_from
 from tissuq.studies.coverage.families import FAMILIES, LEAST_LIMIT
-from tissuq.studies.coverage.fitted import why_not_fitted
+from tissuq.studies.coverage.fitted import model_of
 from tissuq.studies.coverage.truths import FIXED, TRUTHS
 
 __all__ = ["BLOCK", "PRESETS", "CoverageSettings", "Design", "preset"]
@@ -165,9 +165,11 @@ class CoverageSettings(BaseModel):
             for formulation in self.formulations:
                 for noise in self.noise:
                     noise_sd = design.noise_sd if noise == "known" else noise
-                    why = why_not_fitted(formulation, design.mode, design.stretch, noise_sd, self.chosen_priors)
-                    if why:
-                        raise ValueError(f"design {design.label} with '{formulation}' and {noise} noise: {why}")
+                    try:
+                        model_of(formulation, design.mode, design.stretch, noise_sd, self.chosen_priors)
+                    except TissuqError as error:
+                        where = f"design {design.label} with '{formulation}' and {noise} noise"
+                        raise ValueError(f"{where}: {error}") from error
         return self
 
     @property
