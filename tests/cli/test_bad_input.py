@@ -173,6 +173,7 @@ def test_a_column_called_stretch_is_not_taken_for_a_strain(cli, here):
         (["--config", "many.toml"], "1,200,000 fits are asked for"),
         (["--config", "few.toml"], "3 measurements for 4 parameters"),
         (["--config", "unknown.toml"], "replicats"),
+        (["--preset", "sbc", "--replicates", "5"], "greater than or equal to 20"),
         (["--preset", "strength", "--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler answers"),
     ],
 )

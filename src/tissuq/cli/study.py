@@ -16,6 +16,7 @@ study = typer.Typer(name="study", no_args_is_help=True, rich_markup_mode=None, h
 
 Config = Annotated[Path | None, typer.Option(help="TOML file of the campaign.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign [runs/NAME].")]
+Noise = Annotated[str | None, typer.Option(help="known or unknown.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of materials and noise.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
 Scheduler = Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead.")]
@@ -35,7 +36,7 @@ def coverage(
     ] = None,
     out: Out = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every family.")] = None,
-    noise: Annotated[str | None, typer.Option(help="known or unknown.")] = None,
+    noise: Noise = None,
     seed: Seed = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
@@ -46,8 +47,8 @@ def coverage(
     from tissuq.studies.coverage import PRESETS, CoverageSettings, run_campaign
     from tissuq.studies.coverage.campaign import tasks_of
 
-    if preset == "sbc" and config is None and noise is None:
-        sbc(None, out, replicates, seed, workers, scheduler)
+    if preset == "sbc" and config is None:
+        sbc(None, out, replicates, noise, seed, workers, scheduler)
         return
     if (config is None) == (preset is None):
         raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}, sbc.")
@@ -65,6 +66,7 @@ def sbc(
     config: Config = None,
     out: Out = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every formulation.")] = None,
+    noise: Noise = None,
     seed: Seed = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
@@ -75,7 +77,7 @@ def sbc(
     from tissuq.studies.sbc import SbcSettings, run_sbc
     from tissuq.studies.sbc.campaign import tasks_of
 
-    settings = load_settings(SbcSettings, config, {"replicates": replicates, "seed": seed})
+    settings = load_settings(SbcSettings, config, {"replicates": replicates, "noise": noise, "seed": seed})
     folder = out or Path("runs") / (config.stem if config else "sbc")
     results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_sbc)
     table = write_sbc(settings, results, folder)
