@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
@@ -52,6 +53,11 @@ class Posterior:
     def model(self) -> StatisticalModel:
         """The model that was fitted, with its data and priors."""
         return self.solution.model
+
+    @property
+    def marginals(self) -> Mapping[str, Marginal]:
+        """The marginal posterior of every parameter: mean, sd, density, quantiles, HDI."""
+        return self.solution.marginals
 
     @property
     def log_evidence(self) -> float | None:

@@ -170,9 +170,18 @@ def test_a_column_called_stretch_is_not_taken_for_a_strain(cli, here):
         (["--preset", "strength", "--noise", "some"], "'known' or 'unknown'"),
         (["--config", "missing.toml"], "missing.toml"),
         (["--preset", "strength", "--out", "other"], "not the folder of a campaign"),
+        (["--config", "many.toml"], "1,200,000 fits are asked for"),
+        (["--config", "few.toml"], "3 measurements for 4 parameters"),
+        (["--config", "unknown.toml"], "replicats"),
+        (["--preset", "sbc", "--replicates", "5"], "greater than or equal to 20"),
+        (["--preset", "strength", "--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler answers"),
     ],
 )
-def test_a_campaign_refuses_bad_options(cli, here, arguments, words):
+def test_a_campaign_refuses_bad_options_before_anything_is_written(cli, here, arguments, words):
+    design = "designs = [{ low = 0.7, high = 2.0, points = 3, noise_sd = 0.1 }]\n"
+    (here / "many.toml").write_text(design + 'formulations = ["none"]\nreplicates = 100_000\n')
+    (here / "few.toml").write_text(design + 'formulations = ["linear"]\n')
+    (here / "unknown.toml").write_text(design + "replicats = 3\n")
     (here / "other").mkdir()
     (here / "other" / "file.txt").write_text("mine")
     said = cli("study", "coverage", *arguments)
@@ -180,3 +189,20 @@ def test_a_campaign_refuses_bad_options(cli, here, arguments, words):
     assert words in " ".join(said.err.split())
     assert "Traceback" not in said.err
     assert [path.name for path in (here / "other").iterdir()] == ["file.txt"]
+    assert not (here / "runs").exists()
+
+
+def test_a_campaign_goes_on_from_a_kill_before_its_recipe_was_whole(cli, here):
+    (here / "small.toml").write_text(
+        'designs = [{ low = 0.7, high = 2.0, points = 9, noise_sd = 0.1 }]\nformulations = ["none"]\n'
+        'families = ["yeoh", "gent"]\nreplicates = 2\n'
+    )
+    (here / "out").mkdir()
+    (here / "out" / "run.toml.new").write_text("designs = [")
+    assert cli("study", "coverage", "--config", "small.toml", "--out", "out").status == 0
+    assert {"run.toml", "tasks.jsonl", "summary.csv", "families.csv", "figures", "report.html"} == {
+        path.name for path in (here / "out").iterdir()
+    }
+    said = cli("study", "coverage", "--config", "small.toml", "--out", "out", "--seed", "1")
+    assert said.status == 2
+    assert "other settings" in " ".join(said.err.split())

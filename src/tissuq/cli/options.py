@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tissuq.errors import InputError
@@ -17,7 +18,7 @@ from tissuq.registry import find
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["load_settings", "not_converged", "once_each", "parse_prior", "progress"]
+__all__ = ["campaign_progress", "load_settings", "not_converged", "once_each", "parse_prior", "progress"]
 
 Settings = TypeVar("Settings", bound="BaseModel")
 
@@ -93,6 +94,37 @@ def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
             started += 1
 
         yield step
+
+
+@contextmanager
+def campaign_progress(total: int) -> Iterator[Callable[[str, bool], None]]:
+    """Show how much of a campaign is done and how long the rest will take; give the function that is told of each task.
+
+    Tasks that an earlier run had done count as done, but not for the time.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        shown = bar.add_task("", total=total)
+        start, found, own = monotonic(), 0, 0
+
+        def step(text: str, is_new: bool) -> None:
+            nonlocal found, own
+            found, own = found + 1, own + is_new
+            left = (monotonic() - start) / own * (total - found) if own else None
+            bar.update(shown, description=f"{_duration(left)}{text}", completed=found)
+
+        yield step
+
+
+def _duration(seconds: float | None) -> str:
+    if seconds is None:
+        return ""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60} h {minutes % 60:02d} min left, " if minutes >= 60 else f"{minutes}:{rest:02d} left, "
 
 
 def not_converged(names: list[str]) -> None:

@@ -7,12 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import load_settings, progress
+from tissuq.cli.options import campaign_progress, load_settings
 from tissuq.errors import InputError
 
 __all__ = ["study"]
 
 study = typer.Typer(name="study", no_args_is_help=True, rich_markup_mode=None, help="Campaigns over many data sets.")
+
+Config = Annotated[Path | None, typer.Option(help="TOML file of the campaign.")]
+Out = Annotated[Path | None, typer.Option(help="Folder of the campaign [runs/NAME].")]
+Noise = Annotated[str | None, typer.Option(help="known or unknown.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of materials and noise.")]
+Workers = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
+Scheduler = Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead.")]
 
 
 @study.callback()
@@ -22,32 +29,60 @@ def _study() -> None:
 
 @study.command("coverage")
 def coverage(
-    config: Annotated[Path | None, typer.Option(help="TOML file of the campaign.")] = None,
-    preset: Annotated[str | None, typer.Option(help="Instead: designs, formulations, strength or rivals.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the campaign [runs/coverage-NAME].")] = None,
+    config: Config = None,
+    preset: Annotated[
+        str | None,
+        typer.Option(help="Instead: paper, panel, random-materials, strength, formulations, transfer, rivals, or sbc."),
+    ] = None,
+    out: Out = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every family.")] = None,
-    noise: Annotated[str | None, typer.Option(help="known or unknown.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of materials and noise.")] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes on this machine.")] = 1,
-    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead.")] = None,
+    noise: Noise = None,
+    seed: Seed = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
 ) -> None:
     """Count how often intervals hold the truth; the same command goes on with a campaign that was stopped."""
     from tissuq.cli.tables import print_rows
-    from tissuq.report.coverage import COLUMNS, readable_coverage, write_campaign
+    from tissuq.report.coverage import readable_coverage, write_campaign
     from tissuq.studies.coverage import PRESETS, CoverageSettings, run_campaign
     from tissuq.studies.coverage.campaign import tasks_of
 
+    if preset == "sbc" and config is None:
+        sbc(None, out, replicates, noise, seed, workers, scheduler)
+        return
     if (config is None) == (preset is None):
-        raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}.")
+        raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}, sbc.")
     options: dict[str, Any] = {"replicates": replicates, "noise": noise, "seed": seed}
     settings = load_settings(CoverageSettings, config, _with_preset(preset, options))
     folder = out or Path("runs") / f"coverage-{preset or (config or Path()).stem}"
-    _check_folder(folder, settings)
-    with progress(len(tasks_of(settings))) as step:
-        results = run_campaign(settings, folder, workers=workers, scheduler=scheduler, step=step)
+    results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_campaign)
     summary = write_campaign(settings, results, folder)
-    print_rows("Coverage of C10", COLUMNS, readable_coverage(summary))
+    print_rows("Coverage of C10", *readable_coverage(summary))
     print(f"± are Monte Carlo standard errors. Report: {folder / 'report.html'}")
+
+
+@study.command("sbc")
+def sbc(
+    config: Config = None,
+    out: Out = None,
+    replicates: Annotated[int | None, typer.Option(help="Data sets of every formulation.")] = None,
+    noise: Noise = None,
+    seed: Seed = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+) -> None:
+    """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
+    from tissuq.cli.tables import print_rows
+    from tissuq.report.sbc import readable_ranks, write_sbc
+    from tissuq.studies.sbc import SbcSettings, run_sbc
+    from tissuq.studies.sbc.campaign import tasks_of
+
+    settings = load_settings(SbcSettings, config, {"replicates": replicates, "noise": noise, "seed": seed})
+    folder = out or Path("runs") / (config.stem if config else "sbc")
+    results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_sbc)
+    table = write_sbc(settings, results, folder)
+    print_rows("Ranks of the truth", *readable_ranks(table))
+    print(f"Report: {folder / 'report.html'}")
 
 
 def _with_preset(name: str | None, options: dict[str, Any]) -> dict[str, Any]:
@@ -57,18 +92,47 @@ def _with_preset(name: str | None, options: dict[str, Any]) -> dict[str, Any]:
     return dict(preset(name)) | given if name else given
 
 
-def _check_folder(folder: Path, settings: Any) -> None:
-    """Make the folder of a campaign, or find that of the same one; refuse any other."""
-    import tomli_w
+def _carry_out(
+    settings: Any, folder: Path, workers: int, scheduler: str | None, total: int, run: Any
+) -> list[dict[str, Any]]:
+    """Carry out a campaign in its folder; nothing is written before its workers are there."""
+    from tissuq.studies.stream import open_pool
 
+    _check_folder(folder, settings)
+    with open_pool(workers, scheduler) as pool, campaign_progress(total) as step:
+        _write_recipe(folder, settings)
+        results: list[dict[str, Any]] = run(settings, folder, pool=pool, step=step)
+    return results
+
+
+def _check_folder(folder: Path, settings: Any) -> None:
+    """Refuse a folder that is not empty, unless it is that of the same campaign."""
     from tissuq.report.run_folder import RECIPE
 
     recipe = folder / RECIPE
-    text = tomli_w.dumps(settings.model_dump(mode="json"))
-    if not folder.exists() or not any(folder.iterdir()):
-        folder.mkdir(parents=True, exist_ok=True)
-        recipe.write_text(text, encoding="utf-8")
-    elif not recipe.exists():
+    if not folder.exists() or (folder.is_dir() and {path.name for path in folder.iterdir()} <= {_unfinished(recipe)}):
+        return
+    if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    elif recipe.read_text(encoding="utf-8") != text:
+    if recipe.read_text(encoding="utf-8") != _recipe(settings):
         raise InputError(f"'{folder}' holds a campaign with other settings; choose another folder with --out.")
+
+
+def _write_recipe(folder: Path, settings: Any) -> None:
+    """Write it whole or not at all, so that a campaign goes on from a kill at any point."""
+    from tissuq.report.run_folder import RECIPE
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scratch = folder / _unfinished(folder / RECIPE)
+    scratch.write_text(_recipe(settings), encoding="utf-8")
+    scratch.replace(folder / RECIPE)
+
+
+def _unfinished(recipe: Path) -> str:
+    return f"{recipe.name}.new"
+
+
+def _recipe(settings: Any) -> str:
+    import tomli_w
+
+    return tomli_w.dumps(settings.model_dump(mode="json"))

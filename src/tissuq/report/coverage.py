@@ -1,98 +1,100 @@
-"""The run folder of a campaign: tables, a figure and the report."""
+"""The run folder of a campaign: tables, figures and the report."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.report.figures import BAND, BASE, STYLE, save_figure
+from tissuq.report.coverage_figures import campaign_figures
+from tissuq.report.figures import save_figure
 from tissuq.report.page import embedded_figure, render
+from tissuq.report.rows import significant
 from tissuq.report.run_folder import RECIPE
-from tissuq.studies.coverage import CoverageSettings, summarise
+from tissuq.studies.coverage import CoverageSettings, summarise, summarise_unseen
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "readable_coverage", "write_campaign"]
+__all__ = ["readable_coverage", "write_campaign"]
 
-COLUMNS = ["design", "strength", "formulation", "fits", "coverage", "score", "width", "bias"]
-"""Of `readable_coverage`."""
+Rows = tuple[list[str], list[list[str]]]
+
+PLACES = {"design": "design", "strength": "strength", "noise": "noise", "family": "family", "mode": "loading mode"}
 
 
 def write_campaign(settings: CoverageSettings, results: list[dict[str, Any]], folder: Path) -> pd.DataFrame:
-    """Write summary.csv, families.csv, the figure and report.html beside the results; return the summary."""
+    """Write the tables as CSV, the figures and report.html beside the results; return the summary."""
     summary, families = summarise(settings, results), summarise(settings, results, "family")
-    summary.to_csv(folder / "summary.csv", index=False)
-    families.to_csv(folder / "families.csv", index=False)
+    tables = {"summary": summary, "families": families}
+    if settings.unseen:
+        tables["unseen"] = summarise_unseen(settings, results)
+    for name, table in tables.items():
+        table.to_csv(folder / f"{name}.csv", index=False)
+    figures = campaign_figures(tables, settings.prob)
     (folder / "figures").mkdir(exist_ok=True)
-    save_figure(_figure(summary, settings.prob), folder / "figures", "coverage")
+    for name, figure in figures.items():
+        save_figure(figure, folder / "figures", name)
     page = render(
         "coverage.html",
         settings=settings,
-        columns=COLUMNS,
-        rows=readable_coverage(summary),
-        families=_by_family(families),
+        summary=readable_coverage(summary),
+        families=readable_coverage(families) if "families" in figures else None,
+        unseen=_readable_unseen(tables["unseen"]) if settings.unseen else None,
+        is_series=len(settings.strengths) > 1,
         failed=int(summary["failed"].sum()),
         recipe=(folder / RECIPE).read_text(encoding="utf-8"),
         command="study coverage",
-        figure=embedded_figure(folder / "figures" / "coverage.svg"),
+        figures={name: embedded_figure(folder / "figures" / f"{name}.svg") for name in figures},
     )
     (folder / "report.html").write_text(page, encoding="utf-8")
     return summary
 
 
-def readable_coverage(summary: pd.DataFrame) -> list[list[str]]:
-    """Return the rows of a summary as text, with Monte Carlo errors."""
-    return [
+def readable_coverage(summary: pd.DataFrame) -> Rows:
+    """Return headers and rows of a summary as text, with Monte Carlo errors; places only where they differ."""
+    headers = {
+        "fits": ("fits", "count"),
+        "coverage": ("coverage", "percent"),
+        "score": ("score / C10", "number"),
+        "price": ("score / oracle", "number"),
+        "price_median": ("(median)", "number"),
+        "width": ("width / oracle", "number"),
+        "bias": ("bias", "percent"),
+        "predictive": ("new data in band", "percent"),
+    }
+    return _readable(summary, headers)
+
+
+def _readable_unseen(table: pd.DataFrame) -> Rows:
+    headers = {
+        "materials": ("materials", "count"),
+        "coverage": ("true stress in band", "percent"),
+        "error": ("error of the mean", "percent"),
+    }
+    return _readable(table, headers)
+
+
+def _readable(table: pd.DataFrame, headers: dict[str, tuple[str, str]]) -> Rows:
+    places = [name for name in PLACES if name in table and (name == "design" or table[name].nunique() > 1)]
+    columns = {name: header for name, header in headers.items() if name in table}
+    rows = [
         [
-            str(row["design"]),
-            f"{row['strength']:g}",
+            *(f"{row[name]:g}" if name == "strength" else str(row[name]) for name in places),
             str(row["formulation"]),
-            str(row["fits"]),
-            f"{row['coverage']:.1%} ± {row['coverage_error']:.1%}",
-            f"{row['score']:.3f} ± {row['score_error']:.3f}",
-            f"{row['width']:.1f}",
-            f"{row['bias']:+.1%}",
+            *(_with_error(row, name, kind) for name, (_, kind) in columns.items()),
         ]
-        for row in summary.to_dict("records")
+        for row in table.to_dict("records")
     ]
+    return [*(PLACES[name] for name in places), "formulation", *(text for text, _ in columns.values())], rows
 
 
-def _by_family(families: pd.DataFrame) -> dict[str, Any]:
-    """Return the coverage by family: one table, formulations as columns."""
-    table = families.pivot_table(
-        "coverage", ["design", "strength", "family"], "formulation", sort=False, aggfunc="first"
-    ).reset_index()
-    texts = [[f"{cell:.0%}" if isinstance(cell, float) and place > 2 else f"{cell:g}" if place == 1 else str(cell)
-              for place, cell in enumerate(row)] for row in table.itertuples(index=False)]  # fmt: skip
-    return {"columns": list(table.columns), "rows": texts}
-
-
-def _figure(summary: pd.DataFrame, prob: float) -> Figure:
-    """Draw the coverage of every formulation, a panel a design and strength."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    panels = list(summary.groupby(["design", "strength"], sort=False))
-    across = min(2, len(panels))
-    down = -(-len(panels) // across)
-    tall = max(len(rows) for _, rows in panels)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.0, down * (1.3 + 0.24 * tall)))
-        axes = figure.subplots(down, across, squeeze=False, sharex=True).ravel()
-        for axis in axes[len(panels) :]:
-            axis.remove()
-        for axis, ((design, strength), rows) in zip(axes, panels, strict=False):
-            places = list(range(len(rows)))[::-1]
-            axis.axvline(100 * prob, color=BASE, linewidth=1)
-            error = 196 * rows["coverage_error"]
-            axis.errorbar(100 * rows["coverage"], places, xerr=error, fmt="o", markersize=4, color=BAND)
-            axis.set_yticks(places, rows["formulation"])
-            axis.set_ylim(-0.7, len(rows) - 0.3)
-            axis.set_xlim(-2, 102)
-            axis.set_title(design if summary["strength"].nunique() == 1 else f"{design}, strength {strength:g}")
-        for axis in axes[max(0, len(panels) - across) : len(panels)]:
-            axis.tick_params(labelbottom=True)
-            axis.set_xlabel(f"{100 * prob:g} % intervals that hold the true C10 [%]")
-    return figure
+def _with_error(row: Any, name: str, kind: str) -> str:
+    """Return a number and its Monte Carlo standard error as text: a count, a share in percent, or any other number."""
+    value, error = row[name], row.get(f"{name}_error")
+    if kind == "count":
+        return f"{value:.0f}"
+    if error != error:  # of one data set
+        return significant(100 * value) + " %" if kind == "percent" else significant(value)
+    if kind == "percent":
+        return f"{100 * value:.1f} ± {100 * error:.1f} %"
+    return f"{significant(value)} ± {significant(error, 2)}"

@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from importlib.resources import files
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.path import invariants
-from tissuq.studies.coverage.formulations import check_formulation
-from tissuq.studies.coverage.truths import FAMILIES, LEAST_LIMIT
+from tissuq.priors import Prior, prior_from
+from tissuq.studies.coverage.families import FAMILIES, LEAST_LIMIT
+from tissuq.studies.coverage.fitted import model_of, parts_of
+from tissuq.studies.coverage.truths import FIXED, TRUTHS
 
-__all__ = ["PRESETS", "CoverageSettings", "Design", "preset"]
+__all__ = ["BLOCK", "PRESETS", "CoverageSettings", "Design", "preset"]
 
-PRESETS = ("designs", "formulations", "strength", "rivals")
+Found = TypeVar("Found")
+
+PRESETS = ("paper", "panel", "random-materials", "strength", "formulations", "transfer", "rivals")
 BLOCK = 50
 """Data sets of one task."""
+LOCKING = {"gent": LEAST_LIMIT, "fixed-gent": 30.0}
+"""The smallest I1 - 3 at which truths have no finite stress."""
 
 
 class Design(BaseModel):
-    """Where a specimen is measured, and with what noise (MPa)."""
+    """Where a specimen is measured, and with what noise (MPa, or times C10 in a campaign with a scale)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -43,10 +51,7 @@ class Design(BaseModel):
     @field_validator("mode")
     @classmethod
     def _known_mode(cls, name: str) -> str:
-        try:
-            loading_mode(name)
-        except TissuqError as error:
-            raise ValueError(str(error)) from error
+        _known(loading_mode, name)
         return name
 
     @property
@@ -62,9 +67,12 @@ class Design(BaseModel):
 
 
 class CoverageSettings(BaseModel):
-    """Truths x designs x formulations x replicates; each replicate is another material of its family and other noise.
+    """Truths x designs x noise x formulations x replicates; each replicate is another member of its family, and noise.
 
-    ``strengths`` multiply how far the truths are from neo-Hookean ones.
+    ``families`` names families and fixed materials; ``strengths`` multiply how far they are from neo-Hookean ones.
+    With ``scale`` C10 of the families is log-uniform between its ends (MPa), and the noise of every design is in units
+    of C10. ``priors`` replace those of the parameters that a formulation has. ``predictive`` asks for the share of new
+    measurements inside predictive bands, ``unseen`` for the true stress in loading modes that were not measured.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -73,12 +81,22 @@ class CoverageSettings(BaseModel):
     designs: tuple[Design, ...] = Field(min_length=1)
     formulations: tuple[str, ...] = Field(("none", "yeoh", "gp", "auto"), min_length=1)
     strengths: tuple[Annotated[float, Field(ge=0, le=1)], ...] = Field((1.0,), min_length=1)
+    noise: tuple[Literal["known", "unknown"], ...] = Field(("known",), min_length=1)
+    scale: tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...] = Field((), max_length=2)
+    priors: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    predictive: bool = False
+    unseen: tuple[str, ...] = ()
     replicates: int = Field(50, ge=1, le=100_000)
-    noise: Literal["known", "unknown"] = "known"
     prob: float = Field(0.95, gt=0, lt=1)
     seed: int = Field(0, ge=0)
+    most_fits: int = Field(1_000_000, ge=1)
 
-    @field_validator("families", "designs", "formulations", "strengths")
+    @field_validator("noise", mode="before")
+    @classmethod
+    def _one_or_more(cls, given: Any) -> Any:
+        return (given,) if isinstance(given, str) else given
+
+    @field_validator("families", "designs", "formulations", "strengths", "noise", "unseen")
     @classmethod
     def _each_once(cls, given: tuple[Any, ...]) -> tuple[Any, ...]:
         for place, each in enumerate(given):
@@ -86,34 +104,90 @@ class CoverageSettings(BaseModel):
                 raise ValueError(f"{each} is there twice, which would count the same fits twice")
         return given
 
-    @model_validator(mode="after")
-    def _within_reach(self) -> Self:
-        for design in self.designs if "gent" in self.families else ():
-            reach = float(invariants(loading_mode(design.mode), design.stretch)[0].max())
-            if reach >= 0.95 * LEAST_LIMIT:
-                raise ValueError(
-                    f"design {design.label}: I1 - 3 reaches {reach:.3g}, and Gent materials lock at {LEAST_LIMIT:g} or "
-                    "above; measure less far, or leave out the family gent"
-                )
-        return self
-
     @field_validator("families")
     @classmethod
     def _known_families(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            if name not in FAMILIES:
-                raise ValueError(f"there is no family '{name}'; there are {', '.join(FAMILIES)}")
+            if name not in TRUTHS:
+                raise ValueError(f"there is no family '{name}'; there are {', '.join(TRUTHS)}")
         return names
 
     @field_validator("formulations")
     @classmethod
     def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            try:
-                check_formulation(name)
-            except TissuqError as error:
-                raise ValueError(str(error)) from error
+            for part in parts_of(name):
+                _known(discrepancy_named, part)
         return names
+
+    @field_validator("unseen")
+    @classmethod
+    def _known_modes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            _known(loading_mode, name)
+        return names
+
+    @field_validator("scale")
+    @classmethod
+    def _two_ends(cls, ends: tuple[float, ...]) -> tuple[float, ...]:
+        if ends and (len(ends) < 2 or ends[0] >= ends[1]):
+            raise ValueError("needs a smaller and a larger C10 in MPa, such as [0.001, 100.0]")
+        return ends
+
+    @field_validator("priors")
+    @classmethod
+    def _known_priors(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        return {symbol: _known(prior_from, prior).as_dict() for symbol, prior in given.items()}
+
+    @model_validator(mode="after")
+    def _within_limits(self) -> Self:
+        if self.fits > self.most_fits:
+            raise ValueError(
+                f"{self.fits:,} fits are asked for, and no more than {self.most_fits:,} are made unasked: take fewer "
+                "families, designs, noises, strengths, formulations or replicates, or set most_fits to so many"
+            )
+        fixed = [name for name in self.families if name in FIXED]
+        if self.scale and fixed:
+            raise ValueError(f"a scale is for families, and {', '.join(fixed)} has a C10 of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        for design in self.designs:
+            reach = float(invariants(loading_mode(design.mode), design.stretch)[0].max())
+            for family in LOCKING.keys() & self.families:
+                if reach >= 0.95 * LOCKING[family]:
+                    raise ValueError(
+                        f"design {design.label}: I1 - 3 reaches {reach:.3g}, and Gent materials lock at "
+                        f"{LOCKING[family]:g} or above; measure less far, or leave out {family}"
+                    )
+            if design.mode in self.unseen:
+                raise ValueError(f"design {design.label} measures {design.mode} stress, so it is not unseen")
+            for formulation in self.formulations:
+                for noise in self.noise:
+                    noise_sd = design.noise_sd if noise == "known" else noise
+                    try:
+                        for part in parts_of(formulation):
+                            model_of(part, design.mode, design.stretch, noise_sd, self.chosen_priors)
+                    except TissuqError as error:
+                        where = f"design {design.label} with '{formulation}' and {noise} noise"
+                        raise ValueError(f"{where}: {error}") from error
+        return self
+
+    @property
+    def cells(self) -> int:
+        """How many combinations there are of everything but families and replicates."""
+        return len(self.designs) * len(self.strengths) * len(self.noise) * len(self.formulations)
+
+    @property
+    def fits(self) -> int:
+        """How many posteriors are computed."""
+        return self.cells * len(self.families) * self.replicates
+
+    @property
+    def chosen_priors(self) -> dict[str, Prior]:
+        """The priors that are given."""
+        return {symbol: prior_from(given) for symbol, given in self.priors.items()}
 
 
 def preset(name: str) -> dict[str, object]:
@@ -127,3 +201,11 @@ def preset(name: str) -> dict[str, object]:
     if name not in PRESETS:
         raise InputError(f"there is no preset '{name}'. Choose one of: {', '.join(PRESETS)}.")
     return tomllib.loads((files("tissuq.studies.coverage") / "presets" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _known(find: Callable[[Any], Found], given: Any) -> Found:
+    """Return what is found by a name, or say why nothing is."""
+    try:
+        return find(given)
+    except TissuqError as error:
+        raise ValueError(str(error)) from error

@@ -1,0 +1,199 @@
+"""Figures of a campaign: coverage and its price, by family, by strength, and in unseen loading modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.report.figures import BAND, BASE, STYLE, TRUTH
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["campaign_figures"]
+
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = "osD^vP*"
+CELL = ["design", "strength", "noise"]
+ERRORS = 1.96
+"""Monte Carlo standard errors of a bar."""
+MOST_COLUMNS = 3
+
+
+def campaign_figures(tables: Mapping[str, pd.DataFrame], prob: float) -> dict[str, Figure]:
+    """Return the figures of a campaign by name, from its tables: summary, families and, where there is one, unseen.
+
+    There is none by family where there is one family only.
+    """
+    from matplotlib import rc_context
+
+    summary, families = tables["summary"], tables["families"]
+    is_series = summary["strength"].nunique() > 1
+    with rc_context(STYLE):
+        figures = {"coverage": (_of_strength if is_series else _overview)(summary, prob)}
+        if families["family"].nunique() > 1:
+            figures["families"] = _by_family(families, prob)
+        if "unseen" in tables:
+            figures["unseen"] = _of_unseen(tables["unseen"], prob)
+    return figures
+
+
+def _overview(summary: pd.DataFrame, prob: float) -> Figure:
+    """Draw coverage and price of every formulation, a row of panels a design and noise.
+
+    Where there is one formulation only, designs take the place of formulations.
+    """
+    measures = ["coverage", "price", *(["predictive"] if "predictive" in summary else [])]
+    if summary["formulation"].nunique() == 1:
+        panels = [(str(summary["formulation"].iloc[0]), _labels(summary), summary)]
+    else:
+        panels = [(_labels(rows)[0], list(rows["formulation"]), rows) for _, rows in summary.groupby(CELL, sort=False)]
+    tall = max(len(labels) for _, labels, _ in panels)
+    figure, axes = _grid(len(panels), len(measures), 0.75 + 0.24 * tall)
+    for row, (title, labels, table) in zip(axes, panels, strict=True):
+        places = list(range(len(labels)))[::-1]
+        for axis, measure in zip(row, measures, strict=True):
+            _dots(axis, table, measure, places, prob)
+            axis.set_yticks(places, labels if axis is row[0] else [""] * len(labels))
+            axis.set_ylim(-0.7, len(labels) - 0.3)
+        row[0].set_title(title)
+    texts = {
+        "coverage": f"{100 * prob:g} % intervals that hold the true C10 [%]",
+        "price": "mean score ●, median width ○; oracle's width = 1",
+        "predictive": f"new measurements in the {100 * prob:g} % band [%]",
+    }
+    for axis, measure in zip(axes[-1], measures, strict=True):
+        axis.set_xlabel(texts[measure])
+    return figure
+
+
+def _dots(axis: Axes, table: pd.DataFrame, measure: str, places: list[int], prob: float) -> None:
+    factor = 1.0 if measure == "price" else 100.0
+    axis.axvline(1.0 if measure == "price" else 100 * prob, color=BASE, linewidth=1)
+    error: Any = ERRORS * factor * table[f"{measure}_error"]
+    if measure == "price":
+        axis.plot(table["width"], places, "o", markersize=5, markerfacecolor="white", color=BAND)
+        axis.set_xscale("log")
+        axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        error = np.minimum(error, 0.9 * table["price"])
+    else:
+        axis.set_xlim(-2, 102)
+    axis.errorbar(factor * table[measure], places, xerr=error, fmt="o", markersize=4, color=BAND)
+
+
+def _by_family(families: pd.DataFrame, prob: float) -> Figure:
+    """Draw coverage by family as a table of colours, a panel a formulation and a column a design.
+
+    Where there is one design only, formulations take the place of designs.
+    """
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.figure import Figure
+
+    families = families.assign(cell=_labels(families))
+    if families["cell"].nunique() == 1:
+        families = families.assign(cell=families["formulation"], formulation=families["cell"])
+    panels = list(families.groupby("formulation", sort=False))
+    columns, names = list(dict.fromkeys(families["cell"])), list(dict.fromkeys(families["family"]))
+    across = max(1, min(len(panels), 12 // len(columns)))
+    down = -(-len(panels) // across)
+    colors = LinearSegmentedColormap.from_list(
+        "held", [(0, TRUTH), (0.8, "#fbe3d4"), (0.95, "#ffffff"), (1, "#cfe3f1")]
+    )
+    beneath = 0.4 + 0.08 * max(map(len, columns))
+    figure = Figure(figsize=(1.6 + across * (0.62 * len(columns) + 0.3), down * (0.27 * len(names) + 0.4) + beneath))
+    axes = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
+    for axis in axes[len(panels) :]:
+        axis.remove()
+    for axis, (title, rows) in zip(axes, panels, strict=False):
+        table = rows.pivot_table("coverage", "family", "cell", sort=False, aggfunc="first")
+        values = table.reindex(index=names, columns=columns).to_numpy()
+        axis.imshow(_shade(values, prob), cmap=colors, vmin=0, vmax=1, aspect="auto")
+        for (row, column), value in np.ndenumerate(values):
+            if np.isfinite(value):
+                axis.text(column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=8.5)
+        axis.set_title(str(title))
+        axis.tick_params(length=0)
+        axis.spines[:].set_visible(False)
+        axis.set_yticks(range(len(names)), names)
+        axis.set_xticks(range(len(columns)), columns, rotation=90)
+    return figure
+
+
+def _shade(values: Any, prob: float) -> Any:
+    """Return coverage so that the nominal one is at 0.95."""
+    return np.where(values <= prob, 0.95 * values / prob, 0.95 + 0.05 * (values - prob) / (1 - prob))
+
+
+def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
+    """Draw coverage and price over the strength of the model's error, a line a formulation."""
+    panels = list(summary.groupby(["design", "noise"], sort=False))
+    figure, axes = _grid(len(panels), 2, 2.6)
+    for row, ((design, noise), table) in zip(axes, panels, strict=True):
+        for place, (name, line) in enumerate(table.groupby("formulation", sort=False)):
+            style: dict[str, Any] = {"color": COLORS[place % len(COLORS)], "marker": MARKERS[place % len(MARKERS)]}
+            style |= {"markersize": 4, "label": name}
+            error = 100 * ERRORS * line["coverage_error"]
+            row[0].errorbar(line["strength"], 100 * line["coverage"], yerr=error, **style)
+            row[1].errorbar(line["strength"], line["price"], yerr=ERRORS * line["price_error"], **style)
+        row[0].axhline(100 * prob, color=BASE, linewidth=1, zorder=0)
+        row[0].set_ylabel("intervals that hold C10 [%]")
+        row[1].set_ylabel("mean score / oracle's width")
+        row[1].set_yscale("log")
+        row[1].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        row[0].set_title(str(design) if summary["noise"].nunique() == 1 else f"{design}, {noise} noise")
+    for axis in axes[-1]:
+        axis.set_xlabel("strength of the error of the model")
+    handles, names = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=min(5, len(names)))
+    return figure
+
+
+def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
+    """Draw coverage and error of the true stress in other loading modes, a row of panels a design and noise."""
+    panels = list(unseen.groupby(CELL, sort=False))
+    names, modes = list(dict.fromkeys(unseen["formulation"])), list(dict.fromkeys(unseen["mode"]))
+    figure, axes = _grid(len(panels), 2, 0.75 + 0.3 * len(names))
+    for row, (_, table) in zip(axes, panels, strict=True):
+        for which, mode in enumerate(modes):
+            own = table[table["mode"] == mode]
+            places = [len(names) - 1 - names.index(name) + 0.2 * (0.5 * (len(modes) - 1) - which)
+                      for name in own["formulation"]]  # fmt: skip
+            for axis, measure in zip(row, ("coverage", "error"), strict=True):
+                bars = ERRORS * 100 * own[f"{measure}_error"]
+                style: dict[str, Any] = {"fmt": MARKERS[which], "markersize": 4, "color": COLORS[which], "label": mode}
+                axis.errorbar(100 * own[measure], places, xerr=bars, **style)
+        row[0].axvline(100 * prob, color=BASE, linewidth=1, zorder=0)
+        row[0].set_xlim(-2, 102)
+        for axis in row:
+            axis.set_yticks(range(len(names)), names[::-1] if axis is row[0] else [""] * len(names))
+            axis.set_ylim(-0.6, len(names) - 0.4)
+        row[0].set_title(_labels(table)[0])
+    axes[-1][1].set_xlim(left=0)
+    axes[-1][0].set_xlabel(f"true stress in the {100 * prob:g} % band [%]")
+    axes[-1][1].set_xlabel("median error of the predicted mean [%]")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def _grid(down: int, across: int, height: float) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure with rows of panels that share their horizontal axes."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.9 * across if across < MOST_COLUMNS else 11.5, down * height + 0.5))
+    axes = figure.subplots(down, across, squeeze=False, sharex="col")
+    return figure, axes.tolist()
+
+
+def _labels(table: pd.DataFrame) -> list[str]:
+    """Return what tells the rows' designs, strengths and noises apart."""
+    return [
+        str(design)
+        + (", noise unknown" if noise == "unknown" else "")
+        + (f", strength {strength:g}" if strength != 1 else "")
+        for design, strength, noise in zip(table["design"], table["strength"], table["noise"], strict=True)
+    ]

@@ -1,0 +1,93 @@
+"""The fits of a campaign: a neo-Hookean material with a formulation of its error, on many data sets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment import Average, average
+from tissuq.discrepancy import discrepancy_named
+from tissuq.errors import ModelError, TissuqError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import loading_mode
+from tissuq.fitting import fit_many
+from tissuq.inference.energies import why_no_energies
+from tissuq.mechanics import NeoHookean, engineering_stress
+from tissuq.model import StatisticalModel
+from tissuq.noise import noise_named
+from tissuq.posterior import Posterior
+from tissuq.priors import Prior
+from tissuq.studies.paper.settings import FORMULATIONS
+
+__all__ = ["AVERAGES", "fit_all", "model_of", "parts_of"]
+
+AVERAGES = {"average-of-seven": FORMULATIONS}
+"""Averages of fits by their evidence: the paper's seven formulations."""
+NoiseSd = float | str
+"""In MPa, or ``"unknown"``."""
+
+
+def fit_all(
+    data: Sequence[Experiment], formulation: str, noise_sd: Sequence[NoiseSd], priors: Mapping[str, Prior]
+) -> list[Posterior | Average | None]:
+    """Return the posterior of every data set, None where a fit failed.
+
+    Data sets of the same noise are fitted together, and one by one where all together fail.
+    """
+    found: list[Posterior | Average | None] = [None] * len(data)
+    for level in dict.fromkeys(noise_sd):
+        places = [place for place, own in enumerate(noise_sd) if own == level]
+        posteriors = _fit_together([data[place] for place in places], formulation, level, priors)
+        for place, posterior in zip(places, posteriors, strict=True):
+            found[place] = posterior
+    return found
+
+
+def parts_of(formulation: str) -> tuple[str, ...]:
+    """Return the discrepancies that a formulation averages: itself, where it is one."""
+    return AVERAGES.get(formulation, (formulation,))
+
+
+def model_of(
+    formulation: str, mode: str, stretch: NDArray[np.float64], noise_sd: NoiseSd, priors: Mapping[str, Prior]
+) -> StatisticalModel:
+    """Return the model that is fitted to data on these stretches, with a stress that does not matter.
+
+    Raises
+    ------
+    TissuqError
+        When such data cannot be fitted.
+    """
+    stress = engineering_stress(NeoHookean(), loading_mode(mode), stretch, [1.0])
+    own, noise = _own_priors(formulation, noise_sd, priors), noise_named(noise_sd)
+    data = Experiment(loading_mode(mode), stretch, stress)
+    model = StatisticalModel(data, NeoHookean(), discrepancy_named(formulation), noise, own)
+    why = why_no_energies(model) if model.energy_symbols else ""
+    if why:
+        raise ModelError(f"'{formulation}' cannot be integrated: {why}")
+    return model
+
+
+def _own_priors(formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]) -> dict[str, Prior]:
+    """Return those priors whose parameters a formulation has."""
+    every = (*NeoHookean.parameters, *discrepancy_named(formulation).parameters, *noise_named(noise_sd).parameters)
+    return {p.symbol: priors[p.symbol] for p in every if p.symbol in priors}
+
+
+def _fit_together(
+    data: Sequence[Experiment], formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]
+) -> list[Posterior | Average | None]:
+    names, noise = parts_of(formulation), noise_named(noise_sd)
+    try:
+        fits = [
+            fit_many(data, discrepancy=name, noise=noise, priors=_own_priors(name, noise_sd, priors)) for name in names
+        ]
+        if len(names) == 1:
+            return list(fits[0])
+        return [average(dict(zip(names, each, strict=True))) for each in zip(*fits, strict=True)]
+    except (TissuqError, np.linalg.LinAlgError):
+        if len(data) == 1:
+            return [None]
+        return [each for one in data for each in _fit_together([one], formulation, noise_sd, priors)]

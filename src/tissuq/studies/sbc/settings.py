@@ -1,0 +1,88 @@
+"""What a calibration by simulation runs over."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from tissuq.discrepancy import discrepancy_named
+from tissuq.errors import TissuqError
+from tissuq.mechanics import NeoHookean
+from tissuq.model import StatisticalModel
+from tissuq.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
+from tissuq.studies.coverage.fitted import model_of
+from tissuq.studies.coverage.settings import Design
+
+__all__ = ["SbcSettings"]
+
+PRIORS: dict[str, Prior] = {
+    "C10": Uniform(0.5, 1.5),
+    **{symbol: Normal(0, 0.3) for symbol in ("m0", "m1", "m2", "C01")},
+    "C20": Normal(0, 0.2),
+    "C30": Normal(0, 0.1),
+    "S": Uniform(0, 0.5),
+    "c": Uniform(0, 1),
+    "psi": Uniform(0.2, 2),
+    "c1": HalfCauchy(0.1),
+    "c2": HalfCauchy(0.1),
+    "noise_sd": Uniform(0.05, 0.5),
+}
+FORMULATIONS = (
+    *("none", "constant", "linear", "quadratic", "mooney-rivlin", "yeoh", "gp"),
+    *("taylor", "log", "spline", "zero-modulus", "valanis-landel", "auto", "auto-balanced", "auto-sharp"),
+)
+
+
+class SbcSettings(BaseModel):
+    """Formulations x noise x replicates; in each, parameters from the priors, data from the model, and a fit.
+
+    The priors (MPa; psi in stretch) are the same for every data set: none is taken from the data. Known noise is that
+    of the design.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    formulations: tuple[str, ...] = Field(FORMULATIONS, min_length=1)
+    noise: tuple[Literal["known", "unknown"], ...] = Field(("known", "unknown"), min_length=1)
+    design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
+    priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
+    replicates: int = Field(300, ge=20, le=100_000)
+    seed: int = Field(0, ge=0)
+
+    @field_validator("noise", mode="before")
+    @classmethod
+    def _one_or_more(cls, given: Any) -> Any:
+        return (given,) if isinstance(given, str) else given
+
+    @field_validator("formulations", "noise")
+    @classmethod
+    def _each_once(cls, given: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(given)) < len(given):
+            raise ValueError("something is there twice, which would count the same fits twice")
+        return given
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        try:
+            chosen = self.chosen_priors
+            for formulation in self.formulations:
+                every = (*NeoHookean.parameters, *discrepancy_named(formulation).parameters)
+                missing = [p.symbol for p in every if isinstance(chosen.get(p.symbol, Flat()), Flat)]
+                if missing:
+                    raise ValueError(f"'{formulation}' needs proper priors of {', '.join(missing)} to be drawn from")
+                for noise in self.noise:
+                    self.model(formulation, noise)
+        except TissuqError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    @property
+    def chosen_priors(self) -> dict[str, Prior]:
+        """The given priors, and ours for what is not given."""
+        return PRIORS | {symbol: prior_from(given) for symbol, given in self.priors.items()}
+
+    def model(self, formulation: str, noise: str) -> StatisticalModel:
+        """Return the model of a formulation, on data that do not matter."""
+        noise_sd = self.design.noise_sd if noise == "known" else noise
+        return model_of(formulation, self.design.mode, self.design.stretch, noise_sd, self.chosen_priors)

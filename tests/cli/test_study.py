@@ -1,0 +1,72 @@
+"""Campaigns from the command line: their folders, their presets, how they go on."""
+
+from __future__ import annotations
+
+import csv
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tissuq.cli.options import _duration
+from tissuq.studies.coverage import PRESETS
+
+CAMPAIGN = """
+designs = [{ low = 0.7, high = 2.0, points = 9, noise_sd = 0.1 }]
+formulations = ["none"]
+families = ["yeoh", "gent"]
+replicates = 2
+"""
+
+
+def test_the_help_names_every_preset(cli):
+    said = " ".join(cli("study", "coverage", "--help").out.split()).replace("│ ", "").replace("random- ", "random-")
+    assert all(name in said for name in (*PRESETS, "sbc"))
+
+
+def test_the_settings_in_a_campaigns_folder_repeat_it(cli, here):
+    (here / "small.toml").write_text(CAMPAIGN + "scale = [0.01, 10.0]\npredictive = true\nunseen = ['planar']\n")
+    assert cli("study", "coverage", "--config", "small.toml").status == 0
+    first = here / "runs" / "coverage-small"
+    assert cli("study", "coverage", "--config", first / "run.toml", "--out", "again").status == 0
+    for name in ("tasks.jsonl", "summary.csv", "families.csv", "unseen.csv", "run.toml"):
+        assert (first / name).read_bytes() == (here / "again" / name).read_bytes()
+
+
+def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
+    (here / "quick.toml").write_text('formulations = ["none", "zero-modulus"]\nreplicates = 20\n')
+    arguments = ("study", "sbc", "--config", "quick.toml", "--noise", "known", "--out", "out")
+    assert cli(*arguments).status == 0
+    tasks = (here / "out" / "tasks.jsonl").read_bytes()
+    with (here / "out" / "ranks.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["formulation"], row["parameter"]) for row in rows] == [
+        ("none", "C10"), ("zero-modulus", "C10"), ("zero-modulus", "c1"),
+    ]  # fmt: skip
+    page = (here / "out" / "report.html").read_text(encoding="utf-8")
+    assert all(f"{float(row['spread']):.3f}" in page for row in rows)
+    (here / "out" / "tasks.jsonl").write_bytes(tasks[:100])
+    said = cli(*arguments)
+    assert said.status == 0
+    assert "zero-modulus" in said.out
+    assert (here / "out" / "tasks.jsonl").read_bytes() == tasks
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(None, ""), (65.0, "1:05 left, "), (7260.0, "2 h 01 min left, ")])
+def test_the_time_left_is_told_in_minutes_or_hours(seconds, text):
+    assert _duration(seconds) == text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_a_campaign_shows_progress_and_time_left_on_a_terminal(here):
+    import pty
+
+    (here / "small.toml").write_text(CAMPAIGN)
+    reader, terminal = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "120"}
+    command = [sys.executable, "-m", "tissuq", "study", "coverage", "--config", "small.toml"]
+    subprocess.run(command, stderr=terminal, stdout=subprocess.DEVNULL, check=True, env=environment)
+    shown = os.read(reader, 100_000).decode("utf-8", "replace")
+    assert "2/2" in shown
+    assert "left, none" in shown

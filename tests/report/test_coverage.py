@@ -1,0 +1,69 @@
+"""The report of a campaign shows every number of its tables, and draws every kind of campaign."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tissuq.report.coverage import readable_coverage, write_campaign
+from tissuq.report.run_folder import RECIPE
+from tissuq.studies.coverage import CoverageSettings
+from tissuq.studies.coverage.campaign import tasks_of
+
+DESIGN = {"low": 0.7, "high": 2.0, "points": 12, "noise_sd": 0.1}
+
+
+def settings_of(**changes):
+    given = {"designs": [DESIGN], "families": ["yeoh", "gent"], "formulations": ["none", "auto"], "replicates": 3}
+    return CoverageSettings.model_validate(given | changes)
+
+
+def made_up(settings):
+    """Results of every task from a generator: what is in them does not matter here."""
+    generator = np.random.default_rng(0)
+    found = []
+    for task in tasks_of(settings):
+        low = generator.uniform(0.8, 1.1, task.count)
+        fits = [[each, each + 0.1, each + 0.05, 0.02] for each in low]
+        own = task.place | {"truth": [1.0] * task.count, "oracle_sd": [0.01] * task.count, "fits": fits}
+        more = {mode: [[0.9, 0.05]] * task.count for mode in settings.unseen}
+        found.append(own | more | {"predictive": [0.94] * task.count})
+    return found
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"formulations": ["auto"], "families": ["gent"]},
+        {"replicates": 1, "families": ["gent"]},
+        {"strengths": [0.0, 0.5, 1.0], "noise": ["known", "unknown"]},
+        {"predictive": True, "unseen": ["equibiaxial", "planar"], "designs": [DESIGN, DESIGN | {"points": 30}]},
+    ],
+)
+def test_every_kind_of_campaign_has_its_page_tables_and_figures(changes, tmp_path):
+    settings = settings_of(**changes)
+    (tmp_path / RECIPE).write_text("seed = 0\n")
+    summary = write_campaign(settings, made_up(settings), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    _, rows = readable_coverage(summary)
+    assert len(rows) == settings.cells
+    assert all(cell in page for row in rows for cell in row)
+    names = {
+        "coverage",
+        *(["families"] if len(settings.families) > 1 else []),
+        *(["unseen"] if settings.unseen else []),
+    }
+    assert {path.stem for path in (tmp_path / "figures").iterdir()} == names
+    assert page.count("<img") == len(names)
+    assert {path.stem for path in tmp_path.glob("*.csv")} == {"summary", "families"} | (names - {"coverage"})
+    assert not any("nan" in cell for row in rows for cell in row)
+
+
+def test_failed_fits_are_told(tmp_path):
+    settings = settings_of()
+    (tmp_path / RECIPE).write_text("seed = 0\n")
+    results = made_up(settings)
+    results[0]["fits"][1] = None
+    assert write_campaign(settings, results, tmp_path)["failed"].sum() == 1
+    assert "1 fits failed" in (tmp_path / "report.html").read_text(encoding="utf-8")
