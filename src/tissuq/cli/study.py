@@ -32,7 +32,10 @@ def coverage(
     config: Config = None,
     preset: Annotated[
         str | None,
-        typer.Option(help="Instead: paper, panel, random-materials, strength, formulations, transfer, rivals, or sbc."),
+        typer.Option(
+            help="Instead: paper, panel, random-materials, further-families, strength, formulations, transfer, rivals, "
+            "or sbc."
+        ),
     ] = None,
     out: Out = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every family.")] = None,

@@ -9,7 +9,7 @@ import numpy as np
 from tissuq.studies.coverage import laws
 from tissuq.studies.coverage.laws import Law
 
-__all__ = ["FAMILIES", "LEAST_LIMIT"]
+__all__ = ["FAMILIES", "FURTHER", "LEAST_LIMIT"]
 
 Generator = np.random.Generator
 
@@ -41,3 +41,13 @@ FAMILIES: dict[str, Callable[[Generator], Law]] = {
     "coupled": lambda generator: laws.coupled(0.05 * abs(generator.standard_normal())),
 }
 """Laws with random parameters, by name."""
+
+FURTHER: dict[str, Callable[[Generator], Law]] = {
+    "gent-gent": lambda generator: laws.gent_gent(generator.uniform(LEAST_LIMIT, 60), generator.uniform(0, 0.5)),
+    "carroll": lambda generator: laws.carroll(generator.uniform(0, 0.1), generator.uniform(0, 0.4)),
+    "exp-ln": lambda generator: laws.exp_ln(generator.uniform(0.02, 0.15), generator.uniform(0, 0.3)),
+    "hart-smith": lambda generator: laws.hart_smith(generator.uniform(5e-4, 5e-3), generator.uniform(0, 0.5)),
+    "lopez-pamies": lambda generator: laws.lopez_pamies(*generator.uniform([0.6, 1.5, 0.0], [1.2, 4.0, 0.3])),
+    "recruitment": lambda generator: laws.recruitment(generator.uniform(0.2, 2), generator.uniform(0.2, 2)),
+}
+"""Families on which no default was chosen."""

@@ -16,13 +16,19 @@ from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 __all__ = [
     "Law",
     "arruda_boyce",
+    "carroll",
     "coupled",
     "demiray",
+    "exp_ln",
     "gent",
+    "gent_gent",
+    "hart_smith",
     "knowles",
+    "lopez_pamies",
     "mooney_rivlin",
     "neo_hookean",
     "ogden",
+    "recruitment",
     "veronda_westmann",
     "yeoh",
 ]
@@ -96,6 +102,38 @@ def veronda_westmann(rate: float) -> Law:
 def coupled(b: float) -> Law:
     """I1 - 3 + b (I1 - 3) (I2 - 3), an energy that does not separate."""
     return _of_invariants(lambda x, y: (1 + b * y, b * x))
+
+
+def gent_gent(limit: float, share: float) -> Law:
+    """Gent's law and 3 share log(I2 / 3) (Pucci & Saccomandi 2002)."""
+    return _of_invariants(lambda x, y: ((1 - share) * limit / (limit - x), share * 3 / (y + 3)))
+
+
+def carroll(share: float, second: float) -> Law:
+    """I1, share of I1^4 and a root of I2 (Carroll 2011)."""
+    return _of_invariants(lambda x, y: (1 - share - second + share * (1 + x / 3) ** 3, second * (1 + y / 3) ** -0.5))
+
+
+def exp_ln(rate: float, share: float) -> Law:
+    """W1 = exp(rate (I1 - 3)) - share log(I1 - 2): softening before it stiffens (Khajehsaeid et al. 2013)."""
+    return _of_invariants(lambda x, y: (np.exp(rate * x) - share * np.log1p(x), 0 * x))
+
+
+def hart_smith(rate: float, share: float) -> Law:
+    """W1 = (1 - share) exp(rate (I1 - 3)^2), and 3 share log(I2 / 3) (Hart-Smith 1966)."""
+    return _of_invariants(lambda x, y: ((1 - share) * np.exp(rate * x**2), share * 3 / (y + 3)))
+
+
+def lopez_pamies(first: float, second: float, share: float) -> Law:
+    """Two powers of I1 (Lopez-Pamies 2010)."""
+    return _of_invariants(
+        lambda x, y: ((1 - share) * (1 + x / 3) ** (first - 1) + share * (1 + x / 3) ** (second - 1), 0 * x)
+    )
+
+
+def recruitment(gain: float, place: float) -> Law:
+    """W1 = 1 + gain x / (x + place), x = I1 - 3: fibres that take up load one after another."""
+    return _of_invariants(lambda x, y: (1 + gain * x / (x + place), 0 * x))
 
 
 def _of_invariants(derivatives: Derivatives) -> Law:

@@ -24,10 +24,10 @@ __all__ = ["BLOCK", "PRESETS", "CoverageSettings", "Design", "preset"]
 
 Found = TypeVar("Found")
 
-PRESETS = ("paper", "panel", "random-materials", "strength", "formulations", "transfer", "rivals")
+PRESETS = ("paper", "panel", "random-materials", "strength", "formulations", "transfer", "rivals", "further-families")
 BLOCK = 50
 """Data sets of one task."""
-LOCKING = {"gent": LEAST_LIMIT, "fixed-gent": 30.0}
+LOCKING = {"gent": LEAST_LIMIT, "gent-gent": LEAST_LIMIT, "fixed-gent": 30.0}
 """The smallest I1 - 3 at which truths have no finite stress."""
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import LoadingMode
 from tissuq.studies.coverage import laws
-from tissuq.studies.coverage.families import FAMILIES
+from tissuq.studies.coverage.families import FAMILIES, FURTHER
 from tissuq.studies.coverage.laws import Law
 
 __all__ = ["FIXED", "TRUTHS", "Truth", "draw_truth"]
@@ -34,7 +34,7 @@ FIXED: dict[str, tuple[float, Law]] = {
 }
 """C10 (MPa) and law of materials of which there is one each; the first is that of Zeraatpisheh et al. (2021)."""
 
-TRUTHS = (*FAMILIES, *FIXED)
+TRUTHS = (*FAMILIES, *FIXED, *FURTHER)
 """The names of all families and fixed materials."""
 
 
@@ -64,4 +64,4 @@ def draw_truth(name: str, seed: tuple[int, ...], scale: Sequence[float] = ()) ->
         return Truth(*FIXED[name])
     generator = np.random.default_rng(seed)
     log_C10 = generator.uniform(*np.log(scale)) if scale else C10_SPREAD * generator.standard_normal()
-    return Truth(float(np.exp(log_C10)), FAMILIES[name](generator))
+    return Truth(float(np.exp(log_C10)), (FAMILIES | FURTHER)[name](generator))
