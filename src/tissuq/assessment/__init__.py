@@ -3,5 +3,6 @@
 from tissuq.assessment.comparison import compare
 from tissuq.assessment.design import design_warnings
 from tissuq.assessment.extent import Assessment, assess
+from tissuq.assessment.sensitivity import PowerScaling, known_evidence_changes
 
-__all__ = ["Assessment", "assess", "compare", "design_warnings"]
+__all__ = ["Assessment", "PowerScaling", "assess", "compare", "design_warnings", "known_evidence_changes"]

@@ -219,6 +219,11 @@ class EnergySolution(Solution):
         """The component of every draw, and its linear parameters and weights."""
         return self.components.drawn(self._seed)
 
+    @property
+    def component_of_draw(self) -> Places:
+        """The component of every draw."""
+        return self._drawn[0]
+
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:
             return self._bounded.marginal(self.model.linear.index(symbol))

@@ -175,6 +175,11 @@ class Solution(ABC):
         """Draws of every parameter."""
 
     @property
+    @abstractmethod
+    def component_of_draw(self) -> NDArray[np.intp]:
+        """The place among `components` of every draw (chains, draws)."""
+
+    @property
     def is_approximate(self) -> bool:
         """Whether the result must not be used as it stands, because sampling has not converged."""
         return self.diagnostics is not None and not self.diagnostics.converged
