@@ -44,8 +44,8 @@ def warnings_about(solution: Solution) -> Iterator[str]:
     low, high = solution.marginals[headline].hdi()
     if high - low > VAGUE * abs(float(solution.marginals[headline].quantile(0.5))):
         yield (
-            f"the data say little of {headline}: its 95 % interval is wider than its median is large. Measure more, nearer "
-            "stretch 1, or with less noise."
+            f"the data say little of {headline}: its 95 % interval is wider than its median is large. Measure more, "
+            "nearer stretch 1, or with less noise."
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:

@@ -39,7 +39,7 @@ STEP = 1e-4
 NOTHING = 1e-3
 """Share of the initial stiffness that is as good as none."""
 LITTLE, MUCH = 0.2, 0.5
-"""Shifts of the mean, in standard deviations, from which the prior scales of the discrepancy matter a little, and much."""
+"""Shifts of the mean, in standard deviations, from which the discrepancy's prior scales matter a little, and much."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,7 @@ class Assessment:
     @property
     def sentences(self) -> list[str]:
         """The numbers as a person reads them."""
-        found = list(self._shares()) if any(self.share) else [
-            f"there is no discrepancy: whatever the material lacks is taken for noise, and the interval of {self.parameter} "
-            "knows nothing of it"
-        ]
+        found = list(self._shares())
         if self.width_against_none is not None:
             found.append(f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy")
         if self.probability_of_none is not None:
@@ -115,8 +112,8 @@ class Assessment:
         if self.shifts:
             worst = max(self.shifts, key=lambda factor: abs(self.shifts[factor]))
             found.append(
-                f"the prior scale of {' and '.join(self.scales)} {_weight(self.shifts[worst])}: times {worst:g} it moves "
-                f"{self.parameter} by {self.shifts[worst]:+.2f} sd"
+                f"the prior scale of {' and '.join(self.scales)} {_weight(self.shifts[worst])}: times {worst:g} it "
+                f"moves {self.parameter} by {self.shifts[worst]:+.2f} sd"
             )
         if self.power_scaling is not None:
             found.append(self.power_scaling.sentence(self.parameter))
@@ -125,6 +122,12 @@ class Assessment:
     def _shares(self) -> Iterator[str]:
         """Yield what the discrepancy carries of the stress and of the initial stiffness, in words."""
         mean, low, high = self.share
+        if not high:
+            yield (
+                "there is no discrepancy: whatever the material lacks is taken for noise, and the interval of "
+                f"{self.parameter} knows nothing of it"
+            )
+            return
         if high < 1:
             yield f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"
         else:

@@ -39,14 +39,16 @@ class PowerScaling:
     likelihood: float
 
     def sentence(self, parameter: str) -> str:
-        """The numbers and what they mean, for a person."""
+        """Return the numbers and what they mean, for a person."""
         numbers = f"power-scaling sensitivity: prior {self.prior:.2f}, likelihood {self.likelihood:.2f}"
         if self.prior < THRESHOLD:
             if self.likelihood < THRESHOLD:
                 return f"neither the priors nor the data move {parameter} much ({numbers}): read its interval as it is"
             return f"the data decide {parameter}, the shapes of the priors hardly ({numbers})"
         if self.likelihood < THRESHOLD:
-            return f"the priors decide {parameter} more than the data do ({numbers}): measure more, or defend the priors"
+            return (
+                f"the priors decide {parameter} more than the data do ({numbers}): measure more, or defend the priors"
+            )
         return (
             f"both the priors and the data move {parameter} ({numbers}), which may be at odds: "
             "give priors that you can defend, or measure more"
@@ -108,8 +110,8 @@ def _cuts(solution: Solution, symbol: str) -> bool:
     marginal = solution.marginals[symbol]
     parameter = next(p for p in solution.model.parameters if p.symbol == symbol)
     ends = zip(solution.model.priors[symbol].support, parameter.support, strict=True)
-    at_ends = [marginal.pdf(chosen) for chosen, natural in ends if chosen != natural]
-    return bool(np.max(at_ends, initial=0.0) > SHUT * marginal.density.max())
+    at_ends = [float(marginal.pdf(chosen)) for chosen, natural in ends if chosen != natural]
+    return max(at_ends, default=0.0) > SHUT * float(marginal.density.max())
 
 
 def _log_prior(solution: Solution) -> FloatArray:
@@ -138,9 +140,9 @@ def _sensitivity(values: FloatArray, log_density: FloatArray) -> float:
     speeds = []
     for alpha in ALPHAS:
         weights = np.exp((alpha - 1) * deviation)
-        weights /= weights.sum()
+        weights = weights / float(weights.sum())
         distance = max(_distance(ascending, weights), _distance(-ascending[::-1], weights[::-1]))
-        speeds.append(distance / abs(np.log2(alpha)))
+        speeds.append(distance / abs(float(np.log2(alpha))))
     return float(np.mean(speeds))
 
 
@@ -149,6 +151,6 @@ def _distance(values: FloatArray, weights: FloatArray) -> float:
     gaps = np.diff(values)
     first, second = np.arange(1, len(values)) / len(values), np.cumsum(weights)[:-1]
     between = 0.5 * (first + second)
-    divergence = gaps @ (first * np.log2(first / between) + second * np.log2(second / between))
-    size = gaps @ (first + second)  # the terms that make each divergence positive cancel in their sum
+    divergence = float(gaps @ (first * np.log2(first / between) + second * np.log2(second / between)))
+    size = float(gaps @ (first + second))  # the terms that make each divergence positive cancel in their sum
     return float(np.sqrt(max(divergence, 0.0) / size)) if size > 0 else 0.0

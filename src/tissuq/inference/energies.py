@@ -51,6 +51,8 @@ TOUCHED = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
 REPRESENTED = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
+TAILS = 0.25
+"""Power of the weights by which components are taken that must represent the tails, too."""
 
 
 def why_no_energies(model: StatisticalModel) -> str:
@@ -175,11 +177,21 @@ class EnergySolution(Solution):
     @cached_property
     def components(self) -> Components:  # type: ignore[override]  # a cached property
         """The posterior as a mixture; after the material's parameters come the weights of the discrepancy."""
+        return self._represented(1.0)
+
+    @cached_property
+    def wide_components(self) -> Components:
+        """The same, with more components in the tails, where the posterior of fewer data may lie."""
+        return self._represented(TAILS)
+
+    def _represented(self, power: float) -> Components:
+        """Return components that stand for all points, taken as often as a power of their weights says."""
         points, weights = self._points, self._weights
         if len(weights) > REPRESENTED:
             order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice))  # neighbours are alike
-            points = points[order[systematic(weights[order][None], REPRESENTED)[0]]]
-            weights = np.full(REPRESENTED, 1 / REPRESENTED)
+            chosen = order[systematic((weights**power)[order][None], REPRESENTED)[0]]
+            points, weights = points[chosen], weights[chosen] ** (1 - power)
+            weights = weights / weights.sum()
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each.features) for each in self._lattices)
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
         for place in np.unique(points.lattice):

@@ -160,6 +160,11 @@ class Solution(ABC):
     drawn_discrepancy: FloatArray | None = None
     members: Mapping[str, float] = MappingProxyType({})
 
+    @property
+    def wide_components(self) -> Components:
+        """The posterior as a mixture that has components in the tails, too, where importance weights may need them."""
+        return self.components
+
     @cached_property
     def marginals(self) -> Marginals:
         """The marginal posterior of every parameter."""

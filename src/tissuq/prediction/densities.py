@@ -19,9 +19,11 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 4_000_000
 """Values in an array over components, measurements and parameters at once: what bounds the memory."""
-EFFECTIVE, MOST_KHAT = 0.1, 0.7
-"""Effective number of components that are left without a measurement, as a share of those with it, below which its density
-is rough; and the Pareto shape from which it is (Vehtari, Gelman & Gabry 2017)."""
+FEWEST = 5
+"""Components, at least, that stand for the posterior of very many measurements."""
+EFFECTIVE, MOST_KHAT = 0.2, 0.7
+"""Effective number of components that are left without a measurement, as a share of those with it, below which its
+density is rough; and the Pareto shape from which it is (Vehtari, Gelman & Gabry 2017)."""
 LEAST = 1e-12
 """Share of a measurement's precision that the others must leave to it; with less they say nothing about it."""
 
@@ -38,18 +40,19 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
     """Return the density of each stress given all others, parameters and discrepancy integrated.
 
     1 / p(y_i | others) is the posterior mean of 1 / p(y_i | others, h). The inner density is a closed form
-    (`left_out_log_density`); the mean over h is the sum over the components of an integrated posterior, and Pareto-smoothed
-    importance sampling over those of a sampled one. Where bounds or a sampler left draws of the linear parameters
-    instead of Gaussians, these belong to h.
+    (`left_out_log_density`); the mean over h is the sum over the components of an integrated posterior, and
+    Pareto-smoothed importance sampling over those of a sampled one. Where bounds or a sampler left draws of the linear
+    parameters instead of Gaussians, these belong to h; bounds that do not cut the whole posterior are not looked at.
 
     References
     ----------
     Gelfand, Dey & Chang (1992), Bayesian Statistics 4, 147-167; Vehtari, Gelman & Gabry (2017), Statistics and
     Computing 27, 1413-1432 (PSIS).
     """
-    components = solution.components
-    if len(components.weights) * len(solution.model.experiment) > MOST_VALUES:
-        components = components.thinned(max(1, MOST_VALUES // len(solution.model.experiment)))
+    components = solution.wide_components
+    size = len(solution.model.experiment) * max(1, components.root.shape[2])
+    if len(components.weights) * size > MOST_VALUES:
+        components = components.thinned(max(FEWEST, MOST_VALUES // size))
     density = left_out_log_density(solution.model, components)
     log_weights = np.log(components.weights)[:, None] - density
     if solution.diagnostics is not None:
@@ -80,9 +83,9 @@ def left_out_log_density(model: StatisticalModel, components: Components) -> Flo
     Sundararajan & Keerthi (2001), Neural Computation 13, 1103-1118; Vehtari, Mononen, Tolvanen, Sivula & Winther
     (2016), JMLR 17(103), 1-38.
     """
-    size = len(model.experiment) * max(1, components.root.shape[2])
-    blocks = np.array_split(np.arange(len(components.weights)), 1 + len(components.weights) * size // BLOCK)
-    return np.concatenate([_left_out(model, components[block]) for block in blocks if len(block)])
+    count, size = len(components.weights), len(model.experiment) * max(1, components.root.shape[2])
+    blocks = np.array_split(np.arange(count), min(count, 1 + count * size // BLOCK))
+    return np.concatenate([_left_out(model, components[block]) for block in blocks])
 
 
 def _left_out(model: StatisticalModel, components: Components) -> FloatArray:
@@ -127,7 +130,7 @@ def joint_log_likelihood(solution: Solution) -> FloatArray:
     )
     chosen = solution.component_of_draw[:, ::step]
     member = None if solution.components.member is None else solution.components.member[chosen].ravel()
-    blocks = np.array_split(np.arange(count), 1 + count * len(model.experiment) // BLOCK)
+    blocks = np.array_split(np.arange(count), min(count, 1 + count * len(model.experiment) // BLOCK))
     found = [
         _joint(model, columns[block], settings[block], None if member is None else member[block]) for block in blocks
     ]
@@ -147,9 +150,10 @@ def _joint(
     else:
         white = _white_variance(model, settings)
         exponent = (residual**2 / white + np.log(white)).sum(axis=1)
-        for place in np.unique(member) if member is not None else ():
-            own = np.flatnonzero(member == place)
-            exponent[own] += _with_energies(model, int(place), residual[own], settings[own], white[own])
+        if member is not None:
+            for place in np.unique(member):
+                mine = np.flatnonzero(member == place)
+                exponent[mine] += _with_energies(model, int(place), residual[mine], settings[mine], white[mine])
     return np.asarray(-0.5 * (exponent + residual.shape[1] * log(2 * pi)))
 
 

@@ -55,14 +55,16 @@ class CorrelatedPart:
         vectors, scale = self.correlation.vectors, self.scale[:, None]
         own, white = columns / scale, self.white[:, None, None]
         inside = vectors.T @ own
-        return np.asarray((vectors @ (inside / (self.kernel[..., None] + white) - inside / white) + own / white) / scale)
+        return np.asarray(
+            (vectors @ (inside / (self.kernel[..., None] + white) - inside / white) + own / white) / scale
+        )
 
     @property
     def precision(self) -> FloatArray:
         """The diagonal (N, n) of the inverse of the covariance."""
         squares, white = self.correlation.vectors**2, self.white[:, None]
         rest = np.maximum(1 - squares.sum(axis=1), 0.0)
-        return ((1 / (self.kernel + white)) @ squares.T + rest / white) / self.scale**2
+        return np.asarray(((1 / (self.kernel + white)) @ squares.T + rest / white) / self.scale**2)
 
     @property
     def log_determinant(self) -> FloatArray:
