@@ -139,7 +139,8 @@ def test_a_posterior_that_its_prior_cuts_is_said_to_be_cut():
 def test_a_natural_bound_is_no_cause_for_a_warning():
     stretch = np.linspace(0.8, 1.5, 20)
     data = tq.Experiment("uniaxial", stretch, -0.2 * 2 * (stretch - stretch**-2) + 0.01)
-    assert not tq.fit(data, discrepancy="none", noise_sd=0.5, priors={"C10": tq.Uniform(0, 10)}).warnings
+    found = tq.fit(data, discrepancy="none", noise_sd=0.5, priors={"C10": tq.Uniform(0, 10)}).warnings
+    assert not any("cut" in text for text in found)
 
 
 def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch):

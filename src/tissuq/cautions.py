@@ -14,6 +14,8 @@ INSEPARABLE = 0.1
 """Noise and discrepancy are inseparable when either may be less than this share of both (5 % of the draws each)."""
 ROUGH = 0.1
 """Error of the log evidence, by integration, above which nothing rests on it."""
+VAGUE = 1.0
+"""Width of the headline parameter's 95 % interval, over its median, above which it is hardly known."""
 HIGH = 0.1
 """Density at a bound, relative to the largest, above which the bound decides."""
 
@@ -39,6 +41,13 @@ def warnings_about(solution: Solution) -> Iterator[str]:
         yield (
             f"the sums behind this posterior are rough (the log evidence is off by about {error:.1g}), as where the "
             "noise that was given is far smaller than the scatter of the data: give a larger one, or leave it unknown."
+        )
+    headline = solution.model.headline
+    low, high = solution.marginals[headline].hdi()
+    if high - low > VAGUE * abs(float(solution.marginals[headline].quantile(0.5))):
+        yield (
+            f"the data say little of {headline}: its 95 % interval is wider than its median is large. Measure more, "
+            "nearer stretch 1, or with less noise."
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:

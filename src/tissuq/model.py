@@ -336,10 +336,11 @@ class StatisticalModel:
 
     def _check_data(self) -> None:
         n, name = len(self.experiment), self.experiment.name
-        if n < len(self.parameters):
+        told = [symbol for symbol in self.symbols if symbol not in self.energy_symbols]  # not by their priors alone
+        if n < len(told) or (self.energy_symbols and n <= len(self.column_symbols)):
             raise InputError(
-                f"experiment '{name}' has {n} measurements for {len(self.parameters)} parameters "
-                f"({', '.join(self.symbols)}): measure more, or choose a simpler material or discrepancy."
+                f"experiment '{name}' has {n} measurements for {len(told)} parameters "
+                f"({', '.join(told)}): measure more, or choose a simpler material or discrepancy."
             )
         if not self.experiment.stress.any():
             raise InputError(f"experiment '{name}': every stress is zero, so there is nothing to identify.")

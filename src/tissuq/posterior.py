@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tissuq.assessment import Assessment, assess
+from tissuq.assessment import Assessment, assess, known_evidence_changes
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -19,6 +19,7 @@ from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
+from tissuq.prediction.densities import leave_one_out
 from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
 
 if TYPE_CHECKING:
@@ -90,7 +91,8 @@ class Posterior:
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.
 
-        The same data are fitted without discrepancy and, where it is an energy, with other priors of its amplitudes.
+        The same data are fitted without discrepancy and, unless that would need a sampler, with other prior scales of
+        what sets the discrepancy's size.
 
         Examples
         --------
@@ -101,6 +103,10 @@ class Posterior:
         >>> found.share[0] > 0.2, abs(found.initial_share[0]) < 1e-6, found.probability_of_none < 0.01
         (True, True, True)
         """
+        return self._assessment
+
+    @cached_property
+    def _assessment(self) -> Assessment:
         return assess(self.solution, lambda models: [posterior.solution for posterior in self._solve(models)])
 
     def update(self, more: Experiment) -> Posterior:
@@ -127,7 +133,10 @@ class Posterior:
         return self._solve([self.model.with_more(more)])[0]
 
     def summary(self, prob: float = 0.95, parameters: Sequence[str] | None = None) -> pd.DataFrame:
-        """Return mean, sd and the highest-density interval of every parameter (MPa; psi in stretch).
+        """Return mean, sd, median and the highest-density interval of every parameter (MPa; psi in stretch).
+
+        Amplitudes of an energy discrepancy whose prior has no mean (the default, half-Cauchy) have a median and an
+        interval only: few directions of the data tell them, so that their posterior may have its prior's tail.
 
         Parameters
         ----------
@@ -139,8 +148,8 @@ class Posterior:
         Returns
         -------
         pandas.DataFrame
-            Indexed by parameter: mean, sd, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat when
-            the posterior was sampled.
+            Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
+            when the posterior was sampled.
         """
         import pandas as pd
 
@@ -150,15 +159,20 @@ class Posterior:
         unknown = [symbol for symbol in wanted if symbol not in self.model.symbols]
         if unknown:
             raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(self.model.symbols)}.")
-        marginals = [self.solution.marginals[symbol] for symbol in wanted]
-        rows = [(marginal.mean, marginal.sd, *marginal.hdi(prob)) for marginal in marginals]
-        index = pd.Index(wanted, name="parameter")
-        table = pd.DataFrame(np.array(rows), index, ["mean", "sd", "hdi_low", "hdi_high"])
+        index, names = pd.Index(wanted, name="parameter"), ["mean", "sd", "median", "hdi_low", "hdi_high"]
+        table = pd.DataFrame([self._numbers(symbol, prob) for symbol in wanted], index, names)
         found = self.solution.diagnostics
         if found is not None:
             table["ess"] = [min(found.ess_bulk[symbol], found.ess_tail[symbol]) for symbol in table.index]
             table["rhat"] = [found.rhat[symbol] for symbol in table.index]
         return table
+
+    def _numbers(self, symbol: str, prob: float) -> tuple[float, ...]:
+        """Return mean and sd (nan where there may be none), median and the ends of the interval of a parameter."""
+        marginal = self.solution.marginals[symbol]
+        has_moments = symbol not in self.model.energy_symbols or self.model.priors[symbol].has_moments
+        moments = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
+        return (*moments, float(marginal.quantile(0.5)), *marginal.hdi(prob))
 
     def predict(
         self,
@@ -205,9 +219,12 @@ class Posterior:
         """Everything as labelled arrays that ArviZ reads.
 
         Groups posterior, posterior_predictive, log_likelihood (dimensions chain, draw and, for the latter two,
-        measurement), observed_data and constant_data. With very many measurements the latter two hold only some of
-        the draws. On the exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the
-        quadrature's points: for their intervals and densities use `summary` and ``solution.marginals``.
+        measurement), leave_one_out, observed_data and constant_data. With very many measurements the former two hold
+        only some of the draws. The log likelihood of a draw is that of each measurement given the draw's parameters
+        and, under a process, the other measurements; leave_one_out has each measurement's density given the others,
+        everything integrated, which is what `tissuq.compare` takes. On the
+        exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the quadrature's points: for
+        their intervals and densities use `summary` and ``solution.marginals``.
         """
         import xarray as xr
 
@@ -217,7 +234,7 @@ class Posterior:
         sample = {"chain": chains, "draw": draws}
         some = {"chain": chains, "draw": draws[:: stride(solution)]}
         parameters = {parameter.symbol: parameter for parameter in self.model.parameters}
-        stress = ("chain", "draw", "measurement")
+        stress, left_out = ("chain", "draw", "measurement"), leave_one_out(solution)
         in_mpa = {"units": "MPa"}
         groups = {
             "posterior": xr.Dataset(
@@ -231,6 +248,13 @@ class Posterior:
                 {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, some | point
             ),
             "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, some | point),
+            "leave_one_out": xr.Dataset(
+                {
+                    "log_density": ("measurement", left_out.log_density),
+                    "is_rough": ("measurement", left_out.is_rough.astype(np.int8)),
+                },
+                point,
+            ),
             "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
             "constant_data": xr.Dataset({"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point),
         }
@@ -257,6 +281,10 @@ class Posterior:
             "method_reason": solution.reason,
             "seed": self.seed,
         }
+        headline = self.summary(parameters=[model.headline]).to_dict("records")[0]
+        labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
+        labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
+        labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
         labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
         if solution.diagnostics is not None:
             found = solution.diagnostics

@@ -32,6 +32,8 @@ class Prior(ABC):
     name: ClassVar[str]
     with_unit: ClassVar[tuple[str, ...]]
     """Fields that scale with the unit of the parameter."""
+    has_moments: ClassVar[bool] = True
+    """Whether it has a mean and a standard deviation."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -230,6 +232,7 @@ class HalfCauchy(Prior):
 
     name = "half-cauchy"
     with_unit = ("scale",)
+    has_moments = False
 
     @property
     def support(self) -> tuple[float, float]:

@@ -31,6 +31,27 @@ def test_evidence_and_probability_are_those_of_the_fits(fits):
     assert table.index[-1] == "none"
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_the_factor_ranges_over_other_priors_in_both_fits(fits, name):
+    table = tq.compare(fits)
+    best, changes = table.index[0], [f"evidence_change_{change}" for change in ("quarter", "fourfold", "boxes")]
+    factor = table.loc[name, "log_bayes_factor"]
+    others = [factor, *(factor + table.loc[name, changes] - table.loc[best, changes])]
+    assert table.loc[name, "log_bayes_factor_low"] == pytest.approx(min(others))
+    assert table.loc[name, "log_bayes_factor_high"] == pytest.approx(max(others))
+    own = fits[name].assess().evidence_changes
+    assert list(table.loc[name, changes]) == pytest.approx([own["quarter"], own["fourfold"], own["boxes"]])
+    assert table.loc[name, ["hdi_low", "hdi_high"]].tolist() == fits[name].summary().loc["C10"].tolist()[-2:]
+
+
+def test_a_sampled_fit_without_evidence_is_compared_by_prediction(fits):
+    sampled = tq.fit(DATA, discrepancy="constant", noise_sd=0.05, method="nuts")
+    table = tq.compare({"sampled": sampled, "taylor": fits["taylor"]})
+    assert table.loc["sampled", ["log_evidence", "log_bayes_factor_low"]].isna().all()
+    assert table.loc["taylor", "probability"] == 1
+    assert table.loc["sampled", "elpd_difference"] > 10
+
+
 @pytest.mark.parametrize("name", ["yeoh", "taylor"])
 def test_leave_one_out_is_that_of_refitting(fits, name):
     density = 0.0
@@ -52,7 +73,12 @@ def test_saved_posteriors_compare_like_those_in_memory(fits, tmp_path):
         fits[name].save(tmp_path / f"{name}.nc")
         trees[name] = xr.open_datatree(tmp_path / f"{name}.nc", engine="h5netcdf").load()
     first, second = tq.compare(trees), tq.compare({name: fits[name] for name in trees})
-    np.testing.assert_allclose(first.drop(columns="is_rough"), second.drop(columns="is_rough"), rtol=1e-10)
+    assert list(first["parameter"]) == list(second["parameter"]) == ["C10", "C10"]
+    refitted = ["evidence_change_quarter", "evidence_change_fourfold", "log_bayes_factor_low", "log_bayes_factor_high"]
+    numbers = second.columns.drop(["is_rough", "parameter"])
+    np.testing.assert_allclose(first[numbers.drop(refitted)], second[numbers.drop(refitted)], rtol=1e-10)
+    assert first.loc["yeoh", refitted].isna().all()  # a file holds no other fits
+    assert (first.loc["none", refitted[:2]] == 0).all()  # has nothing to scale
 
 
 def test_fits_of_other_data_and_single_fits_are_refused(fits):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 
 import pytest
 
@@ -15,18 +16,43 @@ def two_runs(cli, here, specimen):
     return here
 
 
+def rows_of(folder):
+    with (folder / "comparison.csv").open() as file:
+        return {row["fit"]: row for row in csv.DictReader(file)}
+
+
 def test_runs_are_compared(cli, two_runs):
-    said = cli("compare", "first", "second", "--out", "table.csv")
+    said = cli("compare", "first", "second", "--out", "compared")
     assert said.status == 0, said.err
     for name in ("first/none", "first/constant", "second/auto"):
         assert name in said.out
-    assert "nothing of parameters" in said.out
-    with (two_runs / "table.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert {row["fit"] for row in rows} == {"first/none", "first/constant", "second/auto"}
-    again = cli("compare", "first", "--out", "table.csv")
-    assert again.status == 2
-    assert "table.csv" in again.err
+    words = " ".join(said.out.split())
+    assert "for predictions only" in words
+    assert "C10, kPa (95 %)" in words
+    rows = rows_of(two_runs / "compared")
+    assert set(rows) == {"first/none", "first/constant", "second/auto"}
+    (own,) = json.loads((two_runs / "second" / "assessment.json").read_text())
+    assert float(rows["second/auto"]["evidence_change_quarter"]) == own["evidence_changes"]["quarter"]
+    assert all(row["log_bayes_factor_low"] for row in rows.values())
+    found = {path.relative_to(two_runs / "compared").as_posix() for path in (two_runs / "compared").rglob("*.*")}
+    assert found == {
+        "comparison.csv",
+        "report.html",
+        "contents.txt",
+        "figures/comparison.svg",
+        "figures/comparison.png",
+    }
+
+
+def test_a_comparison_is_never_overwritten_unasked(cli, two_runs):
+    for options, status in (([], 0), ([], 2), (["--force"], 0)):
+        said = cli("compare", "first", "second", "--out", "compared", *options)
+        assert said.status == status
+        assert ("compared" in said.err) == (status == 2)
+    said = cli("compare", "first", "second", "--out", "second", "--force")
+    assert said.status == 2
+    assert "second" in said.err
+    assert (two_runs / "second" / "posterior" / "auto.nc").exists()
 
 
 @pytest.mark.parametrize(("arguments", "words"), [(["."], "no posterior"), (["missing"], "no posterior")])
@@ -48,7 +74,14 @@ def test_runs_of_one_name_are_kept_apart(cli, two_runs):
     (two_runs / "other").mkdir()
     (two_runs / "first").rename(two_runs / "other" / "run")
     (two_runs / "second").rename(two_runs / "run")
-    assert cli("compare", "other/run", "run", "--out", "table.csv").status == 0
-    assert len((two_runs / "table.csv").read_text().splitlines()) == 4
-    assert cli("compare", "other/run/posterior/none.nc", "other/run", "--out", "again.csv").status == 0
-    assert len((two_runs / "again.csv").read_text().splitlines()) == 4
+    assert cli("compare", "other/run", "run", "--out", "one").status == 0
+    assert len(rows_of(two_runs / "one")) == 3
+    assert cli("compare", "other/run/posterior/none.nc", "other/run", "--out", "two").status == 0
+    assert len(rows_of(two_runs / "two")) == 3
+
+
+@pytest.mark.parametrize("text", ["nothing", "[]", '[{"formulation": "auto"}]'])
+def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, text):
+    (two_runs / "second" / "assessment.json").write_text(text)
+    assert cli("compare", "first", "second", "--out", "compared").status == 0
+    assert rows_of(two_runs / "compared")["second/auto"]["evidence_change_quarter"] == ""

@@ -264,3 +264,25 @@ def test_an_estimate_of_the_best_fit_says_so_beside_its_numbers(cli, here, speci
     report = (here / "runs" / "specimen" / "report.html").read_text(encoding="utf-8")
     for text in (said.out + said.err, report, cli("discrepancies").out):
         assert "not the initial modulus" in " ".join(text.split())
+
+
+@pytest.mark.parametrize(
+    ("stretches", "noise_kpa", "told", "words"),
+    [
+        ([0.8, 1.3], 20, 20, "say little of C10"),
+        ([0.5, 0.6, 0.7, 1.3, 1.4, 1.6, 1.8], 5, "unknown", "extrapolated"),
+        (np.linspace(0.7, 1.5, 16).tolist(), 150, 150, "say little of C10"),
+    ],
+    ids=["two points", "nothing near the reference", "noise above the signal"],
+)
+def test_data_that_say_little_give_a_report_with_a_warning(cli, here, stretches, noise_kpa, told, words):
+    points = np.array(stretches)
+    values = 100 * (points - points**-2) + noise_kpa * np.random.default_rng(3).standard_normal(len(points))
+    file = written(here / "poor.csv", stretch=points, stress=values)
+    said = cli("fit", file, "--stress-unit", "kPa", "--noise-sd", told, "--no-figures", "--out", "run")
+    assert said.status == 0, said.err
+    assert words in " ".join(said.out.split())
+    (row,) = summary_of(here / "run")
+    assert float(row["C10_hdi_low"]) < 0.05 < float(row["C10_hdi_high"])
+    amplitude = next(line for line in (here / "run" / "parameters.csv").read_text().splitlines() if ",c1," in line)
+    assert ",,," in amplitude  # no mean, no sd

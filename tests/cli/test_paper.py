@@ -120,7 +120,14 @@ def test_a_run_is_repeated_byte_for_byte_from_its_run_toml(paper_run, tmp_path):
 def test_arviz_summarises_and_cross_validates_every_posterior(paper_run, name):
     folder, _ = paper_run
     with xr.open_datatree(folder / "posterior" / f"{name}.nc", engine="h5netcdf") as data:
-        groups = {"posterior", "posterior_predictive", "log_likelihood", "observed_data", "constant_data"}
+        groups = {
+            "posterior",
+            "posterior_predictive",
+            "log_likelihood",
+            "leave_one_out",
+            "observed_data",
+            "constant_data",
+        }
         assert set(data.children) == groups
         row = next(row for row in rows_of(folder / "summary.csv") if row["formulation"] == name)
         mean, sd = float(row["C10_mean"]), float(row["C10_sd"])

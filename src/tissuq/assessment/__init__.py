@@ -4,5 +4,15 @@ from tissuq.assessment.averaging import Average, average
 from tissuq.assessment.comparison import compare
 from tissuq.assessment.design import design_warnings
 from tissuq.assessment.extent import Assessment, assess
+from tissuq.assessment.sensitivity import PowerScaling, known_evidence_changes
 
-__all__ = ["Assessment", "Average", "assess", "average", "compare", "design_warnings"]
+__all__ = [
+    "Assessment",
+    "Average",
+    "PowerScaling",
+    "assess",
+    "average",
+    "compare",
+    "design_warnings",
+    "known_evidence_changes",
+]

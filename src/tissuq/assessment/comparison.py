@@ -7,13 +7,22 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tissuq.assessment.sensitivity import SCALES
 from tissuq.errors import InputError
+from tissuq.prediction.densities import MOST_KHAT
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 __all__ = ["compare"]
+
+FloatArray = NDArray[np.float64]
+
+CHANGES = (*SCALES, "boxes")
+"""Changes of priors under which the log evidence is told."""
 
 
 def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
@@ -27,12 +36,20 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Indexed by name. log_evidence; log_bayes_factor against the best; probability, were all as probable before the
-        data; elpd, the expected log density of new measurements by leave-one-out (PSIS, conditional on the others in
-        closed form where the discrepancy is a process), elpd_difference to the best and its standard error; and
-        stacking, weights for an average of *predictions*: they say nothing of parameters. Where no evidence is known,
-        it and what follows from it are missing. is_rough marks leave-one-out values that importance sampling cannot
-        tell.
+        Indexed by name; missing is what is not known, as all that follows from an evidence that is not.
+
+        - log_evidence, log_bayes_factor against the best, and probability, were all as probable before the data.
+        - log_bayes_factor_low and _high: its least and largest values with the prior scales of the discrepancies'
+          random parts a quarter or fourfold, and with the uniform boxes of linear parameters four times as wide, each
+          in all fits at once. evidence_change_quarter, _fourfold and _boxes are the changes of the log evidence from
+          which they come. Other fits of the same data give the first two, unless a sampler would be needed; of saved
+          trees they are known where an attribute of that name says them.
+        - elpd, the expected log density of new measurements by leave-one-out; elpd_difference, by how much it falls
+          short of the best, and its standard error. Each measurement's density given the others is a closed form
+          at given nonlinear parameters, whose posterior without it follows by importance weights
+          (`tissuq.prediction.densities`). is_rough marks fits in which these weights leave too few.
+        - stacking: weights for an average of *predictions*, which say nothing of parameters.
+        - parameter, median, hdi_low, hdi_high: the material's first parameter and its 95 % interval, MPa.
 
     Raises
     ------
@@ -41,8 +58,8 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
 
     References
     ----------
-    Vehtari, Gelman & Gabry (2017), Statistics and Computing 27, 1413-1432 (PSIS-LOO); Yao, Vehtari, Simpson & Gelman
-    (2018), Bayesian Analysis 13, 917-1007 (stacking).
+    Vehtari, Gelman & Gabry (2017), Statistics and Computing 27, 1413-1432 (leave-one-out); Yao, Vehtari, Simpson &
+    Gelman (2018), Bayesian Analysis 13, 917-1007 (stacking).
 
     Examples
     --------
@@ -54,30 +71,70 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
     ['auto', 'none']
     """
     import pandas as pd
-    import xarray as xr
-    from arviz_stats import compare as compare_by_loo
 
-    trees = {name: fit if isinstance(fit, xr.DataTree) else fit.data for name, fit in fits.items()}
+    trees = {name: _tree(fit) for name, fit in fits.items()}
     _check(trees)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what they say is in the column is_rough
-        by_loo = compare_by_loo(trees)
-    by_loo = by_loo.loc[list(trees)]
-    evidence = pd.Series({name: float(tree.attrs.get("log_evidence", np.nan)) for name, tree in trees.items()})
-    factor = evidence - evidence.max()
+    evidence = _numbers(trees, "log_evidence")
+    factor = evidence - np.nanmax([*evidence, -np.inf])
+    changes = {f"evidence_change_{name}": _numbers(trees, f"evidence_change_{name}") for name in CHANGES}
+    best = int(np.argmax(np.nan_to_num(factor, nan=-np.inf)))
+    factors = np.array([factor, *(factor + change - change[best] for change in changes.values())])
     table = pd.DataFrame(
         {
             "log_evidence": evidence,
             "log_bayes_factor": factor,
-            "probability": np.exp(factor) / np.exp(factor).sum(),
-            "elpd": by_loo["elpd"].astype(float),
-            "elpd_difference": by_loo["elpd_diff"].astype(float),
-            "elpd_difference_error": by_loo["dse"].astype(float),
-            "stacking": by_loo["weight"].astype(float),
-            "is_rough": by_loo["warning"].astype(bool),
-        }
+            "log_bayes_factor_low": factors.min(axis=0),
+            "log_bayes_factor_high": factors.max(axis=0),
+            "probability": np.exp(factor) / np.nansum(np.exp(factor)),
+            **changes,
+            **_by_leave_one_out(trees),
+            "parameter": [tree.attrs.get("headline", "") for tree in trees.values()],
+            **{name: _numbers(trees, f"headline_{name}") for name in ("median", "hdi_low", "hdi_high")},
+        },
+        list(trees),
     )
     return table.sort_values(["log_evidence", "elpd"], ascending=False)
+
+
+def _tree(fit: Any) -> xr.DataTree:
+    """Return what is known of a fit as a tree; of one in memory, also what other fits of its data tell."""
+    import xarray as xr
+
+    if isinstance(fit, xr.DataTree):
+        return fit
+    tree: xr.DataTree = fit.data.copy()
+    if fit.diagnostics is None and not all(f"evidence_change_{name}" in tree.attrs for name in CHANGES):
+        tree.attrs |= {f"evidence_change_{name}": value for name, value in fit.assess().evidence_changes.items()}
+    return tree
+
+
+def _numbers(trees: Mapping[str, xr.DataTree], name: str) -> FloatArray:
+    """Return a number that the fits' attributes give; nan where they do not."""
+    return np.array([float(tree.attrs.get(name, np.nan)) for tree in trees.values()])
+
+
+def _by_leave_one_out(trees: Mapping[str, xr.DataTree]) -> dict[str, NDArray[Any]]:
+    """Return ArviZ's comparison of fits by leave-one-out densities."""
+    from arviz_stats import compare as compare_by_loo
+    from arviz_stats.utils import ELPDData
+
+    found = {}
+    for name, tree in trees.items():
+        density, is_rough = tree["leave_one_out"]["log_density"], tree["leave_one_out"]["is_rough"]
+        n = density.size
+        elpd, error = float(density.sum()), float(np.sqrt(n * density.var()))
+        rough = bool(is_rough.any())
+        found[name] = ELPDData("loo", elpd, error, np.nan, 0, n, "log", rough, MOST_KHAT, density)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what they say is in the column is_rough
+        table = compare_by_loo(found).loc[list(trees)]
+    return {
+        "elpd": table["elpd"].to_numpy(float),
+        "elpd_difference": table["elpd_diff"].to_numpy(float),
+        "elpd_difference_error": table["dse"].to_numpy(float),
+        "stacking": table["weight"].to_numpy(float),
+        "is_rough": table["warning"].to_numpy(bool),
+    }
 
 
 def _check(trees: Mapping[str, Any]) -> None:
@@ -85,8 +142,10 @@ def _check(trees: Mapping[str, Any]) -> None:
         raise InputError("give two fits or more to compare.")
     names = list(trees)
     for name, tree in trees.items():
-        if not {"observed_data", "constant_data", "log_likelihood"} <= set(tree.children):
-            raise InputError(f"'{name}' is no posterior of tissuq: it has no measurements or no log likelihood.")
+        if not {"observed_data", "constant_data", "leave_one_out"} <= set(tree.children):
+            raise InputError(
+                f"'{name}' is no posterior of tissuq: it has no measurements or no leave-one-out densities."
+            )
     first = trees[names[0]]
     for name in names[1:]:
         if trees[name].attrs.get("loading_mode") != first.attrs.get("loading_mode"):

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.design import design_warnings
+from tissuq.assessment.sensitivity import (
+    SCALES,
+    PowerScaling,
+    known_evidence_changes,
+    power_scaling,
+    rescaled,
+    scale_symbols,
+)
 from tissuq.discrepancy import discrepancy_named
-from tissuq.errors import ModelError
+from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
@@ -27,12 +36,10 @@ POINTS = 60
 """Measured stretches, at most, over which the share is taken."""
 STEP = 1e-4
 """Of the stretch, for the initial slope."""
-SCALES = (0.25, 4.0)
-"""Factors of the amplitudes' prior scale with which its influence is told."""
 NOTHING = 1e-3
 """Share of the initial stiffness that is as good as none."""
-SENSITIVE = 0.5
-"""Shift of the mean, in standard deviations, from which the prior of the amplitudes matters."""
+LITTLE, MUCH = 0.2, 0.5
+"""Shifts of the mean, in standard deviations, from which the discrepancy's prior scales matter a little, and much."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +67,16 @@ class Assessment:
         discrepancy on that ground miss the parameter where a small discrepancy hides in the noise.
     width_against_none : float or None
         Standard deviation of the parameter over that without discrepancy.
+    scales : tuple of str
+        The parameters that set the size of the discrepancy's random part.
     shifts : dict of float to float
-        Shift of the parameter's mean, in standard deviations, when the scale of the amplitudes' priors is multiplied by
-        a factor.
+        Shift of the parameter's mean, in standard deviations, when the prior scales of these are multiplied by a
+        factor. Empty where that would need other runs of a sampler.
+    evidence_changes : dict of str to float
+        Change of the log evidence when these scales are a quarter or fourfold, and when the uniform boxes of the linear
+        parameters are four times as wide (boxes); without what is not known.
+    power_scaling : PowerScaling or None
+        Sensitivity of the parameter to the powers of prior and likelihood.
     warnings : tuple of str
         What the design of the test leaves open, and what to measure next.
     """
@@ -75,22 +89,16 @@ class Assessment:
     between: float
     probability_of_none: float | None
     width_against_none: float | None
+    scales: tuple[str, ...]
     shifts: Mapping[float, float]
+    evidence_changes: Mapping[str, float]
+    power_scaling: PowerScaling | None
     warnings: tuple[str, ...]
 
     @property
     def sentences(self) -> list[str]:
         """The numbers as a person reads them."""
-        mean, low, high = self.share
-        found = [f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"]
-        if max(map(abs, self.initial_share)) < NOTHING:
-            found.append(f"it has no initial stiffness, so it has taken nothing from {self.parameter}")
-        else:
-            mean, low, high = self.initial_share
-            found.append(
-                f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), by which "
-                f"{self.parameter} may be off"
-            )
+        found = list(self._shares())
         if self.width_against_none is not None:
             found.append(f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy")
         if self.probability_of_none is not None:
@@ -103,12 +111,38 @@ class Assessment:
             found.append(f"the energies have the weights {named}; {self.between:.0%} of the variance is between them")
         if self.shifts:
             worst = max(self.shifts, key=lambda factor: abs(self.shifts[factor]))
-            matters = "matters" if abs(self.shifts[worst]) > SENSITIVE else "hardly matters"
             found.append(
-                f"the prior scale of the amplitudes {matters}: times {worst:g} it moves {self.parameter} by "
-                f"{self.shifts[worst]:+.2f} sd"
+                f"the prior scale of {' and '.join(self.scales)} {_weight(self.shifts[worst])}: times {worst:g} it "
+                f"moves {self.parameter} by {self.shifts[worst]:+.2f} sd"
             )
+        if self.power_scaling is not None:
+            found.append(self.power_scaling.sentence(self.parameter))
         return [f"{text[0].upper()}{text[1:]}." for text in found]
+
+    def _shares(self) -> Iterator[str]:
+        """Yield what the discrepancy carries of the stress and of the initial stiffness, in words."""
+        mean, low, high = self.share
+        if not high:
+            yield (
+                "there is no discrepancy: whatever the material lacks is taken for noise, and the interval of "
+                f"{self.parameter} knows nothing of it"
+            )
+            return
+        if high < 1:
+            yield f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"
+        else:
+            yield (
+                "the data do not tell how much of the stress the discrepancy carries (95 % interval "
+                f"{low:.0%} to {high:.0%}: it may oppose the material)"
+            )
+        if max(map(abs, self.initial_share)) < NOTHING:
+            yield f"it has no initial stiffness, so none of {self.parameter} can hide in it"
+            return
+        mean, low, high = self.initial_share
+        yield (
+            f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), by which "
+            f"{self.parameter} may be off"
+        )
 
 
 def assess(solution: Solution, solve: Solve) -> Assessment:
@@ -119,13 +153,13 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
     solution : Solution
     solve : callable
         Returns the solutions of models by the method that gave this one: for the same model without discrepancy, and
-        with other priors of the amplitudes.
+        with other prior scales of what sets the discrepancy's size.
     """
     model, marginal = solution.model, solution.marginals[solution.model.headline]
     none = _without(model, solve)
     share, initial_share = _shares(solution)
-    factors = SCALES if model.energy_symbols else ()
-    moved = {factor: _rescaled(model, solve, factor).marginals[model.headline].mean for factor in factors}
+    scales = scale_symbols(model)
+    others = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
     return Assessment(
         parameter=model.headline,
         share=share,
@@ -137,7 +171,13 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
         between=_between(solution, marginal),
         probability_of_none=_probability_of_none(solution, none),
         width_against_none=marginal.sd / none.marginals[model.headline].sd if none else None,
-        shifts={factor: (mean - marginal.mean) / marginal.sd for factor, mean in moved.items()},
+        scales=scales,
+        shifts={
+            SCALES[name]: float((each.marginals[model.headline].mean - marginal.mean) / marginal.sd)
+            for name, each in others.items()
+        },
+        evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, others),
+        power_scaling=power_scaling(solution),
         warnings=tuple(design_warnings(model.experiment)),
     )
 
@@ -155,10 +195,20 @@ def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
         return None
 
 
-def _rescaled(model: StatisticalModel, solve: Solve, factor: float) -> Solution:
-    """Return the solution with the scale of an energy's amplitudes multiplied by a factor."""
-    wider = {symbol: model.priors[symbol].scaled(factor) for symbol in model.energy_symbols}
-    return solve([replace(model, chosen_priors=model.priors | wider)])[0]
+def _rescaled(model: StatisticalModel, solve: Solve) -> dict[str, Solution]:
+    """Return the solutions with other prior scales of the discrepancy's random part, where there are any."""
+    found = {}
+    for name, factor in SCALES.items():
+        with suppress(ConvergenceError):
+            found[name] = solve([rescaled(model, factor)])[0]
+    return found
+
+
+def _evidence_changes(solution: Solution, others: Mapping[str, Solution]) -> dict[str, float]:
+    """Return by how much the log evidence of other solutions exceeds that of one, where both have any."""
+    known = {name: each.log_evidence for name, each in others.items() if each.log_evidence is not None}
+    own = solution.log_evidence
+    return {} if own is None else {name: float(value - own) for name, value in known.items()}
 
 
 def _shares(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -199,4 +249,11 @@ def _probability_of_none(solution: Solution, none: Solution | None) -> float | N
 
 
 def _percent(probability: float) -> str:
-    return f"{probability:.0%}" if probability >= 0.005 else "less than 1 %"
+    if min(probability, 1 - probability) < 0.005:
+        return "less than 1 %" if probability < 0.5 else "more than 99 %"
+    return f"{probability:.0%}"
+
+
+def _weight(shift: float) -> str:
+    """Return in words how much a shift of some standard deviations matters."""
+    return "matters" if abs(shift) > MUCH else "matters a little" if abs(shift) > LITTLE else "hardly matters"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tissuq.errors import InputError
+from tissuq.report.run_folder import ASSESSMENT
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,36 +19,38 @@ __all__ = ["compare"]
 
 def compare(
     runs: Annotated[list[Path], typer.Argument(help="Run folders, or files of posteriors in them.")],
-    out: Annotated[Path | None, typer.Option(help="CSV file for the table.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the CSV file.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for table, figure and report.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the folder of an earlier comparison.")] = False,
 ) -> None:
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits
-    from tissuq.cli.tables import print_rows
+    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.experiments.units import stress_unit
+    from tissuq.report.comparison import (
+        HEADERS,
+        NOTES,
+        ROUGH,
+        parameter_header,
+        readable_comparison,
+        write_comparison,
+    )
+    from tissuq.report.run_folder import check_target, run_folder
 
-    if out is not None and out.exists() and not force:
-        raise InputError(f"'{out}' exists; choose another file, or --force.")
-    table = compare_fits(_trees(runs))
     if out is not None:
-        table.rename_axis("fit").to_csv(out)
-    rows = [
-        [
-            str(name),
-            f"{row['log_evidence']:.2f}",
-            f"{row['log_bayes_factor']:.2f}",
-            f"{row['probability']:.1%}",
-            f"{row['elpd']:.1f}",
-            f"{row['elpd_difference']:.1f} ± {row['elpd_difference_error']:.1f}",
-            f"{row['stacking']:.2f}{' (rough)' if row['is_rough'] else ''}",
-        ]
-        for name, row in table.iterrows()
-    ]
-    headers = ["fit", "log evidence", "log Bayes factor", "probability", "elpd", "difference", "stacking"]
-    print_rows("Fits of the same measurements", headers, rows)
-    print("Probability: were all fits as probable before the data; it depends on the widths of their priors.")
-    print("Stacking: weights for an average of predictions; they say nothing of parameters.")
-    if table["is_rough"].any():
-        print("Rough: single measurements weigh so much that importance sampling cannot leave them out.")
+        if any(path.resolve().is_relative_to(out.resolve()) for path in runs):
+            raise InputError(f"'{out}' holds what is compared; choose another folder for the comparison with --out.")
+        check_target(out, force=force)
+    trees = _trees(runs)
+    table = compare_fits(trees)
+    units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
+    unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
+    headers = [*HEADERS, parameter_header(table, unit)]
+    print_rows("Fits of the same measurements", headers, readable_comparison(table, unit))
+    print_warnings([*NOTES, *[ROUGH] * bool(table["is_rough"].any())])
+    if out is not None:
+        with run_folder(out, force=force) as folder:
+            write_comparison(table, [str(run) for run in runs], unit, folder)
+        print(f"Report: {out / 'report.html'}")
 
 
 def _trees(runs: list[Path]) -> dict[str, xr.DataTree]:
@@ -62,6 +66,19 @@ def _trees(runs: list[Path]) -> dict[str, xr.DataTree]:
             name = f"{run.name}/{path.stem}" if run.is_dir() and len(runs) > 1 else path.stem
             files[name if name not in files else str(path)] = path
     try:
-        return {name: xr.open_datatree(path, engine="h5netcdf").load() for name, path in files.items()}
+        trees = {name: xr.open_datatree(path, engine="h5netcdf").load() for name, path in files.items()}
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"a posterior cannot be read: {error}.") from error
+    for name, path in files.items():
+        trees[name].attrs |= _assessed(path)
+    return trees
+
+
+def _assessed(path: Path) -> dict[str, float]:
+    """Return what the assessment of the posterior's run says of its evidence with other priors."""
+    try:
+        rows = json.loads((path.parent.parent / ASSESSMENT).read_text(encoding="utf-8"))
+        own = next(row for row in rows if row["formulation"] == path.stem)
+        return {f"evidence_change_{name}": float(change) for name, change in own["evidence_changes"].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, StopIteration):
+        return {}  # a file by itself, or a run without an assessment: not known

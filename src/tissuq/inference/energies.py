@@ -46,6 +46,8 @@ REPRESENTED = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
 NOISE_ROWS, NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
+TAILS = 0.25
+"""Power of the weights by which components are taken that must represent the tails, too."""
 
 
 def why_no_energies(model: StatisticalModel) -> str:
@@ -175,11 +177,21 @@ class EnergySolution(Solution):
     @cached_property
     def components(self) -> Components:  # type: ignore[override]  # a cached property
         """The posterior as a mixture; after the material's parameters come the weights of the discrepancy."""
+        return self._represented(1.0)
+
+    @cached_property
+    def wide_components(self) -> Components:
+        """The same, with more components in the tails, where the posterior of fewer data may lie."""
+        return self._represented(TAILS)
+
+    def _represented(self, power: float) -> Components:
+        """Return components that stand for all points, taken as often as a power of their weights says."""
         points, node, weights = self._points, self._node, self._weights
         if len(weights) > REPRESENTED:
             order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice, node))
-            chosen = order[systematic(weights[order][None], REPRESENTED)[0]]  # neighbours are alike
-            points, node, weights = points[chosen], node[chosen], np.full(REPRESENTED, 1 / REPRESENTED)
+            chosen = order[systematic((weights**power)[order][None], REPRESENTED)[0]]  # neighbours are alike
+            points, node, weights = points[chosen], node[chosen], weights[chosen] ** (1 - power)
+            weights = weights / weights.sum()
         features = {int(place): features_of(self.model, place) for place in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
@@ -224,6 +236,11 @@ class EnergySolution(Solution):
     def _drawn(self) -> tuple[Places, FloatArray]:
         """The component of every draw, and its linear parameters and weights."""
         return self.components.drawn(self._seed)
+
+    @property
+    def component_of_draw(self) -> Places:
+        """The component of every draw."""
+        return self._drawn[0]
 
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:

@@ -185,10 +185,20 @@ class ExactSolution(Solution):
     @cached_property
     def draws(self) -> dict[str, FloatArray]:
         """Independent draws of every parameter."""
-        chosen, linear = self.components.drawn(self._seed)
+        chosen, linear = self._drawn
         columns = np.moveaxis(np.concatenate([self.components.settings[chosen], linear], axis=2), 2, 0)
         named = dict(zip((*self.model.nonlinear, *self.model.linear), columns, strict=True))
         return {symbol: named[symbol] for symbol in self.model.symbols}
+
+    @property
+    def component_of_draw(self) -> NDArray[np.intp]:
+        """The component of every draw."""
+        return self._drawn[0]
+
+    @cached_property
+    def _drawn(self) -> tuple[NDArray[np.intp], FloatArray]:
+        """The component of every draw, and its linear parameters."""
+        return self.components.drawn(self._seed)
 
     def _marginal(self, symbol: str) -> Marginal:
         rule, warp = self._integration.rule, self._integration.warp

@@ -190,6 +190,11 @@ class SampledSolution(Solution):
         """Draws of every parameter."""
         return self._draws
 
+    @property
+    def component_of_draw(self) -> NDArray[np.intp]:
+        """The component of every draw: there is one for each, in their order."""
+        return np.arange(np.prod(self.shape)).reshape(self.shape)
+
     @cached_property
     def diagnostics(self) -> Diagnostics:  # type: ignore[override]  # always there, and computed when asked for
         """Whether sampling converged."""

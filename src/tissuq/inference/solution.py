@@ -160,6 +160,11 @@ class Solution(ABC):
     drawn_discrepancy: FloatArray | None = None
     members: Mapping[str, float] = MappingProxyType({})
 
+    @property
+    def wide_components(self) -> Components:
+        """The posterior as a mixture that has components in the tails, too, where importance weights may need them."""
+        return self.components
+
     @cached_property
     def marginals(self) -> Marginals:
         """The marginal posterior of every parameter."""
@@ -173,6 +178,11 @@ class Solution(ABC):
     @abstractmethod
     def draws(self) -> dict[str, FloatArray]:
         """Draws of every parameter."""
+
+    @property
+    @abstractmethod
+    def component_of_draw(self) -> NDArray[np.intp]:
+        """The place among `components` of every draw (chains, draws)."""
 
     @property
     def is_approximate(self) -> bool:

@@ -50,6 +50,29 @@ class CorrelatedPart:
         """Variances (N, r) of the correlated discrepancy along the eigenvectors."""
         return self.amplitude[:, None] * self.correlation.values
 
+    def solved(self, columns: FloatArray) -> FloatArray:
+        """Return the inverse of the covariance times columns (N, n, q)."""
+        vectors, scale = self.correlation.vectors, self.scale[:, None]
+        own, white = columns / scale, self.white[:, None, None]
+        inside = vectors.T @ own
+        return np.asarray(
+            (vectors @ (inside / (self.kernel[..., None] + white) - inside / white) + own / white) / scale
+        )
+
+    @property
+    def precision(self) -> FloatArray:
+        """The diagonal (N, n) of the inverse of the covariance."""
+        squares, white = self.correlation.vectors**2, self.white[:, None]
+        rest = np.maximum(1 - squares.sum(axis=1), 0.0)
+        return np.asarray(((1 / (self.kernel + white)) @ squares.T + rest / white) / self.scale**2)
+
+    @property
+    def log_determinant(self) -> FloatArray:
+        """Log determinants (N,) of the covariance."""
+        n, r = self.correlation.vectors.shape
+        inside = np.log(self.kernel + self.white[:, None]).sum(axis=1)
+        return np.asarray(inside + (n - r) * np.log(self.white) + 2 * np.log(self.scale).sum())
+
 
 def coefficients(model: StatisticalModel, components: Components) -> tuple[FloatArray, FloatArray]:
     """Return means (M, k) and roots (M, k, p) of the parameters in which the mean stress is linear."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import correlated_parts, mean_stress
 
-__all__ = ["pointwise_log_likelihood", "replicate_data", "stride"]
+__all__ = ["MOST_VALUES", "draws_by_symbol", "pointwise_log_likelihood", "replicate_data", "stride"]
 
 FloatArray = NDArray[np.float64]
 
@@ -48,23 +48,23 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
     """Return (chains, draws, n) log densities of each stress given all others and the draw's parameters.
 
     Without a correlated discrepancy this is the ordinary pointwise log likelihood; with one it is the closed
-    form of leave-one-out conditioning (Sundararajan & Keerthi 2001), which is what PSIS-LOO needs.
+    form of leave-one-out conditioning (Sundararajan & Keerthi 2001), which is what PSIS-LOO of the draws needs.
     """
     mean, settings, white = _given_draws(solution)
     residual = solution.model.experiment.stress - mean
     variance = np.broadcast_to(white, residual.shape).copy()
     if solution.model.is_correlated:
         for part in correlated_parts(solution.model, settings):
-            vectors = part.correlation.vectors
-            own, inverse = residual[part.chosen] / part.scale, 1 / (part.kernel + part.white[:, None])
-            inside = own @ vectors
-            solved = (inside * inverse) @ vectors.T + (own - inside @ vectors.T) / part.white[:, None]
-            rest = np.maximum(1 - (vectors**2).sum(axis=1), 0.0)
-            diagonal = inverse @ (vectors**2).T + rest / part.white[:, None]
-            residual[part.chosen] = part.scale * solved / diagonal
-            variance[part.chosen] = part.scale**2 / diagonal
+            solved = part.solved(residual[part.chosen][:, :, None])[..., 0]
+            residual[part.chosen], variance[part.chosen] = solved / part.precision, 1 / part.precision
     density = -0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi))
     return density.reshape(solution.shape[0], -1, mean.shape[1])
+
+
+def draws_by_symbol(solution: Solution) -> dict[str, FloatArray]:
+    """Return every `stride`-th draw (D,) of every parameter, the chains one after another."""
+    step = stride(solution)
+    return {symbol: drawn[:, ::step].ravel() for symbol, drawn in solution.draws.items()}
 
 
 def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -73,7 +73,7 @@ def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray
     D draws in all.
     """
     model, step = solution.model, stride(solution)
-    values = {symbol: drawn[:, ::step].ravel() for symbol, drawn in solution.draws.items()}
+    values = draws_by_symbol(solution)
     count = len(next(iter(values.values())))
     columns = np.column_stack([values[symbol] for symbol in model.column_symbols])
     settings = np.array([values[symbol] for symbol in model.nonlinear]).reshape(-1, count).T

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["BAND", "BASE", "STYLE", "marginal_figure", "predictive_figure", "save_figure"]
+__all__ = ["BAND", "BASE", "INK", "STYLE", "marginal_figure", "predictive_figure", "save_figure"]
 
 FloatArray = NDArray[np.float64]
 

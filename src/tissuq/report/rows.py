@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import floor, log10
+from math import floor, isnan, log10
 from typing import Any
 
 from tissuq.experiments.units import StressUnit
@@ -71,24 +71,21 @@ def readable_methods(posteriors: Mapping[str, Posterior]) -> dict[str, str]:
 
 
 def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -> list[list[str]]:
-    """Return rows of formulation, parameter, unit, prior, mean, sd and interval as text."""
+    """Return rows of formulation, parameter, unit, prior, median, mean, sd and interval as text."""
     rows = []
     for formulation, posterior in posteriors.items():
         for symbol, numbers in posterior.summary().iterrows():
             parameter = next(p for p in posterior.model.parameters if p.symbol == symbol)
             is_stress = parameter.unit == "MPa"
             factor = unit.to_mpa if is_stress else 1.0
-            mean, sd, low, high = (float(numbers[key]) / factor for key in ("mean", "sd", "hdi_low", "hdi_high"))
-            ends = interval(low, high, sd)
+            mean, sd, median, low, high = (
+                float(numbers[key]) / factor for key in ("mean", "sd", "median", "hdi_low", "hdi_high")
+            )
+            spread = (high - low) / 4 if isnan(sd) else sd
+            ends = interval(low, high, spread)
+            moments = ["–", "–"] if isnan(sd) else [interval(mean, mean, sd)[0], interval(sd, sd, sd)[0]]
             prior = str(posterior.model.priors[parameter.symbol].scaled(1 / factor))
             name = unit.name if is_stress else ""
-            row = [
-                formulation,
-                parameter.symbol,
-                name,
-                prior,
-                interval(mean, mean, sd)[0],
-                interval(sd, sd, sd)[0],
-            ]
+            row = [formulation, parameter.symbol, name, prior, interval(median, median, spread)[0], *moments]
             rows.append([*row, f"[{ends[0]}, {ends[1]}]"])
     return rows

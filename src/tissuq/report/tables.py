@@ -45,7 +45,7 @@ def headline_of(row: Row) -> str:
 
 
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
-    """Return mean, sd and 95 % HPD of every parameter of every formulation, with its unit and prior."""
+    """Return mean, sd, median and 95 % HPD of every parameter of every formulation, with its unit and prior."""
     rows = []
     for formulation, posterior in posteriors.items():
         table = posterior.summary().to_dict("index")
@@ -57,12 +57,16 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
                     "parameter": parameter.symbol,
                     "unit": parameter.unit,
                     "prior": str(posterior.model.priors[parameter.symbol]),
-                    **{name: float(numbers[name]) for name in ("mean", "sd", "hdi_low", "hdi_high")},
+                    **{name: _known(numbers[name]) for name in ("mean", "sd", "median", "hdi_low", "hdi_high")},
                     "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
                     "ess": float(numbers["ess"]) if "ess" in numbers else None,
                 }
             )
     return rows
+
+
+def _known(number: float) -> float | None:
+    return None if number != number else float(number)
 
 
 def write_csv(path: Path, rows: list[Row]) -> None:

@@ -1,0 +1,64 @@
+"""The figure and the page of a comparison."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.experiments.units import StressUnit
+from tissuq.report.comparison import comparison_figure, readable_comparison, write_comparison
+
+KPA = StressUnit("kPa", 1e-3)
+
+
+@pytest.fixture(scope="module")
+def table(specimen_study):
+    names = ("none", "constant", "yeoh", "auto")
+    return tq.compare({name: specimen_study.posteriors[name] for name in names})
+
+
+def test_every_fit_is_a_row_and_the_parameter_is_in_the_unit_asked_for(table):
+    figure = comparison_figure(table, KPA)
+    evidence, prediction, parameter = figure.axes
+    assert [label.get_text() for label in evidence.get_yticklabels()] == list(table.index)
+    assert "kPa" in parameter.get_xlabel()
+    bars = [line for line in parameter.lines if line.get_linewidth() == 4]
+    np.testing.assert_allclose(
+        [bar.get_xdata() for bar in bars], 1000 * table[["hdi_low", "hdi_high"]].to_numpy(), rtol=1e-12
+    )
+    assert any("for predictions only" in text.get_text() for text in prediction.texts)
+
+
+def test_what_is_far_below_is_told_at_the_edge(table):
+    far = table.copy()
+    far.loc["none", "log_bayes_factor"] = -12_345.0
+    texts = [text.get_text() for text in comparison_figure(far, KPA).axes[0].texts]
+    assert "-12,345" in texts
+
+
+def test_what_is_not_known_is_said(table):
+    unknown = table.copy()
+    names = ["log_evidence", "log_bayes_factor", "log_bayes_factor_low", "log_bayes_factor_high", "probability"]
+    unknown.loc["yeoh", names] = np.nan
+    assert "not known" in [text.get_text() for text in comparison_figure(unknown, KPA).axes[0].texts]
+    row = next(row for row in readable_comparison(unknown, KPA) if row[0] == "yeoh")
+    assert row[1:5] == [""] * 4
+    nothing = table.copy()
+    nothing[names] = np.nan
+    comparison_figure(nothing, KPA).draw_without_rendering()
+
+
+def test_parameters_of_different_names_are_named_one_by_one(table):
+    mixed = table.copy()
+    mixed["parameter"] = ["C10", "C10", "mu1", "C10"]
+    words = [text.get_text() for text in comparison_figure(mixed, KPA).axes[2].texts]
+    assert words == ["C10", "C10", "mu1", "C10"]
+
+
+def test_the_page_says_what_a_comparison_does_not_tell(table, tmp_path):
+    write_comparison(table, ["first", "second"], KPA, tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert "say nothing of parameters" in page
+    assert "tissuq compare first second" in page
+    assert page.count("<tr>") == 1 + len(table)
