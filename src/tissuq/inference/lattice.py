@@ -92,8 +92,10 @@ class Directions:
     Parameters
     ----------
     member : Member
+    scale : (n,) array
+        Noise of every measurement over noise_sd.
     features : list of (n, r) arrays
-        The stresses of each block's terms at the measurements, over their relative noise.
+        The stresses of each block's terms at the measurements.
     least : float
         A stress that counts as that of a block without stress in this mode.
     unlikely : list of float
@@ -111,6 +113,7 @@ class Directions:
     def __init__(
         self,
         member: Member,
+        scale: FloatArray,
         features: list[FloatArray],
         least: float,
         unlikely: list[float],
@@ -118,21 +121,21 @@ class Directions:
         shift: float = 0.0,
     ) -> None:
         self.member, self.step = member, step
+        features = [each / scale[:, None] for each in features]
         sizes = (max(float(np.sqrt((each**2).sum(axis=1).mean())), least) for each in features)
         pairs = zip(sizes, unlikely, strict=True)
         grids = [*(_grid(size, low, step, shift) for size, low in pairs), *[np.zeros(1)] * 2]
         self.ratios = grids[0], grids[1]
-        n, r = len(features[0]) if features else 0, features[0].shape[1] if features else 0
-        self.basis, triangle = np.linalg.qr(np.hstack([np.zeros((n, 0)), *features]))
-        first, second = np.split(triangle, [r], axis=1)
+        self.basis, triangle = np.linalg.qr(np.hstack([np.zeros((len(scale), 0)), *features]))
+        first, second = np.split(triangle, [features[0].shape[1] if features else 0], axis=1)
         # White in the second block, for all of its ratios, and then in the first.
         values, vectors = np.linalg.eigh(second @ second.T)
-        scale = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
-        left, singular, _ = np.linalg.svd((vectors.T @ first) / np.sqrt(scale)[:, :, None])
-        self.white = left.swapaxes(1, 2) @ (vectors.T / np.sqrt(scale)[:, :, None])
-        beyond = np.zeros((len(singular), scale.shape[1] - singular.shape[1]))
+        variance = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
+        left, singular, _ = np.linalg.svd((vectors.T @ first) / np.sqrt(variance)[:, :, None])
+        self.white = left.swapaxes(1, 2) @ (vectors.T / np.sqrt(variance)[:, :, None])
+        beyond = np.zeros((len(singular), variance.shape[1] - singular.shape[1]))
         self.variance = 1 + (self.ratios[0][:, None] * np.hstack([singular, beyond])[:, None]) ** 2
-        self.log_size = 0.5 * (np.log(scale).sum(axis=1)[:, None] + np.log(self.variance).sum(axis=2))
+        self.log_size = 0.5 * (np.log(variance).sum(axis=1)[:, None] + np.log(self.variance).sum(axis=2))
 
 
 class Lattice:

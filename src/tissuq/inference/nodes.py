@@ -123,9 +123,9 @@ def _directions(
     member = models[0].energy_members[place]
     symbols = [models[0].energy_symbols[block] for block in member.places]
     unlikely = [min(float(m.priors[s].quantile(UNLIKELY)) / _most_noise(m) for m in models) for s in symbols]
-    features = [each / scale[:, None] for each in features_of(models[0], place)]
     unit, _ = invariant_rates(models[0].experiment.mode, models[0].experiment.stretch)
-    return Directions(member, features, float(np.sqrt((unit**2).mean())), unlikely, step, shift)
+    least = float(np.sqrt((unit**2).mean()))
+    return Directions(member, scale, features_of(models[0], place), least, unlikely, step, shift)
 
 
 def features_of(model: StatisticalModel, place: int) -> list[FloatArray]:
