@@ -170,7 +170,7 @@ def test_the_summary_is_counted_by_hand():
     row = summarise(settings, [place | {"truth": [1.0] * 4, "oracle_sd": [0.05] * 4, "fits": fits}]).iloc[0]
     assert (row["fits"], row["failed"]) == (3, 1)
     assert row["coverage"] == pytest.approx(1 / 3)
-    assert row["coverage_error"] == pytest.approx(np.sqrt(2 / 27))
+    assert row["coverage_error"] == pytest.approx(np.sqrt(2 / 5 * 3 / 5 / 3))
     assert row["score"] == pytest.approx((0.2 + (0.2 + 40 * 0.2) + (0.4 + 40 * 0.1)) / 3)
     assert row["width"] == pytest.approx(0.2 / (2 * 1.959964 * 0.05), rel=1e-6)
     assert row["bias"] == pytest.approx(0.0, abs=1e-12)

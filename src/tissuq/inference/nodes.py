@@ -25,8 +25,8 @@ UNLIKELY = 1e-3
 OUTER_STEP, BEGINNINGS = 2 * STEP, 4
 """Step of the lattices at values of the outer parameters, and how many places they begin at in turn: so their errors
 are of either sign and cancel."""
-OF_NODE = 2000
-"""Points kept of each value."""
+OF_NODE, MOST = 2000, 300_000
+"""Points kept of each value, and where there are no outer parameters."""
 SCOUTS = 6
 """Members, about, whose posterior guides the search for the values."""
 GOLDEN = 0.6180339887
@@ -61,6 +61,7 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     found = []
     for index, model in enumerate(models):
         points, error = Weighing(model, lattices, index).points()
+        points = _thinned(points, MOST, 0.5)
         found.append(Node(points, *_linear(model, lattices, index, points), error))
     return found
 
@@ -94,11 +95,7 @@ class _Sums:
         """Return the posterior of all but the outer parameters, by at most `OF_NODE` points of the same weight."""
         lattices, ratios = self._lattices(settings, members), self._outer.ratios(settings)
         points, error = Weighing(self._model, lattices, 0, ratios).points()
-        if len(points.lattice) > OF_NODE:
-            total = np.logaddexp.reduce(points.log_weight)
-            offset = GOLDEN * self._calls % 1
-            points = points[systematic(np.exp(points.log_weight - total)[None], OF_NODE, offset)[0]]
-            points = replace(points, log_weight=np.full(OF_NODE, total - np.log(OF_NODE)))
+        points = _thinned(points, OF_NODE, GOLDEN * self._calls % 1)
         mean, root = _linear(self._model, lattices, 0, points)
         return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)
 
@@ -114,6 +111,15 @@ class _Sums:
             shift = OUTER_STEP * (turn + 0.5) / BEGINNINGS
             found = self._known[place, turn] = _directions([self._model], scale, place, OUTER_STEP, shift)
         return found
+
+
+def _thinned(points: Points, count: int, offset: float) -> Points:
+    """Return the points, or where these are more, so many of the same weight that stand for all."""
+    if len(points.lattice) <= count:
+        return points
+    total = np.logaddexp.reduce(points.log_weight)
+    chosen = points[systematic(np.exp(points.log_weight - total)[None], count, offset)[0]]
+    return replace(chosen, log_weight=np.full(count, total - np.log(count)))
 
 
 def _directions(

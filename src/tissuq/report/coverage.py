@@ -19,6 +19,7 @@ __all__ = ["readable_coverage", "write_campaign"]
 
 Rows = tuple[list[str], list[list[str]]]
 
+ROUNDING = 1e-9
 PLACES = {"design": "design", "strength": "strength", "noise": "noise", "family": "family", "mode": "loading mode"}
 
 
@@ -51,13 +52,13 @@ def write_campaign(settings: CoverageSettings, results: list[dict[str, Any]], fo
 
 
 def readable_coverage(summary: pd.DataFrame) -> Rows:
-    """Return headers and rows of a summary as text, with Monte Carlo errors; places only where they differ."""
+    """Return headers and rows of a summary as text, with Monte Carlo errors; what is the same in all rows left out."""
     headers = {
         "fits": ("fits", "count"),
         "coverage": ("coverage", "percent"),
         "score": ("score / C10", "number"),
         "price": ("score / oracle", "number"),
-        "price_median": ("(median)", "number"),
+        "price_median": ("(median)", "plain"),
         "width": ("width / oracle", "number"),
         "bias": ("bias", "percent"),
         "predictive": ("new data in band", "percent"),
@@ -75,8 +76,12 @@ def _readable_unseen(table: pd.DataFrame) -> Rows:
 
 
 def _readable(table: pd.DataFrame, headers: dict[str, tuple[str, str]]) -> Rows:
-    places = [name for name in PLACES if name in table and (name == "design" or table[name].nunique() > 1)]
-    columns = {name: header for name, header in headers.items() if name in table}
+    places = [name for name in PLACES if name in table and table[name].nunique() > 1]
+    columns = {
+        name: header
+        for name, header in headers.items()
+        if name in table and (header[1] != "count" or table[name].nunique() > 1)
+    }
     rows = [
         [
             *(f"{row[name]:g}" if name == "strength" else str(row[name]) for name in places),
@@ -89,12 +94,14 @@ def _readable(table: pd.DataFrame, headers: dict[str, tuple[str, str]]) -> Rows:
 
 
 def _with_error(row: Any, name: str, kind: str) -> str:
-    """Return a number and its Monte Carlo standard error as text: a count, a share in percent, or any other number."""
+    """Return a number and its Monte Carlo standard error as text: a share in percent, or any other number."""
     value, error = row[name], row.get(f"{name}_error")
     if kind == "count":
         return f"{value:.0f}"
+    if kind == "plain":
+        return significant(value)
     if error != error:  # of one data set
         return significant(100 * value) + " %" if kind == "percent" else significant(value)
     if kind == "percent":
         return f"{100 * value:.1f} ± {100 * error:.1f} %"
-    return f"{significant(value)} ± {significant(error, 2)}"
+    return f"{significant(value)} ± {significant(error if error > ROUNDING * abs(value) else 0.0, 2)}"

@@ -104,7 +104,8 @@ def _by_family(families: pd.DataFrame, prob: float) -> Figure:
         "held", [(0, TRUTH), (0.8, "#fbe3d4"), (0.95, "#ffffff"), (1, "#cfe3f1")]
     )
     beneath = 0.4 + 0.08 * max(map(len, columns))
-    figure = Figure(figsize=(1.6 + across * (0.62 * len(columns) + 0.3), down * (0.27 * len(names) + 0.4) + beneath))
+    width = max(9.0, 1.6 + across * (0.62 * len(columns) + 0.3))
+    figure = Figure(figsize=(width, down * (0.27 * len(names) + 0.4) + beneath))
     axes = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True).ravel()
     for axis in axes[len(panels) :]:
         axis.remove()

@@ -104,25 +104,20 @@ def carry_out(settings: CoverageSettings, task: Task) -> dict[str, Any]:
             Experiment(mode, stretch, truth.stress(mode, stretch) + sd * generator.standard_normal(len(stretch)))
         )
     told = noise_sd if settings.noise[task.noise] == "known" else ["unknown"] * len(data)
-    fits = fit_all(data, formulation, told, settings.chosen_priors)
-    found: dict[str, Any] = task.place | {
-        "truth": [truth.C10 for truth in truths],
-        "oracle_sd": [
-            sd / float(np.linalg.norm(truth.law(mode, stretch))) for sd, truth in zip(noise_sd, truths, strict=True)
-        ],
-        "fits": [None if fit is None else _interval(fit, settings.prob) for fit in fits],
-    }
-    if settings.predictive:
-        found["predictive"] = [
-            None if fit is None else share_of_new(fit, own, truth, sd, settings.prob)
-            for fit, own, truth, sd in zip(fits, data, truths, noise_sd, strict=True)
-        ]
-    for name in settings.unseen:
-        found[name] = [
-            None if fit is None else stress_unseen(fit, own, truth, loading_mode(name), settings.prob)
-            for fit, own, truth in zip(fits, data, truths, strict=True)
-        ]
-    return found
+    names = ("fits", *(["predictive"] if settings.predictive else []), *settings.unseen)
+    rows: dict[str, list[Any]] = {name: [None] * len(data) for name in names}
+    for place, fit in fit_all(data, formulation, told, settings.chosen_priors):
+        if fit is None:
+            continue
+        rows["fits"][place] = _interval(fit, settings.prob)
+        if settings.predictive:
+            rows["predictive"][place] = share_of_new(fit, data[place], truths[place], noise_sd[place], settings.prob)
+        for name in settings.unseen:
+            rows[name][place] = stress_unseen(fit, data[place], truths[place], loading_mode(name), settings.prob)
+    oracle_sd = [
+        sd / float(np.linalg.norm(truth.law(mode, stretch))) for sd, truth in zip(noise_sd, truths, strict=True)
+    ]
+    return task.place | {"truth": [truth.C10 for truth in truths], "oracle_sd": oracle_sd, **rows}
 
 
 def _interval(fit: Posterior | Average, prob: float) -> list[float]:

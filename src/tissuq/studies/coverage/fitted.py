@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,18 +31,16 @@ NoiseSd = float | str
 
 def fit_all(
     data: Sequence[Experiment], formulation: str, noise_sd: Sequence[NoiseSd], priors: Mapping[str, Prior]
-) -> list[Posterior | Average | None]:
-    """Return the posterior of every data set, None where a fit failed.
+) -> Iterator[tuple[int, Posterior | Average | None]]:
+    """Yield the place and the posterior of every data set, None where a fit failed; those of the same noise in a row.
 
-    Data sets of the same noise are fitted together, and one by one where all together fail.
+    Data sets of the same noise are fitted together, and one by one where all together fail. Posteriors are large: read
+    what is wanted, and let them go.
     """
-    found: list[Posterior | Average | None] = [None] * len(data)
     for level in dict.fromkeys(noise_sd):
         places = [place for place, own in enumerate(noise_sd) if own == level]
         posteriors = _fit_together([data[place] for place in places], formulation, level, priors)
-        for place, posterior in zip(places, posteriors, strict=True):
-            found[place] = posterior
-    return found
+        yield from zip(places, posteriors, strict=True)
 
 
 def parts_of(formulation: str) -> tuple[str, ...]:

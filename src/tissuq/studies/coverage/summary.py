@@ -23,7 +23,8 @@ def summarise(settings: CoverageSettings, results: Sequence[dict[str, Any]], *by
     Columns, each but the first two with the Monte Carlo standard error in ``..._error``:
 
     - fits, failed
-    - coverage: the share of intervals that hold the true C10
+    - coverage: the share of intervals that hold the true C10; its error is that of a share with one more of either
+      kind, so that it is not zero where all hold
     - score: the mean interval score over the true C10 (width, plus 2 / (1 - prob) times by how much the truth is
       missed; Gneiting & Raftery 2007)
     - price: the mean interval score over the width of the interval of an oracle that knows everything but C10; and
@@ -56,7 +57,8 @@ def summarise(settings: CoverageSettings, results: Sequence[dict[str, Any]], *by
     count = groups["coverage"].count()
     table = pd.DataFrame({"fits": count, "failed": groups.size() - count})
     table["coverage"] = groups["coverage"].mean()
-    table["coverage_error"] = np.sqrt(table["coverage"] * (1 - table["coverage"]) / count)
+    likely = (table["coverage"] * count + 1) / (count + 2)
+    table["coverage_error"] = np.sqrt(likely * (1 - likely) / count)
     _add_means(table, groups, "score", "price", "bias", *(["predictive"] if settings.predictive else []))
     table["price_median"], table["price_median_error"] = groups["price"].median(), groups["price"].agg(_median_error)
     table["width"], table["width_error"] = groups["width"].median(), groups["width"].agg(_median_error)

@@ -70,11 +70,12 @@ def carry_out(settings: SbcSettings, task: Task) -> dict[str, Any]:
         data.append(Experiment(model.experiment.mode, model.experiment.stretch, stress))
     noise_sd = settings.design.noise_sd if noise == "known" else noise
     fits = fit_all(data, formulation, [noise_sd] * len(data), settings.chosen_priors)
-    below: dict[str, list[float | None]] = {symbol: [] for symbol in model.symbols}
-    for fit, values, score in zip(fits, truths, scores, strict=True):
-        for symbol, uniform in zip(model.symbols, score, strict=True):
-            marginal = None if fit is None else fit.marginals[symbol]
-            below[symbol].append(None if marginal is None else probability_below(marginal, values[symbol], uniform))
+    below: dict[str, list[float | None]] = {symbol: [None] * len(data) for symbol in model.symbols}
+    for place, fit in fits:
+        for symbol, uniform in zip(model.symbols, scores[place], strict=True):
+            if fit is not None:
+                marginal = fit.marginals[symbol]
+                below[symbol][place] = probability_below(marginal, truths[place][symbol], uniform)
     return {"formulation": task.formulation, "noise": task.noise, "below": below}
 
 
