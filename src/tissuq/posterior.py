@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.assessment import Assessment, assess, known_evidence_changes
+from tissuq.assessment.modulus import modulus
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -59,6 +60,22 @@ class Posterior:
     def marginals(self) -> Mapping[str, Marginal]:
         """The marginal posterior of every parameter: mean, sd, density, quantiles, HDI."""
         return self.solution.marginals
+
+    @property
+    def initial_shear_modulus(self) -> Marginal:
+        """The marginal posterior of the material's initial shear modulus, MPa: what an energy discrepancy leaves alone.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> truth = {"C10": 0.5, "C01": 0.1}
+        >>> data = tq.simulate("mooney-rivlin", truth, stretch, noise_sd=0.02, seed=1)
+        >>> low, high = tq.fit(data, material="mooney-rivlin", noise_sd=0.02).initial_shear_modulus.hdi()
+        >>> bool(low < 2 * (0.5 + 0.1) < high)
+        True
+        """
+        return modulus(self.solution)
 
     @property
     def log_evidence(self) -> float | None:

@@ -108,3 +108,9 @@ def test_a_sampler_that_has_nothing_to_sample_without_discrepancy_gives_no_compa
     found = tq.fit(data, discrepancy="constant", noise_sd=0.02, method="smc").assess()
     assert found.probability_of_none is None
     assert found.width_against_none is None
+
+
+def test_a_parameter_that_no_closed_form_integrates_is_assessed_too(data):
+    found = tq.fit(data, discrepancy="taylor", noise_sd=0.05, priors={"C10": tq.LogNormal(0.5, 0.5)}).assess()
+    assert 0 <= found.between <= 1
+    assert found.modulus_symbols == ("C10",)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.design import design_warnings
+from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import (
     SCALES,
     PowerScaling,
@@ -20,6 +21,7 @@ from tissuq.assessment.sensitivity import (
 )
 from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import ConvergenceError, ModelError
+from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
@@ -56,6 +58,13 @@ class Assessment:
     initial_share : tuple of float
         Share of the initial stiffness that the discrepancy carries, likewise: what it could have taken from the
         parameter. Zero for an energy discrepancy.
+    modulus : tuple of float
+        The material's initial shear modulus, MPa: mean, and the ends of its 95 % HDI.
+    modulus_symbols, other_symbols : tuple of str
+        The material's parameters that it is made of, and the others. Beside an energy discrepancy it keeps its meaning
+        (and a parameter that alone makes it), and the others share theirs.
+    unit : str
+        Of stress, in which sentences speak.
     amplitudes : dict of str to float
         Posterior median of each amplitude of an energy discrepancy over the mean of the parameter.
     members : dict of str to float
@@ -84,6 +93,10 @@ class Assessment:
     parameter: str
     share: tuple[float, float, float]
     initial_share: tuple[float, float, float]
+    modulus: tuple[float, float, float]
+    modulus_symbols: tuple[str, ...]
+    other_symbols: tuple[str, ...]
+    unit: str
     amplitudes: Mapping[str, float]
     members: Mapping[str, float]
     between: float
@@ -98,7 +111,7 @@ class Assessment:
     @property
     def sentences(self) -> list[str]:
         """The numbers as a person reads them."""
-        found = list(self._shares())
+        found = [*self._shares(), self._modulus()]
         if self.width_against_none is not None:
             found.append(f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy")
         if self.probability_of_none is not None:
@@ -144,6 +157,19 @@ class Assessment:
             f"{self.parameter} may be off"
         )
 
+    def _modulus(self) -> str:
+        """Return what is known of the initial shear modulus, in words."""
+        mean, low, high = (value / stress_unit(self.unit).to_mpa for value in self.modulus)
+        text = f"the material's initial shear modulus is {mean:.3g} {self.unit} (95 % interval {low:.3g} to {high:.3g})"
+        if len(self.modulus_symbols) == 1:
+            text += f", by {self.modulus_symbols[0]} alone"
+        else:
+            text += f", by {' and '.join(self.modulus_symbols)} together, which say less one by one"
+        if self.amplitudes and self.other_symbols:
+            verb = "shares its" if len(self.other_symbols) == 1 else "share their"
+            text += f"; {' and '.join(self.other_symbols)} {verb} meaning with the discrepancy"
+        return text
+
 
 def assess(solution: Solution, solve: Solve) -> Assessment:
     """Return what the discrepancy does in a posterior.
@@ -158,12 +184,17 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
     model, marginal = solution.model, solution.marginals[solution.model.headline]
     none = _without(model, solve)
     share, initial_share = _shares(solution)
+    stiffness = modulus(solution)
     scales = scale_symbols(model)
     others = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
     return Assessment(
         parameter=model.headline,
         share=share,
         initial_share=initial_share,
+        modulus=(stiffness.mean, *stiffness.hdi()),
+        modulus_symbols=(own := modulus_symbols(model)),
+        other_symbols=tuple(symbol for symbol in model.material_symbols if symbol not in own),
+        unit=model.experiment.stress_unit,
         amplitudes={
             symbol: float(solution.marginals[symbol].quantile(0.5)) / marginal.mean for symbol in model.energy_symbols
         },
@@ -232,12 +263,14 @@ def _between(solution: Solution, marginal: Marginal) -> float:
     parts = solution.components
     if parts.member is None:
         return 0.0
-    place = solution.model.linear.index(solution.model.headline)
-    names = np.array([member.name for member in solution.model.energy_members])[parts.member]
+    model = solution.model
+    columns = dict(zip((*model.nonlinear, *model.linear), np.hstack([parts.settings, parts.mean]).T, strict=False))
+    values = columns[model.headline]
+    names = np.array([member.name for member in model.energy_members])[parts.member]
     explained = 0.0
     for name in np.unique(names):
         own = names == name
-        mean = float(np.average(parts.mean[own, place], weights=parts.weights[own]))
+        mean = float(np.average(values[own], weights=parts.weights[own]))
         explained += float(parts.weights[own].sum()) * (mean - marginal.mean) ** 2
     return explained / marginal.sd**2
 

@@ -1,0 +1,79 @@
+"""The initial shear modulus of a fitted material: what an energy discrepancy leaves alone, whatever the material."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import loading_mode
+from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points
+from tissuq.inference.solution import Solution
+from tissuq.mechanics import stress_basis
+from tissuq.model import StatisticalModel
+from tissuq.prediction.moments import coefficients
+
+__all__ = ["modulus", "modulus_symbols"]
+
+FloatArray = NDArray[np.float64]
+
+STEP = 1e-3
+"""Of the stretch, for the initial slope."""
+
+
+def modulus(solution: Solution) -> Marginal:
+    """Return the marginal posterior of the material's initial shear modulus, MPa.
+
+    It is linear in the moduli given the exponents, so that it is a mixture of Gaussians as they are.
+    """
+    model, parts = solution.model, solution.components
+    symbols = modulus_symbols(model)
+    bent = parts.settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]]
+    if len(symbols) == 1 and not np.ptp(moduli := _moduli(model, bent), axis=0).any():
+        factor = float(moduli[0, model.column_symbols.index(symbols[0])])
+        return _scaled(solution.marginals[symbols[0]], factor)
+    mean, root = coefficients(model, parts)
+    moduli = _moduli(model, bent)
+    means, sds = (moduli * mean).sum(axis=1), np.linalg.norm(np.einsum("mk,mkp->mp", moduli, root), axis=1)
+    is_wide = sds > 0
+    found = []
+    if is_wide.any():
+        own = marginal_of_mixture(parts.weights[is_wide], means[is_wide], sds[is_wide])
+        found.append((float(parts.weights[is_wide].sum()), own))
+    if not is_wide.all():
+        own = marginal_of_points(means[~is_wide], parts.weights[~is_wide], (-np.inf, np.inf))
+        found.append((float(parts.weights[~is_wide].sum()), own))
+    return blended(found, (-np.inf, np.inf))
+
+
+def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:
+    """Return the parameters that the initial shear modulus is made of."""
+    moduli = np.abs(_moduli(model, np.array([_usual(model)])))[0]
+    return tuple(s for s, size in zip(model.column_symbols, moduli, strict=True) if size > 1e-6 * moduli.max())
+
+
+def _usual(model: StatisticalModel) -> list[float]:
+    return [float(model.priors[symbol].quantile(0.5)) for symbol in model.bent_symbols]
+
+
+def _moduli(model: StatisticalModel, bent: FloatArray) -> FloatArray:
+    """Return the initial shear moduli (M, k) of unit `column_symbols` at exponents (M, s); zero for a discrepancy's."""
+    near = 1 + STEP * np.array([-2, -1, 1, 2])
+    distinct, group = np.unique(bent, axis=0, return_inverse=True)
+    basis = stress_basis(model.material, loading_mode("uniaxial"), near, distinct)
+    basis = np.broadcast_to(basis, (len(distinct), *basis.shape[-2:]))
+    slope = np.einsum("s,msk->mk", np.array([1, -8, 8, -1]) / (12 * STEP), basis)
+    found = np.zeros((len(bent), len(model.column_symbols)))
+    found[:, : slope.shape[1]] = slope[group.ravel()] / 3
+    return found
+
+
+def _scaled(marginal: Marginal, factor: float) -> Marginal:
+    return replace(
+        marginal,
+        mean=marginal.mean * factor,
+        sd=marginal.sd * factor,
+        points=marginal.points * factor,
+        density=marginal.density / factor,
+    )

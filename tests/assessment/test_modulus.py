@@ -1,0 +1,53 @@
+"""The initial shear modulus, against draws through the strain energy's own second derivative."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+STRETCH = np.linspace(0.75, 1.7, 20)
+
+
+def measured(seed=0):
+    truth = {"C10": 0.5, "C20": 0.03, "C30": 0.0}
+    return tq.simulate("yeoh", truth, STRETCH, noise_sd=0.03, seed=seed)
+
+
+@pytest.mark.parametrize("discrepancy", ["none", "taylor", "constant"])
+@pytest.mark.parametrize("material", ["neo-hookean", "mooney-rivlin", "yeoh", "ogden-1", "ogden-2"])
+def test_it_is_that_of_the_draws(material, discrepancy):
+    posterior = tq.fit(measured(), material=material, discrepancy=discrepancy, noise_sd=0.03, method="exact")
+    found, draws = posterior.initial_shear_modulus, posterior.solution.draws
+    some = [draws[p.symbol].ravel()[::40] for p in posterior.model.material.parameters]
+    material = posterior.model.material
+    moduli = np.array([tq.initial_shear_modulus(material, values) for values in zip(*some, strict=True)])
+    assert found.mean == pytest.approx(np.mean(moduli), abs=5 * found.sd / np.sqrt(len(moduli)))
+    assert found.sd == pytest.approx(np.std(moduli), rel=0.3)  # 5 standard errors of a hundred draws
+    low, high = found.hdi(0.5)
+    assert 0.25 < np.mean((low < moduli) & (moduli < high)) < 0.75
+
+
+def test_where_one_parameter_makes_it_it_is_that_one_scaled():
+    posterior = tq.fit(measured(), noise_sd=0.03)
+    assert posterior.initial_shear_modulus.hdi() == pytest.approx(2 * np.array(posterior.marginals["C10"].hdi()))
+
+
+@pytest.mark.parametrize(
+    ("material", "words"),
+    [
+        ("neo-hookean", "by C10 alone."),
+        ("yeoh", "by C10 alone; C20 and C30 share their meaning with the discrepancy."),
+        ("mooney-rivlin", "by C10 and C01 together, which say less one by one."),
+    ],
+)
+def test_the_assessment_says_which_parameters_keep_their_meaning(material, words):
+    data = measured()
+    in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress, stress_unit="kPa")
+    found = tq.fit(in_kpa, material=material, noise_sd=0.03).assess()
+    (sentence,) = (text for text in found.sentences if "initial shear modulus" in text)
+    assert sentence.endswith(words)
+    assert f"is {1000 * found.modulus[0]:.3g} kPa" in sentence
+    low, high = found.modulus[1:]
+    assert low < 1.0 < high
