@@ -25,7 +25,7 @@ UNLIKELY = 1e-3
 OUTER_STEP, BEGINNINGS = 2 * STEP, 4
 """Step of the lattices at values of the outer parameters, and how many places they begin at in turn: so their errors
 are of either sign and cancel."""
-OF_NODE, MOST = 2000, 300_000
+OF_NODE, MOST = 2000, 60_000
 """Points kept of each value, and where there are no outer parameters."""
 SCOUTS = 6
 """Members, about, whose posterior guides the search for the values."""
