@@ -55,7 +55,7 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
         components = components.thinned(max(FEWEST, MOST_VALUES // size))
     density = left_out_log_density(solution.model, components)
     log_weights = np.log(components.weights)[:, None] - density
-    if solution.diagnostics is not None:
+    if solution.diagnostics is not None and len(components.weights) > FEWEST:
         from arviz_stats.base import array_stats
 
         smoothed, khat = array_stats.psislw(density, axis=0)

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from tissuq.discrepancy import discrepancy_named
+from tissuq.discrepancy import discrepancies, discrepancy_named
 from tissuq.errors import TissuqError
 from tissuq.mechanics import NeoHookean
 from tissuq.model import StatisticalModel
@@ -28,10 +28,6 @@ PRIORS: dict[str, Prior] = {
     "c2": HalfCauchy(0.1),
     "noise_sd": Uniform(0.05, 0.5),
 }
-FORMULATIONS = (
-    *("none", "constant", "linear", "quadratic", "mooney-rivlin", "yeoh", "gp"),
-    *("taylor", "log", "spline", "zero-modulus", "valanis-landel", "auto", "auto-balanced", "auto-sharp"),
-)
 
 
 class SbcSettings(BaseModel):
@@ -43,7 +39,7 @@ class SbcSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    formulations: tuple[str, ...] = Field(FORMULATIONS, min_length=1)
+    formulations: tuple[str, ...] = Field(default_factory=lambda: tuple(discrepancies()), min_length=1)
     noise: tuple[Literal["known", "unknown"], ...] = Field(("known", "unknown"), min_length=1)
     design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
     priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
