@@ -173,23 +173,28 @@ def stress_moments(
 
 
 def drawn_curves(
-    model: StatisticalModel, components: Components, stretch: FloatArray, seed: int = 0
+    model: StatisticalModel,
+    components: Components,
+    stretch: FloatArray,
+    seed: int = 0,
+    mode: LoadingMode | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return stresses (M, g) of the material alone and of the discrepancy, one joint draw for every component.
 
-    Scatter that is independent from point to point is no curve, and left out.
+    Scatter that is independent from point to point is no curve, and left out. In another loading mode than that of the
+    data, so is a discrepancy that is no energy.
     """
     generator, settings = np.random.default_rng([seed, 11]), components.settings
     score = generator.standard_normal(components.mean.shape)
     linear = components.mean + np.einsum("mpq,mq->mp", components.root, score)
     drawn, _ = coefficients(model, replace(components, mean=linear))
-    terms = basis_of(model, stretch, settings) * drawn[:, None, :]
+    terms = basis_of(model, stretch, settings, mode) * drawn[:, None, :]
     own = np.isin(model.column_symbols, model.material_symbols)
     alone, other = terms[..., own].sum(axis=2), terms[..., ~own].sum(axis=2)
     if components.member is not None:
-        for shift, _, _, chosen in _energies(model, replace(components, mean=linear), stretch):
+        for shift, _, _, chosen in _energies(model, replace(components, mean=linear), stretch, mode):
             other[chosen] += shift
-    if model.is_correlated:
+    if model.is_correlated and mode is None:
         for part in correlated_parts(model, settings):
             shift, covariance = _condition_jointly(model, part, stretch, drawn[part.chosen])
             values, vectors = np.linalg.eigh(covariance)

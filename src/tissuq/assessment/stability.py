@@ -1,0 +1,133 @@
+"""Whether a fitted material is stable, draw by draw: Baker-Ericksen, Drucker, and a stress that rises with stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import LoadingMode
+from tissuq.inference.resampling import systematic
+from tissuq.inference.solution import Solution
+from tissuq.mechanics.path import invariants
+from tissuq.prediction.moments import drawn_curves
+
+__all__ = ["Stability", "calibrated_range", "stability"]
+
+FloatArray = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+DRAWS = 500
+STEP = 1e-4
+"""Of the logarithmic strains, for the tangent."""
+NEUTRAL = 1e-9
+"""Of the initial modulus: differences of stress that count as none."""
+DIRECTIONS = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
+"""Logarithmic strains of the first and of the second axis at constant volume, the third axis free of stress."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Shares of draws that are stable at stretches of a loading mode, and from the reference up to them.
+
+    Attributes
+    ----------
+    mode : str
+    stretch : (g,) array
+    baker_ericksen : (g,) array
+        The greater principal stress along the greater stretch.
+    drucker : (g,) array
+        Work of every small change of stress is positive: the tangent of Cauchy stress by logarithmic strain, in the
+        plane of the first two axes with the third free of stress, is positive definite (as Abaqus checks).
+    rising : (g,) array
+        The engineering stress rises with the stretch.
+    stable : (g,) array
+        All three hold everywhere from the reference to this stretch.
+    """
+
+    mode: str
+    stretch: FloatArray
+    baker_ericksen: FloatArray
+    drucker: FloatArray
+    rising: FloatArray
+    stable: FloatArray
+
+
+def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Stability:
+    """Return how probable stability is at stretches (g,) of a loading mode, for material and energy discrepancy.
+
+    A discrepancy that is no energy has no part in it.
+    """
+    parts = solution.components
+    parts = parts[systematic(parts.weights[None], DRAWS)[0]]
+    parts = replace(parts, weights=np.full(DRAWS, 1 / DRAWS))
+    model = solution.model
+    base = np.array([np.broadcast_to(each, len(stretch)) for each in mode.principal_stretches(stretch)])
+    nudges = [np.zeros(3), *(sign * STEP * each for each in DIRECTIONS for sign in (1, -1))]
+    paths = [_Path(base * np.exp(nudge)[:, None], direction) for nudge in nudges for direction in DIRECTIONS]
+    whole = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
+    alone, other = drawn_curves(model, parts, np.ones(whole.base.shape[1]), mode=whole)
+    stress = (alone + other).reshape(DRAWS, 5, 2, len(stretch))
+    own, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * STEP)
+    size = np.abs(np.trace(tangent[..., np.abs(stretch - 1).argmin()], axis1=1, axis2=2))[:, None]
+    differences = np.stack([own[:, 0], own[:, 1], own[:, 0] - own[:, 1]])
+    apart = np.stack([base[0] - base[2], base[1] - base[2], base[0] - base[1]])
+    baker = ((differences * np.sign(apart)[:, None] > -NEUTRAL * size) | (np.abs(apart)[:, None] < 1e-9)).all(axis=0)
+    determinant = tangent[:, 0, 0] * tangent[:, 1, 1] - tangent[:, 0, 1] * tangent[:, 1, 0]
+    drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
+    near = np.concatenate([stretch - STEP, stretch + STEP])
+    alone, other = drawn_curves(model, parts, near, mode=mode)
+    rising = np.diff((alone + other).reshape(DRAWS, 2, -1), axis=1)[:, 0] > 0
+    stable = _from_reference(stretch, baker & drucker & rising)
+    return Stability(mode.name, stretch, *(each.mean(axis=0) for each in (baker, drucker, rising, stable)))
+
+
+def calibrated_range(solution: Solution, mode: LoadingMode) -> tuple[float, float]:
+    """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
+    data = solution.model.experiment
+    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
+    if mode == data.mode:
+        return min(1.0, float(data.stretch.min())), max(1.0, float(data.stretch.max()))
+    return _end(mode, most, -1), _end(mode, most, 1)
+
+
+def _end(mode: LoadingMode, most: Sequence[float], sign: int) -> float:
+    low, high = 0.0, np.log(10.0)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        is_inside = all(
+            each[0] <= limit for each, limit in zip(invariants(mode, [np.exp(sign * middle)]), most, strict=True)
+        )
+        low, high = (middle, high) if is_inside else (low, middle)
+    return float(np.exp(sign * low))
+
+
+def _from_reference(stretch: FloatArray, is_stable: Flags) -> Flags:
+    """Return whether all is stable (M, g) from the reference to each stretch."""
+    found = np.empty_like(is_stable)
+    for side in (np.flatnonzero(stretch >= 1), np.flatnonzero(stretch < 1)):
+        outward = side[np.argsort(np.abs(stretch[side] - 1))]
+        found[:, outward] = np.logical_and.accumulate(is_stable[:, outward], axis=1)
+    return found
+
+
+class _Path(LoadingMode):
+    """Deformations through given states: base * l^direction, state by state; its stress is the work per log strain."""
+
+    def __init__(self, base: FloatArray, direction: FloatArray) -> None:
+        object.__setattr__(self, "base", base)
+        object.__setattr__(self, "direction", direction)
+
+    base: FloatArray
+    direction: FloatArray
+
+    def rates(self, count: int) -> FloatArray:
+        """Return the direction (3, count) at every state."""
+        return np.repeat(self.direction[:, None], count, axis=1)
+
+    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+        first, second, third = self.base * stretch**self.direction
+        return first, second, third
