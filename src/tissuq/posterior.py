@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from tissuq.assessment import Assessment, assess, known_evidence_changes
 from tissuq.assessment.modulus import modulus
+from tissuq.assessment.stability import calibrated_range, stability
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.model import StatisticalModel
@@ -125,6 +126,41 @@ class Posterior:
     @cached_property
     def _assessment(self) -> Assessment:
         return assess(self.solution, lambda models: [posterior.solution for posterior in self._solve(models)])
+
+    def stability(
+        self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41
+    ) -> pd.DataFrame:
+        """Return how probable it is that the material, with an energy discrepancy, is stable.
+
+        Parameters
+        ----------
+        mode : str or LoadingMode, optional
+            That of the data unless another is given.
+        stretch : (g,) array, optional
+            Unless given, ``points`` stretches over the range in which both invariants were measured.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns stretch; baker_ericksen, drucker, rising, the shares of draws for which each criterion holds there;
+            and stable, the share for which all hold from the reference up to there.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.02, seed=1)
+        >>> table = tq.fit(data, discrepancy="none", noise_sd=0.02).stability("equibiaxial")
+        >>> float(table["stable"].min())
+        1.0
+        """
+        import pandas as pd
+
+        asked = self.model.experiment.mode if mode is None else loading_mode(mode)
+        ends = calibrated_range(self.model.experiment, asked)
+        at = np.linspace(*ends, points) if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=np.float64))
+        found = stability(self.solution, asked, at)
+        return pd.DataFrame({name: value for name, value in vars(found).items() if name not in ("mode", "everywhere")})
 
     def update(self, more: Experiment) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.

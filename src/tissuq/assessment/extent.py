@@ -19,6 +19,7 @@ from tissuq.assessment.sensitivity import (
     rescaled,
     scale_symbols,
 )
+from tissuq.assessment.stability import probability_of_stability
 from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.experiments.units import stress_unit
@@ -84,6 +85,9 @@ class Assessment:
     evidence_changes : dict of str to float
         Change of the log evidence when these scales are a quarter or fourfold, and when the uniform boxes of the linear
         parameters are four times as wide (boxes); without what is not known.
+    stable : dict of str to float
+        For every loading mode, the probability that material and energy discrepancy are stable over the measured range;
+        empty where the material's energy does not tell.
     power_scaling : PowerScaling or None
         Sensitivity of the parameter to the powers of prior and likelihood.
     warnings : tuple of str
@@ -105,6 +109,7 @@ class Assessment:
     scales: tuple[str, ...]
     shifts: Mapping[float, float]
     evidence_changes: Mapping[str, float]
+    stable: Mapping[str, float]
     power_scaling: PowerScaling | None
     warnings: tuple[str, ...]
 
@@ -128,6 +133,8 @@ class Assessment:
                 f"the prior scale of {' and '.join(self.scales)} {_weight(self.shifts[worst])}: times {worst:g} it "
                 f"moves {self.parameter} by {self.shifts[worst]:+.2f} sd"
             )
+        if self.stable:
+            found.append(self._stability())
         if self.power_scaling is not None:
             found.append(self.power_scaling.sentence(self.parameter))
         return [f"{text[0].upper()}{text[1:]}." for text in found]
@@ -155,6 +162,15 @@ class Assessment:
         yield (
             f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), by which "
             f"{self.parameter} may be off"
+        )
+
+    def _stability(self) -> str:
+        """Return how probable stability is over the measured range, in words."""
+        worst = min(self.stable, key=lambda mode: self.stable[mode])
+        what = "material and discrepancy together are" if self.amplitudes else "the material is"
+        text = f"over the measured range of the invariants {what} stable with a probability of"
+        return (
+            f"{text} {_percent(self.stable[worst])} (Baker-Ericksen, Drucker, rising stress; least in {worst} loading)"
         )
 
     def _modulus(self) -> str:
@@ -185,6 +201,9 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
     none = _without(model, solve)
     share, initial_share = _shares(solution)
     stiffness = modulus(solution)
+    stable: Mapping[str, float] = {}
+    with suppress(ModelError):
+        stable = probability_of_stability(solution)
     scales = scale_symbols(model)
     others = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
     return Assessment(
@@ -208,6 +227,7 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
             for name, each in others.items()
         },
         evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, others),
+        stable=stable,
         power_scaling=power_scaling(solution),
         warnings=tuple(design_warnings(model.experiment)),
     )

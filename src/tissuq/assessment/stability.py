@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.modes import LoadingMode
+from tissuq.errors import ModelError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
+from tissuq.mechanics.complex_step import MOST_VALUES
 from tissuq.mechanics.path import invariants
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["Stability", "calibrated_range", "stability"]
+__all__ = ["Stability", "calibrated_range", "probability_of_stability", "stability"]
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-DRAWS = 500
+DRAWS, POINTS = 500, 21
 STEP = 1e-4
 """Of the logarithmic strains, for the tangent."""
 NEUTRAL = 1e-9
@@ -46,6 +49,8 @@ class Stability:
         The engineering stress rises with the stretch.
     stable : (g,) array
         All three hold everywhere from the reference to this stretch.
+    everywhere : float
+        All three hold at all stretches.
     """
 
     mode: str
@@ -54,23 +59,39 @@ class Stability:
     drucker: FloatArray
     rising: FloatArray
     stable: FloatArray
+    everywhere: float
 
 
 def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Stability:
     """Return how probable stability is at stretches (g,) of a loading mode, for material and energy discrepancy.
 
     A discrepancy that is no energy has no part in it.
+
+    Raises
+    ------
+    ModelError
+        When the material's energy cannot be differentiated at many states at once.
     """
-    parts = solution.components
+    model, parts = solution.model, solution.components
     parts = parts[systematic(parts.weights[None], DRAWS)[0]]
-    parts = replace(parts, weights=np.full(DRAWS, 1 / DRAWS))
-    model = solution.model
+    count = MOST_VALUES // (10 * len(stretch) * len(model.column_symbols)) if model.bent_symbols else DRAWS
+    blocks = [parts[block] for block in np.array_split(np.arange(DRAWS), -(-DRAWS // max(1, count)))]
+
+    def drawn(points: FloatArray, path: LoadingMode) -> FloatArray:
+        curves = [drawn_curves(model, block, points, seed, path) for seed, block in enumerate(blocks)]
+        return np.concatenate([alone + other for alone, other in curves])
+
     base = np.array([np.broadcast_to(each, len(stretch)) for each in mode.principal_stretches(stretch)])
     nudges = [np.zeros(3), *(sign * STEP * each for each in DIRECTIONS for sign in (1, -1))]
     paths = [_Path(base * np.exp(nudge)[:, None], direction) for nudge in nudges for direction in DIRECTIONS]
     whole = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
-    alone, other = drawn_curves(model, parts, np.ones(whole.base.shape[1]), mode=whole)
-    stress = (alone + other).reshape(DRAWS, 5, 2, len(stretch))
+    try:
+        stress = drawn(np.ones(whole.base.shape[1]), whole).reshape(DRAWS, 5, 2, len(stretch))
+    except TypeError as error:
+        raise ModelError(
+            f"the stability of material '{model.material.name}' is not known, because its energy is not plain "
+            "arithmetic of arrays: write it without jax.numpy and branches."
+        ) from error
     own, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * STEP)
     size = np.abs(np.trace(tangent[..., np.abs(stretch - 1).argmin()], axis1=1, axis2=2))[:, None]
     differences = np.stack([own[:, 0], own[:, 1], own[:, 0] - own[:, 1]])
@@ -79,19 +100,29 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     determinant = tangent[:, 0, 0] * tangent[:, 1, 1] - tangent[:, 0, 1] * tangent[:, 1, 0]
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
     near = np.concatenate([stretch - STEP, stretch + STEP])
-    alone, other = drawn_curves(model, parts, near, mode=mode)
-    rising = np.diff((alone + other).reshape(DRAWS, 2, -1), axis=1)[:, 0] > 0
+    rising = np.diff(drawn(near, mode).reshape(DRAWS, 2, -1), axis=1)[:, 0] > 0
     stable = _from_reference(stretch, baker & drucker & rising)
-    return Stability(mode.name, stretch, *(each.mean(axis=0) for each in (baker, drucker, rising, stable)))
+    first, second, third, all_three = (each.mean(axis=0) for each in (baker, drucker, rising, stable))
+    return Stability(mode.name, stretch, first, second, third, all_three, float(stable.all(axis=1).mean()))
 
 
-def calibrated_range(solution: Solution, mode: LoadingMode) -> tuple[float, float]:
+def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]:
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
-    data = solution.model.experiment
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     if mode == data.mode:
         return min(1.0, float(data.stretch.min())), max(1.0, float(data.stretch.max()))
     return _end(mode, most, -1), _end(mode, most, 1)
+
+
+def probability_of_stability(solution: Solution) -> dict[str, float]:
+    """Return for every loading mode the share of draws that are stable over the whole range that was measured."""
+    found = {}
+    for name in loading_modes():
+        mode = loading_mode(name)
+        ends = calibrated_range(solution.model.experiment, mode)
+        result = stability(solution, mode, np.linspace(*ends, POINTS))
+        found[name] = float(result.everywhere)
+    return found
 
 
 def _end(mode: LoadingMode, most: Sequence[float], sign: int) -> float:

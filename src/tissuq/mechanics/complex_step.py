@@ -11,7 +11,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.path import STEP
 
-__all__ = ["complex_step_stress"]
+__all__ = ["MOST_VALUES", "complex_step_stress"]
 
 FloatArray = NDArray[np.float64]
 
