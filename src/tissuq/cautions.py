@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isfinite
 
 import numpy as np
 
@@ -37,9 +38,10 @@ def warnings_about(solution: Solution) -> Iterator[str]:
             "neither alone, or give the noise (repeated measurements at one stretch tell it)."
         )
     error = solution.log_evidence_error
-    if error is not None and error > ROUGH and solution.diagnostics is None:
+    if error is not None and not error <= ROUGH and solution.diagnostics is None:
+        size = f"is off by about {error:.1g}" if isfinite(error) else "is not known"
         yield (
-            f"the sums behind this posterior are rough (the log evidence is off by about {error:.1g}), as where the "
+            f"the sums behind this posterior are rough (the log evidence {size}), as where the "
             "noise that was given is far smaller than the scatter of the data: give a larger one, or leave it unknown."
         )
     headline = solution.model.headline

@@ -242,8 +242,10 @@ class StatisticalModel:
 
     @cached_property
     def _usual_bent(self) -> tuple[float, ...]:
-        """The medians of the priors of `bent_symbols`."""
-        return tuple(float(prior.quantile(0.5)) for prior in self._bent_priors())
+        """The medians of the priors of `bent_symbols`; off zero, where a law may divide by it."""
+        middles = (float(prior.quantile(0.5)) for prior in self._bent_priors())
+        off = (float(prior.quantile(0.6)) for prior in self._bent_priors())
+        return tuple(middle or other for middle, other in zip(middles, off, strict=True))
 
     def _bent_priors(self) -> list[Prior]:
         own = {p.symbol: p for p in self.material.parameters}

@@ -215,8 +215,12 @@ class HalfNormal(Prior):
     def support(self) -> tuple[float, float]:
         return 0.0, inf
 
+    @property
+    def gaussian(self) -> tuple[float, float, float]:
+        return 0.0, self.sd**-2, 0.5 * log(2 / pi) - log(self.sd)
+
     def log_density(self, value: Any) -> Any:
-        return -0.5 * (value / self.sd) ** 2 - log(self.sd) + 0.5 * log(2 / pi)
+        return -0.5 * (value / self.sd) ** 2 + self.gaussian[2]
 
     def quantile(self, probability: Any) -> Any:
         from scipy.special import ndtri

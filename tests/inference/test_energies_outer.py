@@ -9,7 +9,7 @@ from scipy.stats import halfcauchy
 import tissuq as tq
 from tissuq.errors import ConvergenceError
 from tissuq.inference.importance import Proposal, adapted, even_points
-from tissuq.inference.lattice import times_gaussians
+from tissuq.inference.linear import times_gaussians
 from tissuq.inference.outer import relative_error
 from tissuq.noise import stress_level
 
@@ -22,7 +22,7 @@ NOISE_SD = 0.05
 ERRORS = NOISE_SD * np.random.default_rng(0).standard_normal(len(STRETCH))
 STRESS = 0.5 * UNIT * (1 + 0.05 * (STRETCH**2 + 2 / STRETCH - 3)) + ERRORS
 DATA = tq.Experiment("uniaxial", STRETCH, STRESS)
-LOG_C = np.linspace(np.log(1e-5), np.log(1e4), 500)
+LOG_C = np.linspace(np.log(1e-5), np.log(1e4), 250)
 
 
 def ogden(alpha):
@@ -173,3 +173,77 @@ def test_a_product_with_gaussian_priors_is_that_of_precisions():
         miss = mean[k][[0, 2]] - [0.5, -1]
         expected = -0.5 * miss @ np.linalg.solve(pair, miss) - 0.5 * np.linalg.slogdet(2 * np.pi * pair)[1]
         assert log_mass[k] == pytest.approx(expected)
+
+
+PULLING = [
+    (tq.Uniform(0.45, 0.6), 0.45, 0.6),
+    (tq.Uniform(0.6, 0.7), 0.6, 0.7),
+    (tq.Uniform(0.8, 0.9), 0.8, 0.9),
+    (tq.Normal(0.45, 0.01), 0.4, 0.6),
+    (tq.Normal(0.8, 0.02), 0.45, 0.9),
+    (tq.Normal(0.6, 0.03, 0.62), 0.62, 0.8),
+]
+"""Priors of C10, which would be 0.51 +- 0.01, and where it is then."""
+
+
+@pytest.mark.parametrize("noise", ["known", "unknown"])
+@pytest.mark.parametrize(("prior", "low", "high"), PULLING, ids=str)
+def test_priors_that_the_data_contradict_are_obeyed(prior, low, high, noise):
+    """Everything by sums over values of C10, the noise and the amplitude."""
+    cell = (high - low) / 1000
+    values = low + cell * (np.arange(1000) + 0.5)
+    noises = np.exp(np.linspace(np.log(0.01), np.log(2.0), 120)) if noise == "unknown" else np.array([NOISE_SD])
+    log_prior = np.array([float(prior.log_density(value)) for value in values])
+    log_weights = np.empty((len(noises), len(values), len(LOG_C)))
+    for place, sd in enumerate(noises):
+        log_density, mean, variance = conditional(UNIT, sd, 1.0)
+        given = -0.5 * (values[:, None] - mean) ** 2 / variance - 0.5 * np.log(2 * np.pi * variance)
+        log_weights[place] = log_density + given + log_prior[:, None]
+        if noise == "unknown":
+            log_weights[place] += np.log(sd * (np.log(noises[1]) - np.log(noises[0])) / 2)  # uniform(0, 2)
+    evidence = log_weights.max() + np.log(np.exp(log_weights - log_weights.max()).sum() * cell)
+    centre, sd = moments(log_weights, values[None, :, None] + 0 * log_weights)
+    options = {"noise_sd": NOISE_SD} if noise == "known" else {}
+    priors = {"C10": prior} | ({"noise_sd": tq.Uniform(0, 2)} if noise == "unknown" else {})
+    found = fit(priors=priors, **options)
+    assert found.log_evidence == pytest.approx(evidence, abs=0.02)
+    assert found.summary().loc["C10", "mean"] == pytest.approx(centre, abs=0.03 * sd)
+    assert found.summary().loc["C10", "sd"] == pytest.approx(sd, rel=0.03)
+    if noise == "unknown":
+        centre, sd = moments(log_weights, noises[:, None, None] + 0 * log_weights)
+        assert found.marginals["noise_sd"].mean == pytest.approx(centre, abs=0.05 * sd)
+        assert found.solution.draws["noise_sd"].mean() == pytest.approx(centre, abs=0.15 * sd)
+
+
+@pytest.mark.parametrize("share", [tq.Uniform(0.04, 0.06), tq.LogNormal(0.3, 0.02), tq.Uniform(0.0, 0.3)], ids=str)
+def test_the_prior_of_proportional_noise_is_obeyed(share):
+    level = stress_level(DATA)
+    noises, shares = (
+        np.linspace(2e-4, 0.2, 100),
+        np.array([float(share.quantile(p)) for p in (np.arange(60) + 0.5) / 60]),
+    )
+    values = [[conditional(UNIT, s + own * level, 2)[:2] for own in shares] for s in noises]
+    log_density, mean = np.moveaxis(np.array(values), 2, 0)
+    log_density = log_density + np.log((noises[1] - noises[0]) / 0.2 / 60)
+    evidence = log_density.max() + np.log(np.exp(log_density - log_density.max()).sum())
+    priors = {"C10": tq.Uniform(0, 2), "noise_sd": tq.Uniform(0, 0.2), "noise_share": share}
+    found = fit(noise="proportional", priors=priors)
+    assert found.log_evidence == pytest.approx(evidence, abs=2 * found.log_evidence_error + 0.03)
+    table = found.summary()
+    assert table.loc["C10", "mean"] == pytest.approx(moments(log_density, mean)[0], abs=0.1 * table.loc["C10", "sd"])
+    low, high = found.summary().loc["noise_share", ["hdi_low", "hdi_high"]]
+    ends = [float(share.quantile(p)) for p in (1e-4, 1 - 1e-4)]
+    assert ends[0] - 1e-3 <= low < high <= ends[1] + 1e-3
+
+
+def test_priors_of_the_noise_that_exclude_some_ratios_leave_the_rest():
+    priors = {"C10": tq.Uniform(0, 2), "noise_sd": tq.Uniform(0.05, 0.2), "noise_share": tq.Uniform(0.02, 0.1)}
+    found = fit(noise="proportional", priors=priors)
+    assert np.isfinite(found.log_evidence_error)
+    assert found.solution.draws["noise_share"].min() >= 0.02
+    assert found.solution.draws["noise_sd"].min() >= 0.05
+
+
+def test_a_prior_far_from_the_data_is_said():
+    with pytest.raises(ConvergenceError, match="C10 where the prior leaves next to nothing"):
+        fit(noise_sd=0.01, priors={"C10": tq.Exponential(0.005)})

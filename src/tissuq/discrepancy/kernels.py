@@ -18,8 +18,8 @@ def squared_exponential(score: Any) -> Any:
 def pinned_squared_exponential(one: Any, other: Any, derivatives: int) -> Any:
     """Return the squared exponential of scores, given that the process (and its derivative) are zero at zero.
 
-    It is the product of both with zero, times exp(one other) without the first terms of its series, so that nothing
-    cancels where both scores are small; where that exponent is large, what is left out is less than rounding.
+    It is the product of both with zero, times exp(one other) without the first terms of its series, where that
+    exponent is large, what is left out is less than rounding.
     """
     product = one * other
     arrays = product.__array_namespace__()

@@ -10,7 +10,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.lattice import Lattice, times_gaussians
+from tissuq.inference.lattice import Lattice
+from tissuq.inference.linear import LinearPriors
 from tissuq.model import StatisticalModel
 from tissuq.priors import Prior
 
@@ -28,6 +29,14 @@ IRRELEVANT = 18.0
 """Log density below the largest, at the best noise, at which a point of a lattice is left out at once."""
 LIGHT = 1e-6
 """Share of the posterior that may be left out."""
+TRIED = 8
+"""Values of the noise among which the best is sought where priors pull at linear parameters."""
+MOST_WIDER = 8.0
+"""Multiple of `CUT_NODES`, at most."""
+HARDLY_CUT = 0.5
+"""Share that bounds of linear parameters leave, above which points may be left out before they are looked at."""
+MOST_LAST = 1e-3
+"""Share of the posterior at the lattice's largest amplitudes from which it is not known what lies beyond."""
 LIKELY, POSSIBLE = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
 """Probabilities of the noise's prior between which it is likely, and between which it is at all."""
 TINY = 1e-200
@@ -37,7 +46,9 @@ TINY = 1e-200
 class Points:
     """M points of lattices: which lattice, where in it, what noise, both amplitudes, log p(data and point).
 
-    ``misfit`` and ``freedom`` tell how likely any other noise would be at the same ratios.
+    ``misfit`` tells how likely any other noise would be at the same ratios, and ``strain`` what priors that pull at the
+    linear parameters may add to it. ``log_inside`` bounds from above what their bounds leave, which is not in
+    ``log_weight``.
     """
 
     lattice: Places
@@ -47,6 +58,8 @@ class Points:
     amplitudes: FloatArray
     log_weight: FloatArray
     misfit: FloatArray
+    strain: FloatArray
+    log_inside: FloatArray
 
     def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
         return Points(*(array[chosen] for array in vars(self).values()))
@@ -78,25 +91,56 @@ class Weighing:
         ratios: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._model, self._lattices, self._index, self._ratios = model, lattices, index, ratios
+        self._priors = LinearPriors(model)
+        self._is_pulled = self._priors.is_gaussian
 
     def points(self) -> tuple[Points, float]:
-        """Return the points that matter, and the relative error of their sum: from that of every second point."""
-        every = [self._best_noise(place) for place in range(len(self._lattices))]
-        top = max(float(points.log_weight.max()) for points in every)
-        every = [points[points.log_weight > top - IRRELEVANT] for points in every]
-        least = _least_that_matters(np.concatenate([np.exp(points.log_weight - top) for points in every]))
-        every = [points[np.exp(points.log_weight - top) >= least] for points in every]
+        """Return the points that matter, and the relative error of their sum: from that of every second point.
+
+        Infinite where the largest amplitudes of the lattice hold a part. No points where the noise's priors exclude
+        each other.
+        """
+        ends = _ends(self._model, self._ratios) if self._model.noise.parameters else None
+        if ends is not None and ends[0] >= ends[1]:
+            return self._weighed(0, *np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), 0.0
+        every = self._roughly()
+        if not self._is_pulled and self._are_cut(every):
+            self._is_pulled = True
+            every = self._roughly()
         if self._model.noise.parameters:
             every = [self._all_noise(each) for each in every if len(each.lattice)]
         points = Points.joined(every)
-        mass = np.exp(points.log_weight - points.log_weight.max())
-        coarse = 0.0
+        mass = _masses([points])
+        coarse, last = 0.0, 0.0
         for place, lattice in enumerate(self._lattices):
-            own = points.lattice == place
+            own = at_even = points.lattice == place
             for grid, places in zip(lattice.ratios, (points.first, points.second), strict=True):
-                own = own & ((places % 2 == 0) | (len(grid) == 1))
-            coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[own].sum()
-        return points[mass >= _least_that_matters(mass)], float(abs(coarse / mass.sum() - 1) ** 1.5)
+                at_even = at_even & ((places % 2 == 0) | (len(grid) == 1))
+                last += mass[own & (places == len(grid) - 1) & (len(grid) > 1)].sum()
+            coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[at_even].sum()
+        error = np.inf if last > MOST_LAST * mass.sum() else float(abs(coarse / mass.sum() - 1) ** 1.5)
+        return points[mass >= _least_that_matters(mass)], error
+
+    def _roughly(self) -> list[Points]:
+        """Return the points that matter of every lattice, each at one noise."""
+        every = [self._best_noise(place) for place in range(len(self._lattices))]
+        mass = _masses(every)
+        least = max(_least_that_matters(mass), np.exp(-IRRELEVANT))
+        edges = np.cumsum([len(points.lattice) for points in every])[:-1]
+        return [points[own >= least] for points, own in zip(every, np.split(mass, edges), strict=True)]
+
+    def _are_cut(self, every: Sequence[Points]) -> bool:
+        """Return whether the bounds of linear parameters take away much."""
+        inside = 0.0
+        weights = _masses(every)
+        for points in every:
+            if len(points.lattice):
+                lattice = self._lattices[int(points.lattice[0])]
+                mean, root = lattice.linear(self._index, points.second, points.first)
+                ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
+                own, weights = weights[: len(mean)], weights[len(mean) :]
+                inside += float(own @ np.exp(ceiling))
+        return inside < HARDLY_CUT * float(_masses(every).sum())
 
     def _best_noise(self, place: int) -> Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
@@ -106,7 +150,22 @@ class Weighing:
         if not noise.parameters:
             return self._weighed(place, second, first, misfit, np.full(len(second), float(noise.sd({}, 0.0))))
         likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY), *np.exp(_ends(self._model, self._ratios)))
-        return self._weighed(place, second, first, misfit, np.clip(np.sqrt(misfit / lattice.freedom), *likely))
+        strain = self._strain(place, second, first)
+        rise = 0.5 * np.log1p(strain / np.maximum(misfit, TINY))
+        count = 1 if rise.max() < 0.1 else TRIED
+        found = []
+        for share in np.linspace(0, 1, count):
+            noise_sd = np.clip(np.sqrt(misfit / lattice.freedom) * np.exp(share * rise), *likely)
+            found.append(self._weighed(place, second, first, misfit, noise_sd))
+        best = np.argmax([points.log_weight + points.log_inside for points in found], axis=0)
+        arrays = zip(*(vars(points).values() for points in found), strict=True)
+        return Points(*(np.stack(each)[best, np.arange(len(best))] for each in arrays))
+
+    def _strain(self, place: int, second: Places, first: Places) -> FloatArray:
+        """Return what is added to the misfit (M,) where linear parameters are held at their priors."""
+        if not self._is_pulled:
+            return np.zeros(len(second))
+        return self._priors.strain(*self._lattices[place].linear(self._index, second, first))
 
     def _all_noise(self, points: Points) -> Points:
         """Return the points of a lattice with several values of the noise for each, row by row.
@@ -118,15 +177,17 @@ class Weighing:
         freedom, ends = self._lattices[place].freedom, _ends(self._model, self._ratios)
         mode = 0.5 * np.log(np.maximum(points.misfit / freedom, TINY))[:, None]
         below, above = _reach(freedom)
-        low, high = mode - below, mode + above
-        if (low >= ends[0]).all() and (high <= ends[1]).all():
+        rise = 0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY))[:, None]
+        low, high = mode - below, mode + rise + above
+        if not self._is_pulled and (low >= ends[0]).all() and (high <= ends[1]).all():
             nodes, cells = _noise_rule(freedom)
             logs = mode + nodes
         else:
             cut = np.maximum(low, ends[0]), np.minimum(high, ends[1])
             keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
             low, high = (np.where(keeps, own, end) for own, end in zip(cut, ends, strict=True))
-            nodes, cells = np.polynomial.legendre.leggauss(CUT_NODES)
+            wider = float((high - low).max()) / (below + above)
+            nodes, cells = np.polynomial.legendre.leggauss(int(CUT_NODES * np.clip(wider, 1, MOST_WIDER)))
             logs, cells = low + (high - low) * 0.5 * (1 + nodes), (high - low) * 0.5 * cells
         noise_sd = np.exp(logs).ravel()
         rows = np.repeat(np.arange(len(points.misfit)), len(nodes))
@@ -141,17 +202,20 @@ class Weighing:
         lattice, symbols = self._lattices[place], self._model.energy_symbols
         amplitudes = np.zeros((len(first), len(symbols)))
         log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
-        priors = [self._model.priors[symbol] for symbol in self._model.linear]
-        if any(prior.gaussian and prior.gaussian[1] for prior in priors):
+        strain, log_inside = np.zeros(len(first)), np.zeros(len(first))
+        if self._is_pulled:
             mean, root = lattice.linear(self._index, second, first)
-            log_weight += times_gaussians(mean, root * noise_sd[:, None, None], priors)[2]
+            strain = self._priors.strain(mean, root)
+            mean, root, log_mass = self._priors.times(mean, root * noise_sd[:, None, None])
+            log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
         chosen = ((lattice.ratios[0], first), (lattice.ratios[1], second))
         for which, (grid, place_on_grid) in zip(lattice.member.places, chosen, strict=False):
             amplitudes[:, which] = grid[place_on_grid] * noise_sd
             log_weight += log_prior_of_amplitude(self._model.priors[symbols[which]], amplitudes[:, which])
             # The first point stands for all smaller amplitudes, too, among which the density is constant.
             log_weight += np.log(np.where(place_on_grid == 0, lattice.step / -np.expm1(-lattice.step), lattice.step))
-        return Points(np.full(len(first), place), second, first, noise_sd, amplitudes, log_weight, misfit)
+        where = np.full(len(first), place)
+        return Points(where, second, first, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
 
 
 def log_prior_of_amplitude(prior: Prior, amplitude: FloatArray) -> FloatArray:
@@ -169,24 +233,33 @@ def log_prior_of_noise(model: StatisticalModel, ratios: Mapping[str, float], noi
 
 def noise_grid(model: StatisticalModel, points: Points, freedom: int, count: int) -> FloatArray:
     """Return values of the noise, evenly spaced in their logarithm, among which it lies given any of the points."""
-    modes = 0.5 * np.log(np.maximum(points.misfit / freedom, TINY))
+    low, high = (
+        0.5 * np.log(np.maximum(size / freedom, TINY)) for size in (points.misfit, points.misfit + points.strain)
+    )
     below, above = _reach(freedom)
-    low, high = np.clip([modes.min() - below, modes.max() + above], *_ends(model, {}))
+    low, high = np.clip([low.min() - below, high.max() + above], *_ends(model, {}))
     return np.exp(np.linspace(low, high, count))
 
 
 def _ends(model: StatisticalModel, ratios: Mapping[str, float]) -> FloatArray:
     """Return the logarithms of the noise between which its priors leave it."""
-    ends = np.maximum(model.priors["noise_sd"].quantile(POSSIBLE), TINY)
+    low, high = model.priors["noise_sd"].quantile(POSSIBLE)
     for symbol, ratio in ratios.items():
-        ends[1] = min(ends[1], model.priors[symbol].support[1] / ratio)
-    return np.asarray(np.log(ends))
+        own = model.priors[symbol].quantile(POSSIBLE) / ratio
+        low, high = max(low, own[0]), min(high, own[1])
+    return np.log(np.maximum([low, high], TINY))
 
 
 def _reach(freedom: int) -> tuple[float, float]:
     """Return how far log noise_sd reaches below its mode and above, given the ratios."""
     unit = 1 / np.sqrt(2 * freedom)
     return NOISE_BELOW * unit, (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
+
+
+def _masses(every: Sequence[Points]) -> FloatArray:
+    """Return the masses of all points of several sets, within bounds at most, over the largest."""
+    logs = np.concatenate([points.log_weight + points.log_inside for points in every])
+    return np.asarray(np.exp(logs - logs.max(initial=-np.inf))) if len(logs) else logs
 
 
 def _least_that_matters(mass: FloatArray) -> float:

@@ -24,7 +24,8 @@ from tissuq.inference.amplitudes import (
 )
 from tissuq.inference.bounds import bounded
 from tissuq.inference.box import Boxes
-from tissuq.inference.lattice import STEP, Reduced, times_gaussians
+from tissuq.inference.lattice import STEP, Reduced
+from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
 from tissuq.inference.nodes import OUTER_STEP, Node, features_of, single_nodes, weighted_nodes
 from tissuq.inference.outer import Outer
@@ -46,6 +47,8 @@ REPRESENTED = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
 NOISE_ROWS, NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
+PULLED = 5
+"""So many times fewer, where priors of linear parameters depend on the noise, too."""
 TAILS = 0.25
 """Power of the weights by which components are taken that must represent the tails, too."""
 
@@ -126,10 +129,10 @@ class EnergySolution(Solution):
         self._step = STEP if len(nodes) == 1 else OUTER_STEP
         points = Points.joined([node.points for node in nodes])
         self._node = np.repeat(np.arange(len(nodes)), [len(node.points.lattice) for node in nodes])
-        mean, root = (np.concatenate([getattr(node, name) for node in nodes]) for name in ("mean", "root"))
-        priors = [model.priors[symbol] for symbol in model.linear]
-        supports = np.reshape([prior.support for prior in priors], (-1, 2))
-        self._box = Boxes(supports[None, :, 0], supports[None, :, 1])
+        self._bare = tuple(np.concatenate([getattr(node, name) for node in nodes]) for name in ("mean", "root"))
+        self._priors = LinearPriors(model)
+        self._box = self._priors.box
+        mean, root, _ = self._priors.times(self._bare[0], self._bare[1] * points.noise_sd[:, None, None])
         beyond = self._box.beyond(mean, root)
         near = np.flatnonzero(beyond.sum(axis=1) > TOUCHED)
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
@@ -142,10 +145,7 @@ class EnergySolution(Solution):
         settings = self._settings(points, self._node)
         self._bounded = bounded(Components(self._weights, settings, mean, root), beyond, self._box)
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
-            heights = sum(
-                gaussian[2] for gaussian in (prior.gaussian for prior in priors) if gaussian and not gaussian[1]
-            )
-            self.log_evidence = float(top + np.log(total) + heights)
+            self.log_evidence = float(top + np.log(total) + self._priors.log_height)
             of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
             self.log_evidence_error = float(error + of_sums + self._weights @ error_of_mass + LIGHT)
 
@@ -195,7 +195,6 @@ class EnergySolution(Solution):
         features = {int(place): features_of(self.model, place) for place in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
-        priors = [self.model.priors[symbol] for symbol in self.model.linear]
         for number in np.unique(node):
             rows = Outer(self.model).rows(self._nodes[number].outer)
             for place in np.unique(points.lattice[node == number]):
@@ -203,7 +202,7 @@ class EnergySolution(Solution):
                 amplitudes = points.amplitudes[own][:, list(self.model.energy_members[place].places)]
                 reduced = Reduced(rows, features[place])
                 found, found_root = reduced.everything(0, amplitudes, points.noise_sd[own])
-                found, found_root, _ = times_gaussians(found, found_root, priors)
+                found, found_root, _ = self._priors.times(found, found_root)
                 q = found.shape[1]
                 mean[own, :q], root[own, :q, :q] = found, found_root
         whole = Components(weights, self._settings(points, node), mean, root, points.lattice)
@@ -258,9 +257,10 @@ class EnergySolution(Solution):
 
     def _noise_marginal(self) -> Marginal:
         """Return the marginal of the noise from its densities given the rest, at some of the points."""
-        chosen = systematic(self._weights[None], NOISE_ROWS)[0]
+        is_pulled = self._bounded.is_cut or self._priors.is_gaussian
+        chosen = systematic(self._weights[None], NOISE_ROWS // (PULLED if is_pulled else 1))[0]
         points, freedom = self._points[chosen], len(self.model.experiment) - len(self.model.linear)
-        logs = np.log(noise_grid(self.model, points, freedom, NOISES))
+        logs = np.log(noise_grid(self.model, points, freedom, NOISES // (2 if is_pulled else 1)))
         noise_sd, step = np.exp(logs), logs[1] - logs[0]
         log_density = -freedom * logs - 0.5 * points.misfit[:, None] / noise_sd**2
         for number in np.unique(self._node[chosen]):
@@ -270,6 +270,10 @@ class EnergySolution(Solution):
             own = points.amplitudes[:, place] > 0
             ratios = points.amplitudes[own, place] / points.noise_sd[own]
             log_density[own] += log_prior_of_amplitude(self.model.priors[symbol], ratios[:, None] * noise_sd)
+        if is_pulled:
+            mean, root = (np.repeat(bare[chosen], len(noise_sd), axis=0) for bare in self._bare)
+            root = root * np.tile(noise_sd, len(chosen))[:, None, None]
+            log_density += self._priors.log_mass(mean, root).reshape(log_density.shape)
         density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
         density /= density.sum(axis=1, keepdims=True) * step
         return marginal_of_table(noise_sd, density.mean(axis=0) / noise_sd)

@@ -17,6 +17,7 @@ FREEDOM = 5.0
 """Of the t distribution: its tails are heavier than those of a posterior."""
 WIDE = 0.1
 """Share of the proposal that stays as wide as the prior, so that no weight is without bound there."""
+HUGE = 1e300
 ROUNDS = 15
 EFFECTIVE = 0.3
 """Share of a round's points that must be effective for the adaptation to end."""
@@ -78,7 +79,7 @@ def adapted(log_density: Callable[[FloatArray], float], dimension: int) -> Propo
         points = np.concatenate([points, new])
         values = np.concatenate([values, [log_density(point) for point in new]])
         mixture = np.logaddexp.reduce([each.log_density(points) for each in proposals], axis=0) - log(len(proposals))
-        weights, power = _tempered(values - mixture, least)
+        weights, power = _tempered(np.nan_to_num(values - mixture, nan=-HUGE, neginf=-HUGE), least)
         mean = weights @ points
         away = points - mean
         covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)

@@ -6,7 +6,6 @@ sets and all exponents of the material. The ratio of the first block and the noi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log, pi
 
@@ -14,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy import Member
-from tissuq.priors import Prior
 
-__all__ = ["STEP", "Directions", "Lattice", "Reduced", "Rows", "times_gaussians"]
+__all__ = ["STEP", "Directions", "Lattice", "Reduced", "Rows"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -195,37 +193,6 @@ class Lattice:
         root = self._root[second, first]
         shift = (root @ self._pulled[second, first, :, data_set][:, :, None])[:, :, 0]
         return (self._fit[:, data_set] + shift) @ self._inverse.T, self._inverse @ root
-
-
-def times_gaussians(
-    mean: FloatArray, root: FloatArray, priors: Sequence[Prior]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Multiply Gaussians of linear parameters, and perhaps more, by the priors of the former.
-
-    Parameters
-    ----------
-    mean, root : (M, q) and (M, q, q) arrays
-    priors : sequence of Prior
-        Of the first parameters; flat and uniform ones change nothing.
-
-    Returns
-    -------
-    Means (M, q), roots (M, q, q) and the logarithms (M,) of the masses.
-    """
-    log_mass = np.zeros(len(mean))
-    for place, prior in enumerate(priors):
-        centre, precision, log_height = prior.gaussian or (0.0, 0.0, 0.0)
-        if not precision:
-            continue
-        along = root[:, place]
-        variance = (along**2).sum(axis=1) + 1 / precision
-        miss = centre - mean[:, place]
-        covariance = np.einsum("mij,mj->mi", root, along)
-        mean = mean + covariance * (miss / variance)[:, None]
-        shrink = 1 / (variance + np.sqrt(variance / precision))  # Potter's square root of the update
-        root = root - shrink[:, None, None] * covariance[:, :, None] * along[:, None, :]
-        log_mass += log_height - 0.5 * np.log(precision * variance) - 0.5 * miss**2 / variance
-    return mean, root, log_mass
 
 
 def _grid(size: float, unlikely: float, step: float, shift: float) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.amplitudes import Points, Weighing
-from tissuq.inference.lattice import STEP, Directions, Lattice, times_gaussians
+from tissuq.inference.lattice import STEP, Directions, Lattice
 from tissuq.inference.outer import Outer, plain_rows, relative_error, weighted_settings
 from tissuq.inference.resampling import systematic
 from tissuq.mechanics.path import invariant_rates
@@ -39,7 +39,7 @@ class Node:
     Attributes
     ----------
     mean, root : (M, p) and (M, p, p) arrays
-        Of the linear parameters at the points, before their bounds.
+        Of the linear parameters at the points without their priors, and for unit noise.
     error : float
         Relative error of the points' sum.
     ratios : mapping of str to float
@@ -62,7 +62,7 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     for index, model in enumerate(models):
         points, error = Weighing(model, lattices, index).points()
         points = _thinned(points, MOST, 0.5)
-        found.append(Node(points, *_linear(model, lattices, index, points), error))
+        found.append(Node(points, *_linear(lattices, index, points), error))
     return found
 
 
@@ -96,7 +96,7 @@ class _Sums:
         lattices, ratios = self._lattices(settings, members), self._outer.ratios(settings)
         points, error = Weighing(self._model, lattices, 0, ratios).points()
         points = _thinned(points, OF_NODE, GOLDEN * self._calls % 1)
-        mean, root = _linear(self._model, lattices, 0, points)
+        mean, root = _linear(lattices, 0, points)
         return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)
 
     def _lattices(self, settings: FloatArray, members: Places) -> list[Lattice]:
@@ -146,14 +146,11 @@ def _most_noise(model: StatisticalModel) -> float:
     return float(np.sqrt((model.experiment.stress**2).mean()))
 
 
-def _linear(
-    model: StatisticalModel, lattices: Sequence[Lattice], index: int, points: Points
-) -> tuple[FloatArray, FloatArray]:
-    """Return means (M, p) and roots (M, p, p) of the linear parameters, before their bounds."""
+def _linear(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[FloatArray, FloatArray]:
+    """Return means (M, p) of the linear parameters without priors, and roots (M, p, p) for unit noise."""
     p = lattices[0].parameters
     mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
     for place in np.unique(points.lattice):
         own = np.flatnonzero(points.lattice == place)
-        found, found_root = lattices[place].linear(index, points.second[own], points.first[own])
-        mean[own], root[own] = found, found_root * points.noise_sd[own, None, None]
-    return times_gaussians(mean, root, [model.priors[symbol] for symbol in model.linear])[:2]
+        mean[own], root[own] = lattices[place].linear(index, points.second[own], points.first[own])
+    return mean, root

@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float64]
 
 VALUES, LEAST_EFFECTIVE = 64, 20
 """Values taken for each of the parameters, and once more; how many must be effective."""
+FARTHEST = 8.0
+"""Standard deviations beyond which probabilities round to one."""
 RATIO_SPREAD = 3.0
 """Standard deviation of the log of a ratio of noise parameters, in the coordinate that proposes it."""
 
@@ -52,7 +54,7 @@ class Outer:
         """Return the values (d,) at a point (d,); ratios in place of the noise's parameters."""
         from scipy.special import ndtr
 
-        probability = ndtr(point)
+        probability = ndtr(np.clip(point, -FARTHEST, FARTHEST))
         own = [
             float(self._model.priors[symbol].quantile(p)) for symbol, p in zip(self.symbols, probability, strict=True)
         ]
@@ -90,9 +92,20 @@ def weighted_settings(outer: Outer, scout: Callable[[FloatArray], float]) -> tup
     outer : Outer
     scout : callable
         Log of the likelihood at values (d,), roughly: where it leads is where values are taken.
+
+    Raises
+    ------
+    ConvergenceError
+        When that is far outside the priors.
     """
     d = len(outer.symbols)
     proposal = adapted(lambda point: scout(outer.settings(point)) + outer.log_base(point), d)
+    far = [symbol for symbol, at in zip(outer.symbols, np.abs(proposal.mean), strict=True) if at > FARTHEST - 1]
+    if far:
+        raise ConvergenceError(
+            f"the data put {', '.join(far)} where the prior leaves next to nothing (less than 1e-12): give a prior "
+            "that holds what the data say, in MPa where it is a stress."
+        )
     points = proposal.points(even_points(d, VALUES * (d + 1)))
     base = np.array([outer.log_base(point) for point in points])
     settings = np.array([outer.settings(point) for point in points])

@@ -164,10 +164,13 @@ def _with_energies(
     member, features = model.energy_members[place], _features(model, place)
     amplitudes = settings[:, [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]]
     sizes = [each.shape[1] for each in member.stress_features(model.experiment.mode, model.experiment.stretch)]
-    scale = np.repeat(amplitudes, sizes, axis=1) / np.sqrt(white[:, :1])
-    inner = np.eye(features.shape[1]) + scale[:, :, None] * (features.T @ features) * scale[:, None, :]
-    triangle = np.linalg.cholesky(inner)
-    along = scale * (residual @ features) / np.sqrt(white[:, :1])
+    scale = np.repeat(amplitudes, sizes, axis=1)
+    if model.noise.depends_on_level:
+        products = np.stack([features.T @ (features / own[:, None]) for own in white])
+    else:
+        products = (features.T @ features) / white[:, :1, None]
+    triangle = np.linalg.cholesky(np.eye(features.shape[1]) + scale[:, :, None] * products * scale[:, None, :])
+    along = scale * ((residual / white) @ features)
     whitened = np.linalg.solve(triangle, along[:, :, None])[:, :, 0]
     return np.asarray(2 * np.log(np.einsum("mii->mi", triangle)).sum(axis=1) - (whitened**2).sum(axis=1))
 
