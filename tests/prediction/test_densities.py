@@ -108,3 +108,16 @@ def test_the_joint_likelihood_is_that_of_the_full_covariance(name):
         mean = values["C10"] * x(STRETCH) + values.get("m0", 0.0)
         expected = multivariate_normal(mean, covariance).logpdf(DATA.stress)
         assert found[place] == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_joint_likelihood_knows_that_noise_grows_with_the_stress():
+    solution = tq.fit(DATA, discrepancy="taylor+second-invariant", noise="proportional").solution
+    found = joint_log_likelihood(solution)
+    for place in ((0, 0), (2, 500)):
+        values = {symbol: drawn[place] for symbol, drawn in solution.draws.items()}
+        member = solution.model.energy_members[solution.components.member[solution.component_of_draw[place]]]
+        noise = values["noise_sd"] + values["noise_share"] * solution.model.levels
+        features = member.stress_features(solution.model.experiment.mode, STRETCH)
+        energies = sum(values[symbol] ** 2 * each @ each.T for symbol, each in zip(("c1", "c2"), features, strict=True))
+        expected = multivariate_normal(values["C10"] * x(STRETCH), np.diag(noise**2) + energies).logpdf(DATA.stress)
+        assert found[place] == pytest.approx(expected, abs=1e-6)
