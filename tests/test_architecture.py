@@ -15,7 +15,7 @@ from tissuq.registry import variants
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "noise",
-    "statistics", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting", "studies",
+    "statistics", "scales", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting", "studies",
     "report", "cli", "__main__",
 ]  # fmt: skip
 
