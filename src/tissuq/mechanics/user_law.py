@@ -67,8 +67,7 @@ class FunctionLaw(Material):
             is_named = argument.kind is argument.POSITIONAL_OR_KEYWORD
             if not is_named or not (argument.default is argument.empty or isinstance(argument.default, Prior)):
                 raise InputError(
-                    f"the law '{self.name}': its argument '{argument}' is neither plain nor has a prior as its default. "
-                    f"{WRITE}."
+                    f"the law '{self.name}': its argument '{argument}' is not plain, nor has it a prior. {WRITE}."
                 )
 
     @property

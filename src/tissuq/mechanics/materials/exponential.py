@@ -59,8 +59,8 @@ class Fung(Material):
 class VerondaWestmann(Material):
     """W = mu/b (exp(b (I1 - 3)) - 1) - mu/2 (I2 - 3); initial shear modulus mu.
 
-    Written C1 (exp(C2 (I1 - 3)) - 1) - C1 C2/2 (I2 - 3) in FEBio, C2 = b and C1 = mu/b. With a free coefficient of I2 - 3
-    it is the sum of `demiray` and a polynomial, ``demiray+rivlin:C01``.
+    Written C1 (exp(C2 (I1 - 3)) - 1) - C1 C2/2 (I2 - 3) in FEBio, C2 = b and C1 = mu/b. With a free coefficient of
+    I2 - 3 it is the sum of `demiray` and a polynomial, ``demiray+rivlin:C01``.
     """
 
     name = "veronda-westmann"

@@ -15,8 +15,8 @@ __all__ = ["Knowles"]
 class Knowles(Material):
     """W = mu/(2 b) ((1 + b (I1 - 3)/n)^n - 1); initial shear modulus mu.
 
-    n = 1 is neo-Hookean; larger n hardens, smaller n softens, and below 1/2 it loses ellipticity in shear. As n grows it
-    becomes Demiray's exponential with the same b.
+    n = 1 is neo-Hookean; larger n hardens, smaller n softens, and below 1/2 it loses ellipticity in shear. As n grows
+    it becomes Demiray's exponential with the same b.
     """
 
     name = "knowles"

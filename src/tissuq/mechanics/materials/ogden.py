@@ -108,8 +108,8 @@ class Ogden3(_Ogden):
 class Ogden(_Ogden):
     """W = sum over i = 1 to any number of terms of 2 mu_i/alpha_i^2 (l1^alpha_i + l2^alpha_i + l3^alpha_i - 3).
 
-    The initial shear modulus is the sum of mu_i. By default the first half of the exponents (one more of an odd number) is
-    positive, the others negative, in disjoint intervals of equal ratio between 0.5 and 40 in size.
+    The initial shear modulus is the sum of mu_i. By default the first half of the exponents (of an odd number one more)
+    is positive, the others negative, in disjoint intervals of equal ratio between 0.5 and 40 in size.
 
     Parameters
     ----------

@@ -29,8 +29,8 @@ class MaterialSum(Material):
             if shared:
                 raise ModelError(
                     f"the sum '{self.name}' would have {', '.join(shared)} twice, of '{first.name}' and of "
-                    f"'{second.name}'. Leave one of them out, or write the sum as a material of your own in which their "
-                    "symbols differ."
+                    f"'{second.name}'. Leave one of them out, or write the sum as a material of your own in which "
+                    "their symbols differ."
                 )
 
     @property

@@ -40,8 +40,8 @@ class PengLandel(StretchMaterial):
     parameters = _modulus("Peng and Landel's law")
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
-        logs = [(each, log(each)) for each in stretches]
-        return 3 * values[0] * sum(l - 1 - e * (1 + e * (1 / 6 - e * (1 / 18 - e / 216))) for l, e in logs)
+        logs = [log(each) for each in stretches]
+        return 3 * values[0] * (sum(stretches) - 3 - sum(e * (1 + e * (1 / 6 - e * (1 / 18 - e / 216))) for e in logs))
 
 
 class Hencky(StretchMaterial):

@@ -21,9 +21,9 @@ TERMS = 13
 class VanDerWaals(Material):
     """W = -mu Jm (ln(1 - h) + h) - 2/3 A ((I1 - 3)/2)^(3/2), h = sqrt((I1 - 3)/Jm); initial shear modulus mu.
 
-    Written with lambda_m and a elsewhere (Kilian, Abaqus), Jm = lambda_m^2 - 3 and A = a mu; A is used here because the stress
-    is proportional to it. Their mixed invariant (1 - beta) I1 + beta I2 is I1 here, beta = 0. As Jm grows at A = 0 it
-    becomes neo-Hookean with C10 = mu/2.
+    Written with lambda_m and a elsewhere (Kilian, Abaqus), Jm = lambda_m^2 - 3 and A = a mu; A is used here because the
+    stress is proportional to it. Their mixed invariant (1 - beta) I1 + beta I2 is I1 here, beta = 0. As Jm grows at
+    A = 0 it becomes neo-Hookean with C10 = mu/2.
     """
 
     name = "van-der-waals"
