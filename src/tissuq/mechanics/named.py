@@ -10,7 +10,7 @@ from tissuq.mechanics.material import Material
 from tissuq.mechanics.materials.ogden import Ogden
 from tissuq.mechanics.materials.polynomial import Rivlin
 from tissuq.mechanics.materials.sums import added
-from tissuq.mechanics.user_law import LAW, as_material
+from tissuq.mechanics.user_law import LAW, as_material, load_material
 from tissuq.registry import find, variants
 
 __all__ = ["FORMS", "GROUP", "material_named", "plugins"]
@@ -22,13 +22,21 @@ FORMS = (*(family.form for family in FAMILIES), "gent+mooney-rivlin (a sum of an
 """What names can be, beside those of the list."""
 
 
-def material_named(material: str | Material) -> Material:
+def material_named(material: str | Material, *, laws: bool = False) -> Material:
     """Return the material of that name; a material is returned as it is.
+
+    Parameters
+    ----------
+    material : str or Material
+    laws : bool
+        Whether the name may be that of a law in a file, which is then run: only where a person has given it.
 
     Raises
     ------
     ModelError
         When no material has that name, or a sum has a parameter twice.
+    InputError
+        When a law in a file cannot be used.
 
     Examples
     --------
@@ -37,16 +45,18 @@ def material_named(material: str | Material) -> Material:
     """
     if isinstance(material, Material):
         return material
-    if LAW.fullmatch(material):
-        raise ModelError(
-            f"'{material}' is a law in a file, which is run only where you name it yourself: give --material "
-            f"{material} on the command line, or tissuq.load_material('{material}') in Python."
-        )
-    parts = [_single(part.strip()) for part in material.split("+")]
+    parts = [_single(part.strip(), laws) for part in material.split("+")]
     return added(*parts) if len(parts) > 1 else parts[0]
 
 
-def _single(name: str) -> Material:
+def _single(name: str, laws: bool) -> Material:
+    if LAW.fullmatch(name):
+        if laws:
+            return load_material(name)
+        raise ModelError(
+            f"'{name}' is a law in a file, which is run only where you name it yourself: give it with --material on "
+            "the command line, or tissuq.load_material(...) in Python."
+        )
     for family in FAMILIES:
         found = family.named(name)
         if found is not None:

@@ -21,8 +21,8 @@ class ArrudaBoyce(Material):
 
     mu is the modulus at the reference. Arruda & Boyce give the chain density times k T instead, which they write C_R
     (elsewhere mu, as in Abaqus and FElupe, or n k T): mu = C_R G'(1/N) / 3, a little more than C_R. They write N,
-    Abaqus lambda_m = sqrt(N). Abaqus, ANSYS and others cut a series for the inverse Langevin function after five terms, which
-    does not lock; near the limit theirs is another law. As Jm grows it becomes neo-Hookean.
+    Abaqus lambda_m = sqrt(N). Abaqus, ANSYS and others cut a series for the inverse Langevin function after five terms,
+    which does not lock; near the limit theirs is another law. As Jm grows it becomes neo-Hookean.
     """
 
     name = "arruda-boyce"

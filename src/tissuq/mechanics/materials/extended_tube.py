@@ -21,9 +21,7 @@ class ExtendedTube(StretchMaterial):
     """
 
     name = "extended-tube"
-    formula = (
-        "Gc/2 ((1 - d) (I1 - 3)/(1 - d (I1 - 3)) + ln(1 - d (I1 - 3))) + 2 Ge/beta^2 sum_k (l_k^-beta - 1), d = 1/Jm"
-    )
+    formula = "Gc/2 ((1 - 1/Jm) x/(1 - x/Jm) + ln(1 - x/Jm)) + 2 Ge/beta^2 sum over k of (l_k^-beta - 1), x = I1 - 3"
     source = "Kaliske & Heinrich 1999"
     caution = "The initial shear modulus is Gc (1 - 2/Jm) + Ge; delta of the authors is 1/sqrt(Jm)."
     parameters = (
