@@ -19,14 +19,14 @@ from closed_forms import (
 )
 from tissuq.mechanics import engineering_stress, initial_shear_modulus
 from tissuq.mechanics.contract import checked
-from tissuq.mechanics.material import materials
 
 EVERY_MATERIAL = pytest.mark.parametrize("material", EVERY, ids=lambda material: material.name)
 EVERY_MODE = pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
 
 
 def test_every_material_has_a_closed_form():
-    assert set(materials()) <= OF_INVARIANTS.keys() | OF_STRETCHES.keys()
+    names = {part for material in EVERY for part in material.name.split("+")}
+    assert names <= OF_INVARIANTS.keys() | OF_STRETCHES.keys()
 
 
 @EVERY_MODE

@@ -32,9 +32,8 @@ def materials(
     if markdown:
         print(materials_page(), end="")
         return
-    _print_kinds(
-        "Materials: strain-energy densities W", {**known(), **{each.name: each for each in plugins()}}.values()
-    )
+    others = [each for each in plugins() if each.name not in known()]
+    _print_kinds("Materials: strain-energy densities W", [*known().values(), *others])
     print("Other names:")
     for form in FORMS:
         print(f"    {form}")

@@ -18,6 +18,4 @@ def check(material: Annotated[str, typer.Argument(help="Your own law.py:Name, or
     print(f"{found.name}\n    {found.formula}")
     print(f"    parameters: {', '.join(f'{p.symbol} ({p.unit})' if p.unit else p.symbol for p in found.parameters)}")
     for each in checked(found):
-        print(
-            f"    {'FAILS: ' if each.problem else 'holds: '}{each.claim}{f' ({each.problem})' if each.problem else ''}"
-        )
+        print(f"    FAILS: {each.claim}: {each.problem}" if each.problem else f"    holds: {each.claim}")

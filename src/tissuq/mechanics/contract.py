@@ -92,4 +92,6 @@ def _difference(material: Material, mode: LoadingMode, values: FloatArray) -> Fl
 
 def _check(claim: str, wrong: FloatArray | float, problem: str) -> Check:
     largest = float(np.abs(wrong).max())
+    if np.isnan(largest):
+        return Check(claim, "it is no number for some values of the parameters")
     return Check(claim, "" if largest <= AGREEMENT else problem.format(largest))

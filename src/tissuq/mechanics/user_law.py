@@ -142,9 +142,9 @@ def load_material(law: str) -> Material:
     with _failures_of(path):
         material = as_material(getattr(module, name), law)
         checks = checked(material)
-    failed = [f"{each.claim}: {each.problem}" for each in checks if each.problem]
+    failed = [f"{each.claim} ({each.problem})" for each in checks if each.problem]
     if failed:
-        raise InputError(f"the material '{law}' cannot be used. {'; '.join(failed)}.")
+        raise InputError(f"the material '{law}' cannot be used, because this does not hold: {'; '.join(failed)}.")
     return material
 
 

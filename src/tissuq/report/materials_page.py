@@ -15,9 +15,11 @@ HEAD = """# Materials
 
 Written by `tissuq materials --markdown` from the classes; a test holds it up to date. W is the strain energy per
 undeformed volume, I1 and I2 the invariants of the right Cauchy-Green tensor, l1, l2, l3 the principal stretches; every
-material is incompressible, and every stress is a derivative of W. Linear parameters, to which the stress is proportional,
-are integrated in closed form. A limit Jm is never inside the data: a specimen that was stretched so far has not locked.
+material is incompressible, and every stress is a derivative of W. Linear parameters, to which the stress is
+proportional, are integrated in closed form. A limit Jm is never inside the data: a specimen that was stretched so far has
+not locked.
 """
+LIBRARY = "tissuq.mechanics.materials."
 SCALES = {
     "stress": " x the largest stress",
     "stretch": " x the stretch range",
@@ -28,9 +30,10 @@ SCALES = {
 
 
 def materials_page() -> str:
-    """Return the page in Markdown."""
+    """Return the page in Markdown: of the library's own materials, not of those that others have added."""
     forms = "\n".join(f"- `{form.partition(' (')[0]}` {form[form.index(' (') + 1 :]}" for form in FORMS)
-    return "\n".join([HEAD, f"Names that are not in the list:\n\n{forms}\n", *map(_section, materials().values())])
+    library = [kind for kind in materials().values() if kind.__module__.startswith(LIBRARY)]
+    return "\n".join([HEAD, f"Names that are not in the list:\n\n{forms}\n", *map(_section, library)])
 
 
 def default_in_words(parameter: Parameter) -> str:
@@ -42,16 +45,13 @@ def default_in_words(parameter: Parameter) -> str:
 
 
 def _section(kind: type[Material]) -> str:
-    rows = [
-        f"| {p.symbol} | {p.unit or '-'} | {p.description} | {_range(p)} | {default_in_words(p)} |"
-        for p in kind.parameters
-    ]
-    table = ["| parameter | unit | | values | default prior |", "|---|---|---|---|---|", *rows]
+    head = f"## {kind.name}\n", f"    W = {kind.formula}\n", (getdoc(kind) or "").replace("``", "`") + "\n"
     note = [f"{kind.caution}\n"] if kind.caution else []
-    text = (getdoc(kind) or "").replace("``", "`")
-    return "\n".join(
-        [f"## {kind.name}\n", f"    W = {kind.formula}\n", f"{text}\n", *note, *table, f"\nSource: {kind.source}.\n"]
-    )
+    table = ["| parameter | unit | | linear | values | default prior |", "|---|---|---|---|---|---|"]
+    for p in kind.parameters:
+        cells = p.symbol, p.unit or "-", p.description, "yes" if p.is_linear else "no", _range(p), default_in_words(p)
+        table.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*head, *note, *table, f"\nSource: {kind.source}.\n"])
 
 
 def _range(parameter: Parameter) -> str:

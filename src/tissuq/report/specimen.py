@@ -40,8 +40,9 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
     """
     (folder / INPUT).mkdir()
     shutil.copyfile(source, folder / INPUT / source.name)
-    command = "fit" if figures else "fit --no-figures"
     kept = {"file": f"{INPUT}/{source.name}", "material": _with_laws(study.settings.material, folder)}
+    named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
+    command = f"fit{'' if figures else ' --no-figures'}{named}"
     write_recipe(folder, command, study.settings.model_copy(update=kept))
     write_data(folder, study.experiment)
     summary = specimen_summary(study)
