@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import MODES
 
+from closed_forms import MODES
 from tissuq.mechanics import engineering_stress, material_named
 
 felupe = pytest.importorskip("felupe", reason="FElupe is not installed")
