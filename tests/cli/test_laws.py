@@ -46,8 +46,10 @@ def test_a_law_is_fitted_recorded_and_repeated_with_its_name(cli, law, here, spe
     own = cli("fit", specimen, "--material", "law.py:exponential", *FIT, "--out", "own")
     known = cli("fit", specimen, "--material", "demiray", *FIT, "--prior", "b=uniform(0.1,20)", "--out", "known")
     assert (own.status, known.status) == (0, 0)
-    rows = [next(line for line in said.out.splitlines() if line.split()[:1] == ["none"]) for said in (own, known)]
-    assert rows[0] == rows[1]
+    rows = [
+        next(line.split() for line in said.out.splitlines() if line.split()[:1] == ["none"]) for said in (own, known)
+    ]
+    assert rows[0][:5] == rows[1][:5]  # the evidence also tells that mu of demiray is positive
     recipe = tomllib.loads((here / "own" / "run.toml").read_text())
     assert recipe["material"] == "input/law.py:exponential"
     assert (here / "own" / "input" / "law.py").read_text() == LAW

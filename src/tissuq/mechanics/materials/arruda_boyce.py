@@ -20,7 +20,7 @@ class ArrudaBoyce(Material):
     function, y (3 - (6 y^2 + y^4 - 2 y^6)/5) / (1 - y^2), right to 0.28 %.
 
     mu is the modulus at the reference. Arruda & Boyce give the chain density times k T instead, which they write C_R
-    (elsewhere mu, as in Abaqus and FElupe, or n k T): mu = C_R G'(1/N) / 3, a little more than C_R. They write N,
+    (mu in Abaqus, n k T elsewhere): mu = C_R G'(1/N) / 3, a little more than C_R. They write N,
     Abaqus lambda_m = sqrt(N). Abaqus, ANSYS and others cut a series for the inverse Langevin function after five terms,
     which does not lock; near the limit theirs is another law. As Jm grows it becomes neo-Hookean.
     """

@@ -15,7 +15,7 @@ __all__ = ["Gent", "GentGent"]
 class Gent(Material):
     """W = -mu Jm/2 ln(1 - (I1 - 3)/Jm); initial shear modulus mu.
 
-    Written with E instead (Gent's paper, SOFA), E = 3 mu. As Jm grows it becomes neo-Hookean with C10 = mu/2. It locks
+    Written with E instead (Gent's paper), E = 3 mu. As Jm grows it becomes neo-Hookean with C10 = mu/2. It locks
     at I1 = 3 + Jm, in uniaxial tension at a stretch of about sqrt(3 + Jm).
     """
 
@@ -32,8 +32,7 @@ class Gent(Material):
 class GentGent(Material):
     """W = -mu1 Jm/2 ln(1 - (I1 - 3)/Jm) + 3 mu2/2 ln(I2/3); initial shear modulus mu1 + mu2.
 
-    Written C1 and C2 ln(I2/3) elsewhere (Pucci & Saccomandi), C1 = mu1/2 and C2 = 3 mu2/2; written K2 in
-    Ogden, Saccomandi & Sgura (2004), K2 = C2.
+    Written C1 and C2 elsewhere, for -C1 Jm ln(...) + C2 ln(I2/3), C1 = mu1/2 and C2 = 3 mu2/2.
     """
 
     name = "gent-gent"
