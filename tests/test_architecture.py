@@ -15,8 +15,8 @@ from tissuq.registry import variants
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "noise",
-    "statistics", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting", "studies",
-    "report", "cli", "__main__",
+    "statistics", "scales", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting",
+    "studies", "report", "cli", "__main__",
 ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from tissuq import Exponential, Flat, HalfCauchy, HalfNormal, InputError, LogNormal, Normal, Uniform
+from tissuq import Exponential, Flat, HalfCauchy, HalfNormal, InputError, LogNormal, LogUniform, Normal, Uniform
 from tissuq.mechanics.stress import differentiator
 from tissuq.priors import Prior, prior_from
 from tissuq.registry import variants
@@ -20,6 +20,7 @@ CASES = [
     (HalfCauchy(0.3), stats.halfcauchy(0, 0.3)),
     (Exponential(2.5), stats.expon(0, 2.5)),
     (LogNormal(0.8, 0.6), stats.lognorm(0.6, 0, 0.8)),
+    (LogUniform(0.2, 5.0), stats.loguniform(0.2, 5.0)),
 ]
 EVERY = pytest.mark.parametrize(("prior", "law"), CASES, ids=[str(prior) for prior, _ in CASES])
 PROBABILITIES = np.array([0.01, 0.2, 0.5, 0.9, 0.999])
@@ -94,6 +95,8 @@ def test_jax_sees_the_same_density(prior, law):
         (lambda: HalfNormal(float("nan")), "must be a finite number"),
         (lambda: Uniform(0, float("inf")), "must be a finite number"),
         (lambda: LogNormal(-1, 1), "must be positive"),
+        (lambda: LogUniform(0, 1), "low must be positive"),
+        (lambda: LogUniform(2, 1), "low must be less"),
         (lambda: prior_from({"distribution": "unifrom", "low": 0, "high": 1}), "Did you mean 'uniform'"),
         (lambda: prior_from({"distribution": "uniform", "low": 0}), "needs low and high"),
         (

@@ -8,12 +8,20 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.experiments.reading import read_experiment
 from tissuq.fitting import fit, fit_many
-from tissuq.mechanics import Material, StretchMaterial, engineering_stress, initial_shear_modulus, simulate
+from tissuq.mechanics import (
+    FunctionLaw,
+    Material,
+    StretchMaterial,
+    engineering_stress,
+    initial_shear_modulus,
+    load_material,
+    simulate,
+)
 from tissuq.mechanics.material import materials
 from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, UnknownNoise
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
-from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, Normal, Prior, Uniform
+from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 
 __version__ = "0.1.0"
 
@@ -25,12 +33,14 @@ __all__ = [
     "Experiment",
     "Exponential",
     "Flat",
+    "FunctionLaw",
     "HalfCauchy",
     "HalfNormal",
     "InputError",
     "KnownNoise",
     "LoadingMode",
     "LogNormal",
+    "LogUniform",
     "Material",
     "ModelError",
     "Noise",
@@ -52,6 +62,7 @@ __all__ = [
     "fit",
     "fit_many",
     "initial_shear_modulus",
+    "load_material",
     "loading_modes",
     "materials",
     "read_experiment",

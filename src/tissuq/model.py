@@ -15,10 +15,10 @@ from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, engineering_stress, stress_basis
-from tissuq.mechanics.path import invariant_rates
 from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
 from tissuq.priors import Flat, Prior, Uniform
+from tissuq.scales import default_prior, support
 from tissuq.statistics import CHUNK, Statistics
 
 __all__ = ["StatisticalModel"]
@@ -86,7 +86,7 @@ class StatisticalModel:
         """The prior of every parameter, in MPa and stretch."""
         boxes = self._default_boxes()
         return {
-            p.symbol: self._chosen_prior(p) or boxes.get(p.symbol) or self._default_scale_prior(p)
+            p.symbol: self._chosen_prior(p) or boxes.get(p.symbol) or default_prior(p, self.experiment)
             for p in self.parameters
         }
 
@@ -249,7 +249,7 @@ class StatisticalModel:
 
     def _bent_priors(self) -> list[Prior]:
         own = {p.symbol: p for p in self.material.parameters}
-        return [self._chosen_prior(own[s]) or self._default_scale_prior(own[s]) for s in self.bent_symbols]
+        return [self._chosen_prior(own[s]) or default_prior(own[s], self.experiment) for s in self.bent_symbols]
 
     def _shortest_columns(self) -> FloatArray:
         """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
@@ -266,36 +266,9 @@ class StatisticalModel:
         if isinstance(prior, Flat) and not parameter.is_linear:
             raise InputError(f"{parameter.symbol}: a flat prior is improper and only serves linear parameters.")
         try:
-            return prior.within(parameter.support) if prior else None
+            return prior.within(support(parameter, self.experiment)) if prior else None
         except InputError as error:
             raise InputError(f"{parameter.symbol}: {error}") from error
-
-    def _default_scale_prior(self, parameter: Parameter) -> Prior:
-        if parameter.relative_prior is None:
-            raise ModelError(f"parameter {parameter.symbol} has no default prior: give one.")
-        data = self.experiment
-        if parameter.dimension == "stretch" and not np.ptp(data.stretch):
-            raise ModelError(
-                f"experiment '{data.name}' has one stretch only, so nothing tells the {parameter.description} "
-                f"{parameter.symbol}: measure at other stretches, or choose another discrepancy."
-            )
-        unit = {
-            "stress": np.abs(data.stress).max(),
-            "modulus": self.pilot_modulus,
-            "stretch": np.ptp(data.stretch),
-            "number": 1.0,
-        }
-        return parameter.relative_prior.scaled(float(unit[parameter.dimension]))
-
-    @cached_property
-    def pilot_modulus(self) -> float:
-        """A rough C10 of the data, MPa: the median of stress over that of a neo-Hookean material with C10 = 1.
-
-        It only sets the scale of priors: the same data in another unit give the same answer in that unit.
-        """
-        unit, _ = invariant_rates(self.experiment.mode, self.experiment.stretch)
-        used = (np.abs(unit) > 1e-3 * np.abs(unit).max()) & (self.experiment.stress != 0)
-        return float(np.median(np.abs(self.experiment.stress[used] / unit[used])))
 
     def _default_boxes(self) -> dict[str, Prior]:
         """Return uniform priors that hold the least-squares solution with a margin, whatever the units.

@@ -22,21 +22,22 @@ class Parameter:
     description : str
         What it is, in a few words.
     dimension : str
-        ``"stress"`` or ``"modulus"`` (both MPa), ``"stretch"`` or ``"number"`` (both dimensionless).
+        ``"stress"`` or ``"modulus"`` (both MPa); ``"stretch"``, ``"number"``, ``"limit"`` (a value of I1 - 3 that no
+        measurement may reach) or ``"rate"`` (one over a value of I1 - 3), all dimensionless.
     support : tuple of float
-        The lowest and highest value that has a meaning.
+        The lowest and highest value that has a meaning; a limit also lies beyond the data.
     is_linear : bool
         Whether the stress is proportional to it.
     relative_prior : Prior or None
         The default prior in units of the data: the largest measured stress for a stress, the range of the measured
-        stretches for a stretch, and for a modulus the typical ratio of the stress to that of a neo-Hookean material
-        with C10 = 1. Linear parameters have none: theirs is a box that the data's own least-squares solution sets
-        (`tissuq.model.StatisticalModel`).
+        stretches for a stretch, for a modulus the typical ratio of the stress to that of a neo-Hookean material with
+        C10 = 1, the largest I1 - 3 for a limit and one over it for a rate. Linear parameters have none: theirs is a box
+        that the data's own least-squares solution sets (`tissuq.model.StatisticalModel`).
     """
 
     symbol: str
     description: str
-    dimension: Literal["stress", "modulus", "stretch", "number"] = "stress"
+    dimension: Literal["stress", "modulus", "stretch", "number", "limit", "rate"] = "stress"
     support: tuple[float, float] = (-inf, inf)
     is_linear: bool = True
     relative_prior: Prior | None = None

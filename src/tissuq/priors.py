@@ -18,7 +18,18 @@ from tissuq.errors import InputError
 from tissuq.gaussian import interval_quantile, log_interval
 from tissuq.registry import find
 
-__all__ = ["Exponential", "Flat", "HalfCauchy", "HalfNormal", "LogNormal", "Normal", "Prior", "Uniform", "prior_from"]
+__all__ = [
+    "Exponential",
+    "Flat",
+    "HalfCauchy",
+    "HalfNormal",
+    "LogNormal",
+    "LogUniform",
+    "Normal",
+    "Prior",
+    "Uniform",
+    "prior_from",
+]
 
 
 @dataclass(frozen=True)
@@ -296,6 +307,32 @@ class LogNormal(Prior):
         from scipy.special import ndtri
 
         return self.median * np.exp(self.sd_log * ndtri(probability))
+
+
+@dataclass(frozen=True)
+class LogUniform(Prior):
+    """Density whose logarithm is uniform between two positive bounds: p(x) = 1 / (x log(high / low))."""
+
+    low: float
+    high: float
+
+    name = "log-uniform"
+    with_unit = ("low", "high")
+
+    def _check(self) -> None:
+        if self.low <= 0:
+            raise InputError(f"prior {self}: low must be positive.")
+        _check_order(self, self.low, self.high)
+
+    @property
+    def support(self) -> tuple[float, float]:
+        return self.low, self.high
+
+    def log_density(self, value: Any) -> Any:
+        return -_log(value) - log(log(self.high / self.low))
+
+    def quantile(self, probability: Any) -> Any:
+        return self.low * (self.high / self.low) ** np.asarray(probability)
 
 
 def prior_from(settings: dict[str, Any]) -> Prior:

@@ -1,6 +1,9 @@
+from pathlib import Path
+
 import pytest
 
 from tissuq import datasets, discrepancies, materials
+from tissuq.mechanics.named import FORMS
 
 
 @pytest.mark.parametrize(("command", "kinds"), [("materials", materials), ("discrepancies", discrepancies)])
@@ -10,6 +13,22 @@ def test_every_variant_is_listed_with_its_formula_and_parameters(cli, command, k
     for kind in kinds().values():
         assert f"{kind.name}\n    {kind.formula}" in said.out
         assert all(parameter.description in said.out for parameter in kind.parameters)
+
+
+def test_names_that_are_not_listed_are_told(cli):
+    said = cli("materials")
+    assert all(form in said.out for form in FORMS)
+
+
+def test_the_page_of_materials_is_up_to_date(cli):
+    said = cli("materials", "--markdown")
+    assert said.status == 0
+    page = Path(__file__).parents[2] / "docs" / "materials.md"
+    assert said.out == page.read_text(encoding="utf-8"), "run: tissuq materials --markdown > docs/materials.md"
+
+
+def test_no_line_of_the_list_of_materials_is_too_long_to_read(cli):
+    assert max(map(len, cli("materials").out.splitlines())) <= 130
 
 
 def test_the_data_sets_are_listed_with_their_citations(cli):

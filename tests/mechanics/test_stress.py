@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from closed_forms import EVERY, values_of
 from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial, loading_modes
 from tissuq.mechanics import (
     MooneyRivlin,
@@ -17,12 +18,11 @@ from tissuq.mechanics import (
     initial_shear_modulus,
     stress_basis,
 )
-from tissuq.mechanics.material import materials
 from tissuq.mechanics.stress import path_energy
 
 STRETCH = np.concatenate([np.linspace(0.4, 0.95, 12), np.linspace(1.05, 4.25, 30)])
 
-EVERY_MATERIAL = pytest.mark.parametrize("material", [kind() for kind in materials().values()], ids=str)
+EVERY_MATERIAL = pytest.mark.parametrize("material", EVERY, ids=lambda material: material.name)
 EVERY_MODE = pytest.mark.parametrize("mode", [kind() for kind in loading_modes().values()], ids=str)
 
 UNIAXIAL = {  # the paper's eq. 7, 9 and 11, as corrected
@@ -30,29 +30,23 @@ UNIAXIAL = {  # the paper's eq. 7, 9 and 11, as corrected
     "C01": lambda x: 2 * (1 - x**-3),
     "C20": lambda x: 4 * (x**3 - 3 * x + 1 + 3 * x**-2 - 2 * x**-3),
     "C30": lambda x: 6 * (x**5 - 6 * x**3 + 3 * x**2 + 9 * x - 6 - 9 * x**-2 + 12 * x**-3 - 4 * x**-4),
-} | dict.fromkeys(("mu1", "mu2", "mu3"), lambda x, alpha: 2 / alpha * (x ** (alpha - 1) - x ** (-alpha / 2 - 1)))
+}
 
 
 def some_values(material, seed):
     """Return values for every parameter: linear ones of size one, the others drawn from their default prior."""
-    rng = np.random.default_rng(seed)
-    return np.array(
-        [rng.normal() if p.is_linear else p.relative_prior.quantile(rng.random()) for p in material.parameters]
-    )
+    return values_of(material, seed, largest=36.4)  # I1 - 3 at an equibiaxial stretch of 0.4
 
 
 def is_linear(material):
     return np.array([parameter.is_linear for parameter in material.parameters])
 
 
-@EVERY_MATERIAL
+@pytest.mark.parametrize("material", [NeoHookean(), MooneyRivlin(), Yeoh()], ids=str)
 def test_uniaxial_stress_is_its_closed_form(material):
-    nonlinear = some_values(material, seed=4)[~is_linear(material)]
-    basis = stress_basis(material, Uniaxial(), STRETCH, nonlinear)
-    symbols = [parameter.symbol for parameter in material.parameters if parameter.is_linear]
-    exponents = [[alpha] for alpha in nonlinear] or [[]] * len(symbols)
-    for column, symbol, own in zip(basis.T, symbols, exponents, strict=True):
-        closed = UNIAXIAL[symbol](STRETCH, *own)  # loses a few digits itself where its terms cancel
+    basis = stress_basis(material, Uniaxial(), STRETCH)
+    for column, parameter in zip(basis.T, material.parameters, strict=True):
+        closed = UNIAXIAL[parameter.symbol](STRETCH)  # loses a few digits itself where its terms cancel
         np.testing.assert_allclose(column, closed, rtol=1e-12, atol=1e-13)
 
 
@@ -152,4 +146,5 @@ def test_initial_slope_in_tension_is_three_times_the_shear_modulus(material):
     step = 1e-5
     below, above = engineering_stress(material, Uniaxial(), [1 - step, 1 + step], values)
     slope = (above - below) / (2 * step)
-    assert slope == pytest.approx(3 * initial_shear_modulus(material, values), rel=1e-6)
+    # Not nearer, because van der Waals' stress has a term in |stretch - 1|, which this difference does not remove.
+    assert slope == pytest.approx(3 * initial_shear_modulus(material, values), rel=2e-5)

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, compare, fit, paper, show, study
+from tissuq.cli import catalogue, check, compare, fit, paper, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -27,6 +27,7 @@ app.command("fit")(fit.fit)
 app.command("compare")(compare.compare)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)
+app.command("check")(check.check)
 app.command("discrepancies")(catalogue.discrepancies)
 app.add_typer(study.study)
 app.command("datasets")(catalogue.datasets)

@@ -14,16 +14,29 @@ from tissuq.errors import InputError
 if TYPE_CHECKING:
     from tissuq.discrepancy import Discrepancy
     from tissuq.mechanics import Material
-    from tissuq.parameters import Parameter
 
 __all__ = ["datasets", "discrepancies", "materials"]
 
+LONG = 70
+"""Characters of a formula from which its source stands on a line of its own."""
 
-def materials() -> None:
+
+def materials(
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the page docs/materials.md instead.")] = False,
+) -> None:
     """List the materials: formula, parameters, units and default priors."""
     from tissuq.mechanics.material import materials as known
+    from tissuq.mechanics.named import FORMS, plugins
+    from tissuq.report.materials_page import materials_page
 
-    _print_kinds("Materials: strain-energy densities W", known().values())
+    if markdown:
+        print(materials_page(), end="")
+        return
+    others = [each for each in plugins() if each.name not in known()]
+    _print_kinds("Materials: strain-energy densities W", [*known().values(), *others])
+    print("Other names:")
+    for form in FORMS:
+        print(f"    {form}")
 
 
 def discrepancies() -> None:
@@ -50,21 +63,15 @@ def datasets(
         print(f"{name}\n    {known.citation(name)}")
 
 
-def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy]]) -> None:
+def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy] | Material]) -> None:
+    from tissuq.report.materials_page import default_in_words
+
     print(f"{title}\n")
     for kind in kinds:
-        print(f"{kind.name}\n    {kind.formula}   ({kind.source})")
+        gap = "   " if len(kind.formula) < LONG else "\n    "
+        print(f"{kind.name}\n    {kind.formula}{gap}({kind.source})")
         for p in kind.parameters:
-            print(f"    {p.symbol:<6} {p.unit or '-':<4} {p.description}; prior {_default(p)}")
+            print(f"    {p.symbol:<6} {p.unit or '-':<4} {p.description}; prior {default_in_words(p)}")
         if kind.caution:
             print(fill(kind.caution, 96, initial_indent="    Note: ", subsequent_indent="    "))
         print()
-
-
-def _default(parameter: Parameter) -> str:
-    """Return the default prior in words; the data set its scale."""
-    if parameter.relative_prior is None:
-        side = "positive, " if parameter.support[0] == 0 else ""
-        return f"uniform, {side}to 10 times beyond least squares"
-    of_what = {"stress": " x the largest stress", "stretch": " x the stretch range", "modulus": " x the pilot C10"}
-    return f"{parameter.relative_prior}{of_what.get(parameter.dimension, '')}"

@@ -18,7 +18,12 @@ def fit(
     file: Annotated[
         Path | None, typer.Argument(help="CSV file, or the name of a built-in data set (tissuq datasets).")
     ] = None,
-    material: Annotated[str | None, typer.Option(help="Material [neo-hookean]; see tissuq materials.")] = None,
+    material: Annotated[
+        str | None,
+        typer.Option(
+            help="Material, a sum (gent+mooney-rivlin), or your own law.py:Name [neo-hookean]; see tissuq materials."
+        ),
+    ] = None,
     discrepancy: Annotated[
         list[str] | None,
         typer.Option(help="Discrepancy; repeat for more; 'all' fits the paper's seven and auto [auto]."),
@@ -58,6 +63,7 @@ def fit(
 ) -> None:
     """Identify a material's parameters from a file of stretches and stresses."""
     from tissuq.cli.tables import print_summary, print_warnings
+    from tissuq.mechanics import material_named
     from tissuq.report.run_folder import check_target, run_folder
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import SpecimenSettings, run_specimen
@@ -74,6 +80,7 @@ def fit(
         options["columns"] = once_each("--column", map(_role, column))
     if not file and not config:
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
+    law = material_named(material, laws=True) if material else None
     settings = load_settings(SpecimenSettings, config, options, rivals=("noise", "noise_sd"))
     beside = config.parent if config else Path()
     source = beside / settings.file
@@ -82,7 +89,7 @@ def fit(
     target = out or Path("runs") / source.stem
     check_target(target, force=force)
     with progress() as step:
-        study = run_specimen(settings, beside, step)
+        study = run_specimen(settings, beside, step, law)
         step("writing")
         with run_folder(target, force=force) as folder:
             write_specimen_run(study, source, folder, figures=figures)

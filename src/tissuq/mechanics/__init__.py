@@ -1,11 +1,14 @@
 """What the material says: strain energies, and stress as their derivative along a loading mode."""
 
-from tissuq.mechanics.material import Material, StretchMaterial, material_named
+from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Ogden1, Ogden2, Ogden3, Yeoh
+from tissuq.mechanics.named import material_named
 from tissuq.mechanics.simulate import simulate
 from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, stress_basis, traced_stress_basis
+from tissuq.mechanics.user_law import FunctionLaw, load_material
 
 __all__ = [
+    "FunctionLaw",
     "Material",
     "MooneyRivlin",
     "NeoHookean",
@@ -16,6 +19,7 @@ __all__ = [
     "Yeoh",
     "engineering_stress",
     "initial_shear_modulus",
+    "load_material",
     "material_named",
     "simulate",
     "stress_basis",

@@ -9,11 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tissuq.errors import ModelError
 from tissuq.parameters import Parameter
-from tissuq.registry import find, variants
+from tissuq.registry import variants
 
-__all__ = ["Material", "StretchMaterial", "material_named", "materials"]
+__all__ = ["Material", "StretchMaterial", "materials"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,8 @@ class Material(ABC):
 
     A new material is one subclass in one file: its name, formula, parameters and energy. The energy is written
     with plain arithmetic and must vanish at I1 = I2 = 3; every stress is its derivative along a loading mode, so no
-    material holds a stress formula. A law of the principal stretches, such as Ogden's, is a `StretchMaterial`.
+    material holds a stress formula. A law of the principal stretches, such as Ogden's, is a `StretchMaterial`. The sum
+    of two materials is a material.
     """
 
     name: ClassVar[str]
@@ -31,6 +31,11 @@ class Material(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     caution: ClassVar[str] = ""
     """What a reader of its parameters must know."""
+
+    def __add__(self, other: Material) -> Material:
+        from tissuq.mechanics.materials.sums import added
+
+        return added(self, other)
 
     @abstractmethod
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
@@ -65,16 +70,5 @@ class StretchMaterial(Material):
 
 
 def materials() -> dict[str, type[Material]]:
-    """Return every material by name."""
-    return variants(Material)
-
-
-def material_named(material: str | Material) -> Material:
-    """Return the material of that name; a material is returned as it is.
-
-    Raises
-    ------
-    ModelError
-        When no material has that name.
-    """
-    return material if isinstance(material, Material) else find(Material, "material", material, ModelError)()
+    """Return every material by name, those with few parameters first."""
+    return dict(sorted(variants(Material).items(), key=lambda item: len(item[1].parameters)))

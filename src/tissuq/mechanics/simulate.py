@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.mechanics.material import Material, material_named
+from tissuq.mechanics.material import Material
+from tissuq.mechanics.named import material_named
 from tissuq.mechanics.stress import engineering_stress
 
 __all__ = ["simulate"]

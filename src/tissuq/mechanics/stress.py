@@ -43,6 +43,11 @@ def engineering_stress(
     -------
     (n,) or (m, n) array, MPa
 
+    Raises
+    ------
+    ModelError
+        When the material cannot be stretched so far with these parameters.
+
     References
     ----------
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
@@ -52,6 +57,13 @@ def engineering_stress(
     if curves is None:
         with _explained(material):
             curves = np.asarray(_curves(material, mode)(points, np.atleast_2d(values)))
+    is_borne = np.isfinite(curves).all(axis=0)
+    if not is_borne.all():
+        symbols = ", ".join(each.symbol for each in material.parameters)
+        raise ModelError(
+            f"material '{material.name}' has no finite stress at a stretch of {points[~is_borne][0]:g} with the "
+            f"values of {symbols} that it was given: it has locked, or its energy is too large for a number."
+        )
     return curves if values.ndim == 2 else np.asarray(curves[0])
 
 

@@ -54,7 +54,8 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
     if len(components.weights) * size > MOST_VALUES:
         components = components.thinned(max(FEWEST, MOST_VALUES // size))
     density = left_out_log_density(solution.model, components)
-    log_weights = np.log(components.weights)[:, None] - density
+    with np.errstate(divide="ignore"):  # a component may have no weight
+        log_weights = np.log(components.weights)[:, None] - density
     if solution.diagnostics is not None and len(components.weights) > FEWEST:
         from arviz_stats.base import array_stats
 

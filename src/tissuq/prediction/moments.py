@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Components
@@ -25,6 +26,8 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
+NEXT_TO_NOTHING = 1e-6
+"""Probability that the material locks before a stretch, below which a stress there is predicted."""
 BLOCK = 1_000_000
 """Values of the stress at once: what bounds the memory."""
 
@@ -96,6 +99,28 @@ def basis_of(
     return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]], mode)
 
 
+def _borne(model: StatisticalModel, stretch: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return a basis without the components, of next to no weight, in which the material has locked.
+
+    Raises
+    ------
+    ModelError
+        When they have weight, so that there is no stress to predict.
+    """
+    is_borne = np.asarray(np.isfinite(basis).all(axis=-1))
+    if is_borne.all():
+        return basis
+    locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(stretch)))
+    if locked.max() > NEXT_TO_NOTHING:
+        beyond = stretch[locked > NEXT_TO_NOTHING]
+        raise ModelError(
+            f"material '{model.material.name}' has no stress at a stretch of {beyond[np.abs(beyond - 1).argmin()]:g}: "
+            f"its {', '.join(model.bent_symbols)} may be such that it locks before (up to a probability of "
+            f"{locked.max():.2g}). Predict at stretches nearer to those of the data."
+        )
+    return np.where(is_borne[..., None], basis, 0.0)
+
+
 def mean_stress(model: StatisticalModel, coefficients: FloatArray, settings: FloatArray) -> FloatArray:
     """Return the mean stress (M, n) at the measurements for coefficients (M, k) and settings (M, d)."""
     if not model.bent_symbols:
@@ -147,7 +172,7 @@ def stress_moments(
     """
     values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
-    basis = basis_of(model, stretch, components.settings, mode)
+    basis = _borne(model, stretch, basis_of(model, stretch, components.settings, mode), components.weights)
     if not discrepancy:
         basis = basis * np.isin(model.column_symbols, model.material_symbols)
     mean = (basis @ mean_b[:, :, None])[:, :, 0]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
+from tissuq.mechanics.user_law import LAW
 from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
 from tissuq.report.rows import readable_methods, readable_parameters, readable_summary, significant
@@ -39,8 +40,10 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
     """
     (folder / INPUT).mkdir()
     shutil.copyfile(source, folder / INPUT / source.name)
-    command = "fit" if figures else "fit --no-figures"
-    write_recipe(folder, command, study.settings.model_copy(update={"file": f"{INPUT}/{source.name}"}))
+    kept = {"file": f"{INPUT}/{source.name}", "material": _with_laws(study.settings.material, folder)}
+    named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
+    command = f"fit{'' if figures else ' --no-figures'}{named}"
+    write_recipe(folder, command, study.settings.model_copy(update=kept))
     write_data(folder, study.experiment)
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
@@ -50,6 +53,17 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
         write_figures(folder, _figures(study))
     page = render("specimen.html", **_context(study, summary, folder), command=command)
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _with_laws(material: str, folder: Path) -> str:
+    """Return the name of a material with the laws in the user's files, of which copies go with the run."""
+    parts = material.split("+")
+    for place, match in enumerate(map(LAW.fullmatch, parts)):
+        if match:
+            law = Path(match["path"].strip())
+            shutil.copyfile(law, folder / INPUT / law.name)
+            parts[place] = f"{INPUT}/{law.name}:{match['name']}"
+    return "+".join(parts)
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:

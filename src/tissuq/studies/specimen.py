@@ -18,7 +18,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import read_experiment
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.fitting import Method, fit
-from tissuq.mechanics import material_named
+from tissuq.mechanics import Material, material_named
 from tissuq.noise import Noise, noise_named
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
@@ -145,9 +145,14 @@ class SpecimenStudy:
 
 
 def run_specimen(
-    settings: SpecimenSettings, folder: Path = Path(), step: Callable[[str], None] = lambda text: None
+    settings: SpecimenSettings,
+    folder: Path = Path(),
+    step: Callable[[str], None] = lambda text: None,
+    law: Material | None = None,
 ) -> SpecimenStudy:
     """Read the file and fit the material with every chosen discrepancy.
+
+    Settings may come from a file, so that a law of the user's own which they name is not run; it is given as ``law``.
 
     Raises
     ------
@@ -156,22 +161,23 @@ def run_specimen(
         is skipped with the reason when all were asked for.
     """
     experiment = settings.experiment(folder)
+    material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
     is_all = settings.discrepancies == (ALL,)
     names = _every() if is_all else list(dict.fromkeys(settings.discrepancies))
-    priors = _priors(settings, names, unit)
+    priors = _priors(settings, material, names, unit)
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
         start = perf_counter()
-        own = {p.symbol for p in _parameters(settings, name)}
+        own = {p.symbol for p in _parameters(settings, material, name)}
         if is_all and len(experiment) < len(own):
             skipped[name] = f"{len(experiment)} measurements are too few for its parameters {', '.join(sorted(own))}."
             continue
         try:
             posteriors[name] = fit(
                 experiment,
-                material=settings.material,
+                material=material,
                 discrepancy=name,
                 noise=settings.noise_in(unit),
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
@@ -196,14 +202,14 @@ def _every() -> list[str]:
     return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, others)]
 
 
-def _parameters(settings: SpecimenSettings, discrepancy: str) -> tuple[Parameter, ...]:
+def _parameters(settings: SpecimenSettings, material: Material, discrepancy: str) -> tuple[Parameter, ...]:
     noise = settings.noise_in(stress_unit("MPa")).parameters
-    return (*material_named(settings.material).parameters, *discrepancy_named(discrepancy).parameters, *noise)
+    return (*material.parameters, *discrepancy_named(discrepancy).parameters, *noise)
 
 
-def _priors(settings: SpecimenSettings, names: list[str], unit: StressUnit) -> Mapping[str, Prior]:
+def _priors(settings: SpecimenSettings, material: Material, names: list[str], unit: StressUnit) -> Mapping[str, Prior]:
     """Return the chosen priors in MPa and stretch."""
-    known = {p.symbol: p for name in names for p in _parameters(settings, name)}
+    known = {p.symbol: p for name in names for p in _parameters(settings, material, name)}
     unknown = sorted(set(settings.priors) - set(known))
     if unknown:
         raise InputError(f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(known)}.")

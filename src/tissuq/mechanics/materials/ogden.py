@@ -1,14 +1,18 @@
-"""Ogden's sums of powers of the principal stretches, with one, two or three terms."""
+"""Ogden's sums of powers of the principal stretches, with any number of terms."""
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
+from tissuq.errors import ModelError
 from tissuq.mechanics.material import StretchMaterial
 from tissuq.parameters import Parameter
 from tissuq.priors import Uniform
 
-__all__ = ["Ogden1", "Ogden2", "Ogden3"]
+__all__ = ["Ogden", "Ogden1", "Ogden2", "Ogden3"]
 
 LARGEST = 40.0
 """Reported for soft tissue: about 10 to 25 for skin and fat, about -20 for brain."""
@@ -98,3 +102,61 @@ class Ogden3(_Ogden):
     formula = "sum over i = 1 to 3 of 2 mu_i/alpha_i^2 (l1^alpha_i + l2^alpha_i + l3^alpha_i - 3)"
     parameters = _moduli_and_exponents(SMALL, LARGE, NEGATIVE)
     caution = CAUTION
+
+
+@dataclass(frozen=True)
+class Ogden(_Ogden):
+    """W = sum over i = 1 to any number of terms of 2 mu_i/alpha_i^2 (l1^alpha_i + l2^alpha_i + l3^alpha_i - 3).
+
+    The initial shear modulus is the sum of mu_i. By default the first half of the exponents (of an odd number one more)
+    is positive, the others negative, in disjoint intervals of equal ratio between 0.5 and 40 in size.
+
+    Parameters
+    ----------
+    terms : int
+        How many, or ``ogden-4`` by name. With up to three, `Ogden1`, `Ogden2` and `Ogden3` have the default priors of
+        those names.
+
+    Raises
+    ------
+    ModelError
+        When there is no term.
+    """
+
+    terms: int
+
+    form = "ogden-4 (any number of terms)"
+    caution = CAUTION
+
+    def __post_init__(self) -> None:
+        if self.terms < 1:
+            raise ModelError(f"an Ogden material needs one term or more, not {self.terms}.")
+
+    @classmethod
+    def named(cls, name: str) -> _Ogden | None:
+        """Return the material of a name such as ``ogden-4``; None for other names, and for those with own classes."""
+        match = re.fullmatch(r"ogden-(\d+)", name)
+        return cls(int(match[1])) if match and not 1 <= int(match[1]) <= 3 else None
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """The name by which it is found."""
+        return f"ogden-{self.terms}"
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """The sum of its terms."""
+        return Ogden3.formula.replace("1 to 3", f"1 to {self.terms}")
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        """Moduli, then exponents."""
+        positive = _intervals(self.terms - self.terms // 2)
+        negative = [(-high, -low) for low, high in _intervals(self.terms // 2)]
+        return _moduli_and_exponents(*positive, *negative)
+
+
+def _intervals(count: int) -> list[tuple[float, float]]:
+    """Return intervals of equal ratio from the smallest to the largest exponent."""
+    ratio = LARGEST / SMALLEST
+    return list(pairwise(SMALLEST * ratio ** (place / count) for place in range(count + 1))) if count else []

@@ -1,0 +1,52 @@
+"""Functions for strain energies that NumPy (real and complex) and JAX arrays both pass through."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from tissuq.parameters import Parameter
+from tissuq.priors import LogUniform
+
+__all__ = ["LIMIT", "exp", "expm1", "library", "log", "log_left", "sqrt"]
+
+LIMIT = Parameter(
+    "Jm", "value of I1 - 3 at which the material locks", "limit", (0.0, float("inf")), False, LogUniform(1.001, 100.0)
+)
+"""A specimen that was stretched so far has its limit beyond: the data set where its support begins."""
+
+
+def library(value: Any) -> Any:
+    """Return the library that an array belongs to: NumPy for plain numbers."""
+    return value.__array_namespace__() if hasattr(value, "__array_namespace__") else np
+
+
+def log(value: Any) -> Any:
+    """Return the natural logarithm."""
+    return library(value).log(value)
+
+
+def exp(value: Any) -> Any:
+    """Return the exponential."""
+    return library(value).exp(value)
+
+
+def expm1(value: Any) -> Any:
+    """Return exp(value) - 1 with the digits of small values."""
+    return library(value).expm1(value)
+
+
+def sqrt(value: Any) -> Any:
+    """Return the square root."""
+    return library(value).sqrt(value)
+
+
+def log_left(ratio: Any) -> Any:
+    """Return log(1 - ratio), and not a number (with all its derivatives) where nothing is left.
+
+    A logarithm by itself has a finite derivative beyond the pole, and a material that has locked would have a stress.
+    """
+    own = library(ratio)
+    return own.log1p(-ratio * own.where(ratio.real < 1, 1.0, nan))

@@ -1,0 +1,45 @@
+"""The same laws in another library, where it is installed: `pip install felupe`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from closed_forms import MODES
+from tissuq.mechanics import engineering_stress, material_named
+
+felupe = pytest.importorskip("felupe", reason="FElupe is not installed")
+
+STRETCH = np.linspace(0.7, 2.2, 7)
+LIMIT = 22.0
+"""Of I1 - 3: at these stretches it is at most 6.7."""
+PAIRS = [  # a name and values here, a function and its arguments there, and how near it comes
+    ("neo-hookean", [0.7], "neo_hooke", {"mu": 1.4}, 1e-10),
+    ("mooney-rivlin", [0.7, 0.2], "mooney_rivlin", {"C10": 0.7, "C01": 0.2}, 1e-10),
+    ("yeoh", [0.7, -0.1, 0.02], "yeoh", {"C10": 0.7, "C20": -0.1, "C30": 0.02}, 1e-10),
+    (
+        "rivlin:C10,C01,C11,C20,C30", [0.7, 0.2, 0.03, -0.1, 0.02],
+        "third_order_deformation", {"C10": 0.7, "C01": 0.2, "C11": 0.03, "C20": -0.1, "C30": 0.02}, 1e-10,
+    ),
+    ("ogden-2", [0.7, 0.2, 3.1, -2.3], "ogden", {"mu": [0.7, 0.2], "alpha": [3.1, -2.3]}, 1e-6),  # shifts equal roots
+    (
+        "extended-tube", [0.7, 0.2, LIMIT, 0.4],
+        "extended_tube", {"Gc": 0.7, "Ge": 0.2, "delta": LIMIT**-0.5, "beta": 0.4}, 1e-6,
+    ),
+    (
+        "van-der-waals", [0.7, 0.7 * 0.3, LIMIT],
+        "van_der_waals", {"mu": 0.7, "limit": (LIMIT + 3) ** 0.5, "a": 0.3, "beta": 0.0}, 2e-3,  # it adds 1e-4 to I1
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize(("name", "values", "function", "arguments", "near"), PAIRS, ids=[pair[0] for pair in PAIRS])
+def test_felupe_has_the_same_stress(mode, name, values, function, arguments, near):
+    law = felupe.Hyperelastic(getattr(felupe, function), **arguments)
+    stretches = np.array([np.broadcast_to(each, STRETCH.shape) for each in mode.principal_stretches(STRETCH)])
+    F = np.einsum("ij,in->ijn", np.eye(3), stretches)[..., None]
+    P = law.gradient([F, None])[0][..., 0]
+    expected = P[0, 0] - P[2, 2] * stretches[2] / stretches[0]  # the free face gives the pressure
+    found = engineering_stress(material_named(name), mode, STRETCH, values)
+    np.testing.assert_allclose(found, expected, rtol=near, atol=near * np.abs(expected).max())
