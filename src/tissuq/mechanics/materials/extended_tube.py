@@ -16,9 +16,9 @@ __all__ = ["ExtendedTube"]
 class ExtendedTube(StretchMaterial):
     """W = Gc/2 ((1 - 1/Jm) x/(1 - x/Jm) + ln(1 - x/Jm)) + 2 Ge/beta^2 sum over k of (l_k^-beta - 1), x = I1 - 3.
 
-    The initial shear modulus is Gc (1 - 2/Jm) + Ge. Kaliske & Heinrich write delta^2 for 1/Jm. At Jm = 2 the
-    crosslinks would have no modulus at the reference and below it a negative one, so that Jm is more. Made for rubber:
-    strains much smaller than that tell neither Gc nor Jm.
+    The initial shear modulus is Gc (1 - 2/Jm) + Ge. Kaliske & Heinrich write delta^2 for 1/Jm. At Jm = 2 the crosslinks
+    would have no modulus at the reference and below it a negative one, so that Jm is more. Made for rubber: strains
+    much smaller than that tell neither Gc nor Jm.
     """
 
     name = "extended-tube"
