@@ -156,9 +156,9 @@ class StatisticalModel:
     def design(self) -> FloatArray:
         """`basis` at the measured stretches; at the medians of the priors where it depends on parameters."""
         if len(self.experiment) > CHUNK:
-            return self.basis(self.experiment.stretch, self._usual_bent)
+            return self.basis(self.experiment.stretch, self.usual_bent)
         key = self.experiment.stretch.tobytes()
-        return _remembered_basis(self.material, self.discrepancy, self.experiment.mode, key, self._usual_bent)
+        return _remembered_basis(self.material, self.discrepancy, self.experiment.mode, key, self.usual_bent)
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -173,7 +173,7 @@ class StatisticalModel:
         InputError
             When the further measurements are in another loading mode.
         """
-        rows = np.column_stack([self.basis(experiment.stretch, self._usual_bent), experiment.stress])
+        rows = np.column_stack([self.basis(experiment.stretch, self.usual_bent), experiment.stress])
         known = self.statistics.joined(Statistics.of_rows([rows]))
         return replace(self, experiment=self.experiment.joined(experiment), known_statistics=known)
 
@@ -237,15 +237,13 @@ class StatisticalModel:
         for start in range(0, len(stress), CHUNK):
             block = slice(start, start + CHUNK)
             count = len(stress[block])
-            basis = self.basis(np.pad(stretch[block], (0, CHUNK - count), mode="edge"), self._usual_bent)
+            basis = self.basis(np.pad(stretch[block], (0, CHUNK - count), mode="edge"), self.usual_bent)
             yield np.column_stack([basis[:count], stress[block]])
 
     @cached_property
-    def _usual_bent(self) -> tuple[float, ...]:
+    def usual_bent(self) -> tuple[float, ...]:
         """The medians of the priors of `bent_symbols`; off zero, where a law may divide by it."""
-        middles = (float(prior.quantile(0.5)) for prior in self._bent_priors())
-        off = (float(prior.quantile(0.6)) for prior in self._bent_priors())
-        return tuple(middle or other for middle, other in zip(middles, off, strict=True))
+        return tuple(_off_zero(prior, 0.5) for prior in self._bent_priors())
 
     def _bent_priors(self) -> list[Prior]:
         own = {p.symbol: p for p in self.material.parameters}
@@ -255,7 +253,7 @@ class StatisticalModel:
         """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
         stretch = self.experiment.stretch
         some = stretch[:: max(1, len(stretch) // CHUNK)]
-        bent = np.array([[prior.quantile(q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
+        bent = np.array([[_off_zero(prior, q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
         columns = stress_basis(self.material, self.experiment.mode, some, bent)
         return np.asarray(np.linalg.norm(columns, axis=1).min(axis=0) * np.sqrt(len(stretch) / len(some)))
 
@@ -325,7 +323,7 @@ class StatisticalModel:
                 "itself: choose the noise 'unknown', or round the stretches to the steps of the test."
             )
         low, high = float(self.experiment.stretch.min()), float(self.experiment.stretch.max())
-        _check_linearity(self.material, self.experiment.mode, low, high, self._usual_bent)
+        _check_linearity(self.material, self.experiment.mode, low, high, self.usual_bent)
         triangle = self.statistics.triangle[:, :-1]
         lengths = np.linalg.norm(triangle, axis=0)
         if not lengths.all() or np.linalg.cond(triangle / lengths) > 1e10:
@@ -334,6 +332,11 @@ class StatisticalModel:
                 f"{', '.join(self.column_symbols)}: measure at more or other stretches, or choose a simpler "
                 "material or discrepancy."
             )
+
+
+def _off_zero(prior: Prior, probability: float) -> float:
+    """Return a quantile, or where that is zero, by which laws may divide, one nearby."""
+    return float(prior.quantile(probability)) or float(prior.quantile(probability + 0.005))
 
 
 @lru_cache(maxsize=256)

@@ -136,3 +136,14 @@ def test_three_terms_with_everything_unknown_go_to_nuts_with_an_evidence_by_smc(
     assert np.isfinite(posterior.log_evidence)
     assert posterior.log_evidence_error > 0
     assert posterior.data.attrs["method_reason"] == reason
+
+
+@pytest.mark.parametrize("prior", [tq.Uniform(-40, 40), tq.Normal(0, 10)], ids=str)
+def test_a_prior_of_an_exponent_about_zero_where_the_law_divides_by_it_is_no_obstacle(prior):
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.03, seed=1)
+    tables = [
+        tq.fit(data, material="ogden-1", discrepancy="none", noise_sd=0.03, priors={"alpha1": each}).summary()
+        for each in (prior, tq.Uniform(0.5, 40))
+    ]
+    sd = tables[1].loc["mu1", "sd"]
+    assert tables[0].loc["mu1", "mean"] == pytest.approx(tables[1].loc["mu1", "mean"], abs=0.05 * sd)

@@ -49,12 +49,8 @@ def modulus(solution: Solution) -> Marginal:
 
 def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:
     """Return the parameters that the initial shear modulus is made of."""
-    moduli = np.abs(_moduli(model, np.array([_usual(model)])))[0]
+    moduli = np.abs(_moduli(model, np.array([model.usual_bent])))[0]
     return tuple(s for s, size in zip(model.column_symbols, moduli, strict=True) if size > 1e-6 * moduli.max())
-
-
-def _usual(model: StatisticalModel) -> list[float]:
-    return [float(model.priors[symbol].quantile(0.5)) for symbol in model.bent_symbols]
 
 
 def _moduli(model: StatisticalModel, bent: FloatArray) -> FloatArray:
