@@ -100,7 +100,7 @@ def test_the_design_is_judged(stretch, words):
 
 
 def test_a_parameter_that_is_not_linear_is_assessed_too(data):
-    posterior = tq.fit(data, discrepancy="yeoh", noise_sd=0.02, priors={"C10": tq.HalfNormal(2.0)})
+    posterior = tq.fit(data, discrepancy="yeoh", noise_sd=0.02, priors={"C10": tq.LogNormal(1.0, 1.0)})
     assert posterior.assess().between == 0
 
 

@@ -207,7 +207,7 @@ def test_a_prior_that_is_not_conjugate_is_integrated_numerically():
 
 
 def test_four_nonlinear_parameters_are_refused_with_the_reason(paper):
-    priors = {"C10": tq.HalfNormal(2.0)}
+    priors = {"C10": tq.LogNormal(1.0, 1.0)}
     with pytest.raises(tq.ModelError, match=r"at most 3 nonlinear parameters.*4 .*nuts"):
         tq.fit(paper.experiment(), discrepancy="gp", priors=priors, method="exact")
 

@@ -120,7 +120,7 @@ def test_the_joint_method_gives_no_evidence_and_says_how_it_converged(paper):
 
 
 def test_four_nonlinear_parameters_are_sampled_on_auto(paper):
-    priors = {"C10": tq.HalfNormal(2.0)}
+    priors = {"C10": tq.LogNormal(1.0, 1.0)}
     posterior = tq.fit(paper.experiment(), discrepancy="gp", priors=priors)
     assert posterior.solution.route == "nuts"
     assert "at most 3 nonlinear parameters" in posterior.solution.reason
