@@ -96,7 +96,10 @@ def test_proportional_noise_is_integrated():
         assert table.loc[symbol, "mean"] == pytest.approx(centre, abs=0.1 * sd)
 
 
-@pytest.mark.parametrize("prior", [tq.Normal(0.6, 0.03, 0), tq.LogNormal(0.6, 0.1), tq.HalfNormal(0.3), tq.Exponential(0.4)], ids=str)
+PLAIN = [tq.Normal(0.6, 0.03, 0), tq.LogNormal(0.6, 0.1), tq.HalfNormal(0.3), tq.Exponential(0.4)]
+
+
+@pytest.mark.parametrize("prior", PLAIN, ids=str)
 def test_any_prior_of_a_material_parameter_is_integrated(prior):
     values = np.linspace(0.3, 0.8, 1001)
     log_density, mean, variance = conditional(UNIT, NOISE_SD, 1.0)
