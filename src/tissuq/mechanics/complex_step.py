@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.path import STEP
 
@@ -23,7 +23,7 @@ AGREEMENT = 1e-6
 
 
 def complex_step_stress(
-    material: Material, mode: LoadingMode, stretch: FloatArray, values: FloatArray
+    material: Material, mode: Path, stretch: FloatArray, values: FloatArray
 ) -> FloatArray | None:
     """Return engineering stresses (m, n) at stretches (n,) for parameter values (m, k), or None.
 
@@ -34,12 +34,12 @@ def complex_step_stress(
         return None
     parameters = values.T[:, :, None]
 
-    def energy(points: Any) -> Any:
-        return material.energy(mode.principal_stretches(points), parameters)
+    def energy(step: Any) -> Any:
+        return material.energy_of(mode.moved(stretch, step), parameters)
 
     try:
         with np.errstate(all="ignore"):
-            found, after, before = (energy(stretch + step) for step in (1j * STEP, REAL_STEP, -REAL_STEP))
+            found, after, before = (energy(step) for step in (1j * STEP, REAL_STEP, -REAL_STEP))
     except (TypeError, ValueError):
         return None
     if not all(isinstance(each, np.ndarray) for each in (found, after, before)) or not np.iscomplexobj(found):

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tissuq.experiments.modes import Deformation
 from tissuq.parameters import Parameter
 from tissuq.registry import variants
 
@@ -45,6 +46,10 @@ class Material(ABC):
         """Return the same energy (MPa) from the three principal stretches: what stress is derived from."""
         first, second, third = (stretch * stretch for stretch in stretches)
         return self.strain_energy(first + second + third, first * second + second * third + third * first, values)
+
+    def energy_of(self, deformation: Deformation, values: Any) -> Any:
+        """Return the same energy (MPa) of a deformation; a material with directions sees more than the stretches."""
+        return self.energy(deformation.stretches, values)
 
 
 class StretchMaterial(Material):

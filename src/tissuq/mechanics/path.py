@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 
 __all__ = ["STEP", "invariant_rates", "invariants", "log_stretches"]
 
@@ -15,25 +15,25 @@ STEP = 1e-30
 """Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
 
 
-def log_stretches(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def log_stretches(mode: Path, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the logarithms (n, 3) of the principal stretches and their rates (n, 3) along a mode.
 
     Divided by the number of loaded axes, so that the engineering stress of a separable energy
     w(l1) + w(l2) + w(l3) is sum_k l_k w'(l_k) rate_k.
     """
     points = np.asarray(stretch, dtype=np.float64)
-    principal = mode.principal_stretches(points + 1j * STEP)
-    logs = np.log(np.stack([np.broadcast_to(each, points.shape).astype(complex) for each in principal], axis=-1))
+    principal = mode.moved(points, 1j * STEP).stretches
+    logs = np.log(np.stack([np.broadcast_to(each, len(points)).astype(complex) for each in principal], axis=-1))
     return np.asarray(logs.real), np.asarray(logs.imag / STEP / mode.loaded_axes)
 
 
-def invariants(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def invariants(mode: Path, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return I1 - 3 and I2 - 3, (n,) each; their digits near the reference are kept."""
     logs, _ = log_stretches(mode, stretch)
     return np.expm1(2 * logs).sum(axis=1), np.expm1(-2 * logs).sum(axis=1)
 
 
-def invariant_rates(mode: LoadingMode, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def invariant_rates(mode: Path, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the engineering stresses (n,) of the energies I1 and I2."""
     logs, rates = log_stretches(mode, stretch)
     return (2 * np.exp(2 * logs) * rates).sum(axis=1), (-2 * np.exp(-2 * logs) * rates).sum(axis=1)

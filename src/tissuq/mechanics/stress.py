@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode, Uniaxial
+from tissuq.experiments.modes import Path, Uniaxial
 from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.material import Material
 
 __all__ = ["engineering_stress", "initial_shear_modulus", "path_energy", "stress_basis", "traced_stress_basis"]
 
 
-def path_energy(material: Material, mode: LoadingMode, stretch: Any, values: Any) -> Any:
-    """Return the strain energy (MPa) of a material at one stretch of a loading mode; JAX differentiates it."""
-    return material.energy(mode.principal_stretches(stretch), values)
+def path_energy(material: Material, mode: Path, stretch: Any, values: Any, step: Any = 0.0) -> Any:
+    """Return the strain energy (MPa) of a material a step further than a stretch of a mode; JAX differentiates it."""
+    return material.energy_of(mode.moved(stretch, step), values)
 
 
 def engineering_stress(
-    material: Material, mode: LoadingMode, stretch: ArrayLike, values: ArrayLike
+    material: Material, mode: Path, stretch: ArrayLike, values: ArrayLike
 ) -> NDArray[np.float64]:
     """Return the engineering stress, (1 / loaded axes) dW/dstretch.
 
@@ -68,7 +68,7 @@ def engineering_stress(
 
 
 def stress_basis(
-    material: Material, mode: LoadingMode, stretch: ArrayLike, nonlinear: ArrayLike = ()
+    material: Material, mode: Path, stretch: ArrayLike, nonlinear: ArrayLike = ()
 ) -> NDArray[np.float64]:
     """Return the stresses of unit linear parameters: the columns of a model linear in them.
 
@@ -113,7 +113,7 @@ def stress_basis(
     return bases if settings.ndim == 2 else np.asarray(bases[0])
 
 
-def traced_stress_basis(material: Material, mode: LoadingMode, stretch: Any, nonlinear: Any) -> Any:
+def traced_stress_basis(material: Material, mode: Path, stretch: Any, nonlinear: Any) -> Any:
     """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
     _check_nonlinear(material, np.shape(nonlinear))
     jnp = differentiator().numpy
@@ -139,24 +139,24 @@ def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
         return float(_initial_slope(material)(np.asarray(values, dtype=np.float64))) / 3
 
 
-def _stresses(material: Material, mode: LoadingMode) -> Any:
+def _stresses(material: Material, mode: Path) -> Any:
     """Return the function of stretches (n,) and parameter values (m, k) that gives stresses (m, n)."""
     jax = differentiator()
 
     def stress(stretch: Any, values: Any) -> Any:
-        slope = jax.grad(path_energy, argnums=2)(material, mode, stretch, values)
+        slope = jax.grad(path_energy, argnums=4)(material, mode, stretch, values, 0.0)
         return slope / mode.loaded_axes
 
     return jax.vmap(jax.vmap(stress, (0, None)), (None, 0))
 
 
 @lru_cache(maxsize=256)
-def _curves(material: Material, mode: LoadingMode) -> Any:
+def _curves(material: Material, mode: Path) -> Any:
     return differentiator().jit(_stresses(material, mode))
 
 
 @lru_cache(maxsize=256)
-def _bases(material: Material, mode: LoadingMode) -> Any:
+def _bases(material: Material, mode: Path) -> Any:
     jax = differentiator()
     basis = partial(traced_stress_basis, material, mode)
     return jax.jit(jax.vmap(basis, (None, 0)))

@@ -7,6 +7,7 @@ from itertools import accumulate, combinations, pairwise
 from typing import Any
 
 from tissuq.errors import ModelError
+from tissuq.experiments.modes import Deformation
 from tissuq.mechanics.material import Material
 from tissuq.parameters import Parameter
 
@@ -69,6 +70,9 @@ class MaterialSum(Material):
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         return sum(part.energy(stretches, own) for part, own in self._shares(values))
+
+    def energy_of(self, deformation: Deformation, values: Any) -> Any:
+        return sum(part.energy_of(deformation, own) for part, own in self._shares(values))
 
     def _shares(self, values: Any) -> list[tuple[Material, Any]]:
         """Return every part with its values."""
