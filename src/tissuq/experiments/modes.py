@@ -59,6 +59,7 @@ class LoadingMode(Path):
 
     name: ClassVar[str]
     description: ClassVar[str]
+
     @abstractmethod
     def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
         """Return the diagonal of F for a stretch (dimensionless): plain arithmetic, differentiable."""

@@ -23,9 +23,7 @@ def path_energy(material: Material, mode: Path, stretch: Any, values: Any, step:
     return material.energy_of(mode.moved(stretch, step), values)
 
 
-def engineering_stress(
-    material: Material, mode: Path, stretch: ArrayLike, values: ArrayLike
-) -> NDArray[np.float64]:
+def engineering_stress(material: Material, mode: Path, stretch: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
     """Return the engineering stress, (1 / loaded axes) dW/dstretch.
 
     Parameters
@@ -67,9 +65,7 @@ def engineering_stress(
     return curves if values.ndim == 2 else np.asarray(curves[0])
 
 
-def stress_basis(
-    material: Material, mode: Path, stretch: ArrayLike, nonlinear: ArrayLike = ()
-) -> NDArray[np.float64]:
+def stress_basis(material: Material, mode: Path, stretch: ArrayLike, nonlinear: ArrayLike = ()) -> NDArray[np.float64]:
     """Return the stresses of unit linear parameters: the columns of a model linear in them.
 
     Parameters
