@@ -14,8 +14,8 @@ from tissuq.registry import variants
 
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
-    "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "noise",
-    "statistics", "scales", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting",
+    "errors", "registry", "gaussian", "priors", "parameters", "smoothing", "experiments", "mechanics", "discrepancy",
+    "noise", "statistics", "scales", "whitening", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting",
     "studies", "report", "cli", "__main__",
 ]  # fmt: skip
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from numbers import Integral
 from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.discrepancy import Discrepancy, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
@@ -15,27 +18,34 @@ from tissuq.inference.energies import solve_energies
 from tissuq.inference.exact import solve_exactly, why_not_exact
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import Material, material_named
+from tissuq.mechanics.joint import joined
 from tissuq.model import StatisticalModel
 from tissuq.noise import Noise, noise_named
 from tissuq.posterior import Posterior
+from tissuq.prediction.moments import mean_curve
 from tissuq.priors import Prior
+from tissuq.whitening import BETWEEN_SPECIMENS, Tolerances
 
 __all__ = ["METHODS", "Method", "fit", "fit_many"]
 
+FloatArray = NDArray[np.float64]
 Method = Literal["auto", "exact", "nuts", "smc", "joint"]
 FACTORISED = 3
 """Parameters of the structure from which `auto` samples."""
+ROUNDS = 2
+"""In which the curve is found along which whole tests err."""
 METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
 
 
 def fit(
-    data: Experiment,
+    data: Experiment | Sequence[Experiment],
     *,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
-    noise_sd: float | Literal["unknown"] | None = None,
+    noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
+    tolerances: Tolerances | None = None,
     method: Method = "auto",
     seed: int = 0,
 ) -> Posterior:
@@ -43,20 +53,26 @@ def fit(
 
     Parameters
     ----------
-    data : Experiment
-        The measurements.
+    data : Experiment or sequence of Experiment
+        The measurements: of one test, or of several in any modes, which share one material. A discrepancy that is an
+        energy acts in all of them; one in stress is another in each test, of the same size.
     discrepancy : str or Discrepancy
         What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object; ``"auto"`` is
         an average of strain energies that leave the initial shear modulus alone, by the evidence.
     material : str or Material
         The material whose parameters are wanted.
     noise_sd : float or "unknown"
-        Standard deviation of the measurement noise in MPa; unknown, as when nothing is said, makes it a parameter.
+        Standard deviation of the measurement noise in MPa; unknown, as when nothing is said, makes it a parameter. For
+        several tests a sequence of numbers, one for each, is taken, too; where it is unknown, its ratios between the
+        tests are those of their scatter about smooth curves, and noise_sd is its geometric mean.
     noise : str or Noise
         Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), or ``"repeats"`` (told
         by repeated measurements at the same stretch).
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
+    tolerances : Tolerances
+        By how much whole tests may be off, such as ``Tolerances(stress=0.1, length=0.02)``; by default tests of
+        different specimens agree to 15 % in stress, and a single test has no such errors.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
@@ -98,19 +114,21 @@ def fit(
         noise_sd=noise_sd,
         noise=noise,
         priors=priors,
+        tolerances=tolerances,
         method=method,
         seed=seed,
     )[0]
 
 
 def fit_many(
-    datasets: Sequence[Experiment],
+    datasets: Sequence[Experiment | Sequence[Experiment]],
     *,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
-    noise_sd: float | Literal["unknown"] | None = None,
+    noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
+    tolerances: Tolerances | None = None,
     method: Method = "auto",
     seed: int = 0,
 ) -> list[Posterior]:
@@ -122,7 +140,8 @@ def fit_many(
 
     Parameters
     ----------
-    datasets : sequence of Experiment
+    datasets : sequence of Experiment, or of sequences of them
+        Several tests that belong together count as one data set.
 
     Returns
     -------
@@ -147,12 +166,17 @@ def fit_many(
         raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
     chosen = noise_named(noise if noise is not None else "unknown" if noise_sd is None else noise_sd)
     parts = discrepancy_named(discrepancy), material_named(material), chosen
-    recipe = _Recipe(*parts, dict(priors or {}), method, seed)
-    keys = [(data.mode.name, data.stretch.tobytes()) for data in datasets]
+    recipe = _Recipe(*parts, dict(priors or {}), tolerances, method, seed)
+    every = [joined(data) for data in datasets]
+    is_shared = [len(data.parts) == 1 and not tolerances for data in every]
+    keys = [
+        (data.mode.name, data.stretch.tobytes(), 0 if shared else place)
+        for place, (data, shared) in enumerate(zip(every, is_shared, strict=True))
+    ]
     found: dict[int, Posterior] = {}
     for _, group in groupby(sorted(range(len(keys)), key=keys.__getitem__), key=keys.__getitem__):
         places = list(group)
-        found |= zip(places, recipe.posteriors([datasets[place] for place in places]), strict=True)
+        found |= zip(places, recipe.posteriors([every[place] for place in places]), strict=True)
     return [found[place] for place in range(len(datasets))]
 
 
@@ -164,18 +188,32 @@ class _Recipe:
     material: Material
     noise: Noise
     priors: Mapping[str, Prior]
+    tolerances: Tolerances | None
     method: Method
     seed: int
 
     def posteriors(self, datasets: Sequence[Experiment]) -> list[Posterior]:
         """Fit experiments on the same stretches."""
-        return self.solved(
-            [StatisticalModel(data, self.material, self.discrepancy, self.noise, self.priors) for data in datasets]
-        )
+        return self.solved([self._model(data) for data in datasets])
+
+    def _model(self, data: Experiment) -> StatisticalModel:
+        chosen = Tolerances() if self.tolerances is None else self.tolerances
+        model = StatisticalModel(data, self.material, self.discrepancy, self.noise, self.priors, chosen)
+        return model if self.tolerances is not None else replace(model, tolerances=_usual_tolerances(model))
 
     def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
         """Return the posteriors of models on the same stretches."""
-        return [Posterior(solution, self.seed, self.solved) for solution in self._solve(models)]
+        ready = [self._with_curve(model) for model in models]
+        return [Posterior(solution, self.seed, self.solved) for solution in self._solve(ready)]
+
+    def _with_curve(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model with tolerances along its own mean curve: as if there were none, and then with these."""
+        if not model.tolerances or model.curve is not None:
+            return model
+        pilot = replace(model, tolerances=Tolerances())
+        for _ in range(ROUNDS):
+            pilot = replace(model, curve=mean_curve(self._solve([pilot])[0]))
+        return pilot
 
     def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
         """Solve models on the same stretches: together by the exact route, one by one by the others."""
@@ -211,6 +249,13 @@ class _Recipe:
         if self.method == "smc":
             return sampled.sample_smc_given(model, self.seed)
         return sampled.sample_nuts_given(model, self.seed, refusal)
+
+
+def _usual_tolerances(model: StatisticalModel) -> Tolerances:
+    """Return the tolerances where nothing is said: none within a specimen, or where something else takes them up."""
+    specimens = [part.specimen or number for number, part in enumerate(model.experiment.parts)]
+    is_plain = not (model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy)
+    return BETWEEN_SPECIMENS if len(set(specimens)) > 1 and is_plain else Tolerances()
 
 
 def _why_not_soon(model: StatisticalModel) -> str:

@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.discrepancy import Discrepancy, EnergyDiscrepancy, Member
+from tissuq.discrepancy import Discrepancy, EnergyDiscrepancy, Member, separated
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import LoadingMode, Path
 from tissuq.mechanics import Material, engineering_stress, stress_basis
+from tissuq.mechanics.joint import TEST
 from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
 from tissuq.priors import Flat, Prior, Uniform
 from tissuq.scales import default_prior, support
 from tissuq.statistics import CHUNK, Statistics
+from tissuq.whitening import Tolerances, Whitening, whitening
 
 __all__ = ["StatisticalModel"]
 
@@ -51,6 +53,10 @@ class StatisticalModel:
         Standard deviation in MPa, or the name of a noise with parameters (``"unknown"``).
     chosen_priors : mapping of str to Prior
         Priors in MPa that replace the defaults.
+    tolerances : Tolerances
+        By how much whole tests may be off; nothing, where nothing is said.
+    curve : (n,) array, MPa, optional
+        About what stress the measurements have without errors, along which tolerances act; `tissuq.fit` finds it.
     known_statistics : Statistics, optional
         `statistics`, where they are known already.
 
@@ -67,12 +73,15 @@ class StatisticalModel:
     discrepancy: Discrepancy
     noise: Noise = "unknown"  # type: ignore[assignment]  # a name or a number becomes a Noise
     chosen_priors: Mapping[str, Prior] = field(default_factory=dict)
+    tolerances: Tolerances = Tolerances()  # noqa: RUF009 (frozen)
+    curve: FloatArray | None = None
     known_statistics: Statistics | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", noise_named(self.noise))
-        object.__setattr__(self, "discrepancy", self.discrepancy.adapted_to(self.material, self.experiment))
+        object.__setattr__(self, "discrepancy", separated(self.discrepancy, self.material, self.experiment))
         self._check_parameters()
+        self._check_tolerances()
         self._check_priors()
         self._check_data()
 
@@ -153,12 +162,56 @@ class StatisticalModel:
         return self.material.parameters[0].symbol
 
     @cached_property
+    def whitening(self) -> Whitening | None:
+        """What makes the errors of several tests independent and equal; None where they are so already."""
+        if len(self.experiment.parts) == 1 and not self.tolerances:
+            return None
+        noise_sd = self.noise.of_tests(self.experiment)
+        usual = float(np.exp(np.log(noise_sd).mean()))
+        if self.noise.depends_on_level:
+            noise_sd = np.full(len(noise_sd), usual)
+        return whitening(self.experiment, noise_sd, usual, self.tolerances, self.curve)
+
+    def white(self, columns: Any) -> Any:
+        """Return columns (n,) or (n, k) of the measurements in units in which their errors are independent and equal.
+
+        Everything that inference sees of the data is whitened.
+        """
+        return columns if self.whitening is None else self.whitening(columns)
+
+    def relative_noise(self, points: FloatArray) -> Any:
+        """Return the noise over noise_sd at points (g,) or rows (g, 14): that of the test; one where there is none."""
+        if self.whitening is None or len(self.experiment.parts) == 1:
+            return 1.0
+        first = np.cumsum([0, *(part.stress.size for part in self.experiment.parts[:-1])])
+        return np.append(self.whitening.size[first], 1.0)[points[:, TEST].astype(int)]
+
+    @property
+    def log_whitening(self) -> float:
+        """What whitening adds to the log density of the data."""
+        return 0.0 if self.whitening is None else self.whitening.log_determinant
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """The measured stresses (n,), whitened."""
+        return np.asarray(self.white(self.experiment.stress))
+
+    @cached_property
     def design(self) -> FloatArray:
-        """`basis` at the measured stretches; at the medians of the priors where it depends on parameters."""
-        if len(self.experiment) > CHUNK:
-            return self.basis(self.experiment.stretch, self.usual_bent)
+        """`basis` at the measurements, whitened; at the medians of the priors where it depends on parameters."""
+        if len(self.experiment) > CHUNK or self.whitening is not None:
+            return self.design_at(self.usual_bent)
         key = self.experiment.stretch.tobytes()
         return _remembered_basis(self.material, self.discrepancy, self.experiment.mode, key, self.usual_bent)
+
+    def design_at(self, bent: ArrayLike) -> FloatArray:
+        """Return `basis` (n, k) at the measurements, whitened, at values (s,) of `bent_symbols`."""
+        return np.asarray(self.white(self.basis(self.experiment.stretch, bent)))
+
+    def energy_features(self, place: int) -> list[FloatArray]:
+        """Return the stresses (n, r) of each block's terms of a member at the measurements, whitened."""
+        features = self.energy_members[place].stress_features(self.experiment.mode, self.experiment.stretch)
+        return [np.asarray(self.white(each)) for each in features]
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -173,9 +226,11 @@ class StatisticalModel:
         InputError
             When the further measurements are in another loading mode.
         """
+        both = self.experiment.joined(experiment)
+        if self.whitening is not None:
+            return replace(self, experiment=both)
         rows = np.column_stack([self.basis(experiment.stretch, self.usual_bent), experiment.stress])
-        known = self.statistics.joined(Statistics.of_rows([rows]))
-        return replace(self, experiment=self.experiment.joined(experiment), known_statistics=known)
+        return replace(self, experiment=both, known_statistics=self.statistics.joined(Statistics.of_rows([rows])))
 
     def noise_variance(self, values: Mapping[str, Any], level: Any) -> Any:
         """Return the variance (MPa^2) of the measurement noise where the absolute stress has a level (MPa)."""
@@ -231,8 +286,8 @@ class StatisticalModel:
     def _rows(self) -> Iterator[FloatArray]:
         """Yield the rows [X y], block by block; every block has one length, so that JAX compiles once."""
         stretch, stress = self.experiment.stretch, self.experiment.stress
-        if len(stress) <= CHUNK:
-            yield np.column_stack([self.design, stress])
+        if len(stress) <= CHUNK or self.whitening is not None:
+            yield np.column_stack([self.design, self.stress])
             return
         for start in range(0, len(stress), CHUNK):
             block = slice(start, start + CHUNK)
@@ -252,9 +307,10 @@ class StatisticalModel:
     def _shortest_columns(self) -> FloatArray:
         """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
         stretch = self.experiment.stretch
-        some = stretch[:: max(1, len(stretch) // CHUNK)]
+        some = stretch if self.whitening is not None else stretch[:: max(1, len(stretch) // CHUNK)]
         bent = np.array([[_off_zero(prior, q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
-        columns = stress_basis(self.material, self.experiment.mode, some, bent)
+        bases = stress_basis(self.material, self.experiment.mode, some, bent)
+        columns = np.array([self.white(basis) for basis in bases])
         return np.asarray(np.linalg.norm(columns, axis=1).min(axis=0) * np.sqrt(len(stretch) / len(some)))
 
     def _chosen_prior(self, parameter: Parameter) -> Prior | None:
@@ -298,6 +354,20 @@ class StatisticalModel:
                 f"'{self.material.name}' has already: no data can tell the two apart. Choose another of the two."
             )
 
+    def _check_tolerances(self) -> None:
+        if not self.tolerances:
+            return
+        if self.discrepancy.is_correlated:
+            raise ModelError(
+                f"discrepancy '{self.discrepancy.name}' takes up errors of a whole test itself: choose no tolerances, "
+                "or a discrepancy that is an energy, such as 'auto'."
+            )
+        if self.noise.depends_on_level or self.noise.shares_discrepancy:
+            raise ModelError(
+                f"noise '{self.noise}' and tolerances of whole tests do not go together: choose the noise 'unknown', "
+                "or tolerances=Tolerances(), which are none."
+            )
+
     def _check_priors(self) -> None:
         for symbol in self.chosen_priors:
             if symbol not in self.symbols:
@@ -317,13 +387,17 @@ class StatisticalModel:
             )
         if not self.experiment.stress.any():
             raise InputError(f"experiment '{name}': every stress is zero, so there is nothing to identify.")
+        if self.noise.shares_discrepancy and len(self.experiment.parts) > 1:
+            raise InputError(f"noise '{self.noise}' is for one test: choose the noise 'unknown' for several.")
         if self.noise.shares_discrepancy and len(np.unique(self.experiment.stretch)) == n:
             raise InputError(
                 f"experiment '{name}' has no two measurements at the same stretch, so nothing tells the noise by "
                 "itself: choose the noise 'unknown', or round the stretches to the steps of the test."
             )
-        low, high = float(self.experiment.stretch.min()), float(self.experiment.stretch.max())
-        _check_linearity(self.material, self.experiment.mode, low, high, self.usual_bent)
+        for part in self.experiment.parts:
+            for path in part.mode.channels:
+                ends = np.array([part.stretch.min(axis=0), part.stretch.max(axis=0)])
+                _check_linearity(self.material, path, ends.tobytes(), ends.shape, self.usual_bent)
         triangle = self.statistics.triangle[:, :-1]
         lengths = np.linalg.norm(triangle, axis=0)
         if not lengths.all() or np.linalg.cond(triangle / lengths) > 1e10:
@@ -354,8 +428,11 @@ def _basis(
 
 
 @lru_cache(maxsize=256)
-def _check_linearity(material: Material, mode: LoadingMode, low: float, high: float, bent: tuple[float, ...]) -> None:
+def _check_linearity(
+    material: Material, mode: Path, ends: bytes, shape: tuple[int, ...], bent: tuple[float, ...]
+) -> None:
     """Refuse a material whose stress is not proportional to the parameters that it calls linear."""
+    low, high = np.frombuffer(ends).reshape(shape)
     stretch = np.linspace(low, high, 16)
     is_linear = np.array([p.is_linear for p in material.parameters])
     tried = np.empty((is_linear.sum() + 1, len(is_linear)))

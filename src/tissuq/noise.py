@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from numbers import Real
@@ -17,8 +17,18 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.parameters import Parameter
 from tissuq.priors import Uniform
 from tissuq.registry import find, variants
+from tissuq.smoothing import scatter, smoothed
 
-__all__ = ["KnownNoise", "Noise", "ProportionalNoise", "RepeatNoise", "UnknownNoise", "noise_named", "stress_level"]
+__all__ = [
+    "KnownNoise",
+    "KnownNoises",
+    "Noise",
+    "ProportionalNoise",
+    "RepeatNoise",
+    "UnknownNoise",
+    "noise_named",
+    "stress_level",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -26,8 +36,8 @@ NOISE_SD = Parameter.scale("noise_sd", "standard deviation of the measurement no
 NOISE_SHARE = Parameter(
     "noise_share", "noise per measured stress", "number", (0.0, inf), is_linear=False, relative_prior=Uniform(0.0, 1.0)
 )
-SMOOTHED = 2000
-"""Stretches at most between which the stress is smoothed."""
+LEAST_SCATTER = 0.005
+"""Of a test's root mean square stress: averaged and digitised curves are smooth, and not for that exact."""
 LEVELS = 200
 """Levels of the stress at most that many measurements are sorted into."""
 
@@ -51,6 +61,13 @@ class Noise(ABC):
     def sd(self, values: Mapping[str, Any], level: Any) -> Any:
         """Return the standard deviation (MPa) for parameter values, at absolute stresses (MPa)."""
 
+    def of_tests(self, experiment: Experiment) -> FloatArray:
+        """Return the noise (tests,) of each of several tests as known or about, MPa; their ratios are taken as known.
+
+        Here by the scatter of each test about a smooth curve.
+        """
+        return np.array([_scatter_of(part) for part in experiment.parts])
+
 
 @dataclass(frozen=True)
 class KnownNoise(Noise):
@@ -71,8 +88,29 @@ class KnownNoise(Noise):
     def sd(self, values: Mapping[str, Any], level: Any) -> Any:
         return self.value
 
+    def of_tests(self, experiment: Experiment) -> FloatArray:
+        return np.full(len(experiment.parts), self.value)
+
     def __str__(self) -> str:
         return str(self.value)
+
+
+@dataclass(frozen=True)
+class KnownNoises(KnownNoise):
+    """Known standard deviations, one for each of several tests; ``value`` is their geometric mean."""
+
+    every: tuple[float, ...] = ()
+
+    def of_tests(self, experiment: Experiment) -> FloatArray:
+        if len(self.every) != len(experiment.parts):
+            raise InputError(
+                f"noise_sd has {len(self.every)} values for {len(experiment.parts)} tests: give one for each, or one "
+                "number for all."
+            )
+        return np.array(self.every)
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self.every))
 
 
 class UnknownNoise(Noise):
@@ -117,8 +155,10 @@ class RepeatNoise(UnknownNoise):
     shares_discrepancy = True
 
 
-def noise_named(noise: float | str | Noise) -> Noise:
-    """Return the noise of that name or known standard deviation (MPa); a noise is returned as it is.
+def noise_named(noise: float | Sequence[float] | str | Noise) -> Noise:
+    """Return the noise of that name, or of known standard deviation (MPa), or of one for each of several tests.
+
+    A noise is returned as it is.
 
     Raises
     ------
@@ -127,32 +167,42 @@ def noise_named(noise: float | str | Noise) -> Noise:
     """
     if isinstance(noise, Noise):
         return noise
+    if isinstance(noise, (Sequence, np.ndarray)) and not isinstance(noise, str):
+        every = tuple(float(KnownNoise(each).value) for each in noise)
+        return KnownNoises(float(np.exp(np.log(every).mean())), every)
     if not isinstance(noise, str):
         return KnownNoise(noise)
-    options = [name for name, kind in variants(Noise).items() if kind is not KnownNoise]
+    options = [name for name, kind in variants(Noise).items() if not issubclass(kind, KnownNoise)]
     if noise not in options:
         raise InputError(f"noise must be a positive number of MPa or one of {', '.join(options)}; not '{noise}'.")
     return find(Noise, "noise", noise, InputError)()
 
 
 def stress_level(experiment: Experiment) -> FloatArray:
-    """Return the size (n,) of the stress at every measurement, MPa: a smoothing spline through the data.
+    """Return the size (n,) of the stress at every measurement, MPa: a smoothing spline through each test.
 
-    Generalised cross-validation chooses how smooth (SciPy); with fewer than five stretches it is the mean
-    measured stress at each. Many measurements are sorted into two hundred levels, half a percent of the range apart.
+    Many measurements are sorted into two hundred levels, half a percent of the range apart.
     """
-    stretch, place, count = np.unique(experiment.stretch, return_inverse=True, return_counts=True)
-    if len(stretch) > SMOOTHED:
-        edges = np.linspace(stretch[0], stretch[-1], SMOOTHED + 1)[1:-1]
-        _, place, count = np.unique(np.searchsorted(edges, experiment.stretch), return_inverse=True, return_counts=True)
-        stretch = np.bincount(place, experiment.stretch) / count
-    stress = np.bincount(place, experiment.stress) / count
-    if len(stretch) < 5:
-        return np.asarray(np.abs(stress)[place])
-    from scipy.interpolate import make_smoothing_spline
-
-    level = np.abs(make_smoothing_spline(stretch, stress, w=count)(experiment.stretch))
+    level = np.concatenate([_level_of(part) for part in experiment.parts])
     if len(level) > LEVELS and np.ptp(level) > 0:
         step = np.ptp(level) / LEVELS
         level = level.min() + np.minimum((level - level.min()) // step, LEVELS - 1) * step + 0.5 * step
     return np.asarray(level)
+
+
+def _level_of(test: Experiment) -> FloatArray:
+    if test.stretch.ndim > 1:
+        return np.asarray(np.abs(test.stress.T.ravel()))
+    stresses = test.stress.reshape(len(test.stress), -1).T
+    pairs = zip(test.mode.channels, stresses, strict=True)
+    return np.concatenate([np.abs(smoothed(path.abscissa(test.stretch), stress).stress) for path, stress in pairs])
+
+
+def _scatter_of(test: Experiment) -> float:
+    """Return the scatter (MPa) of a test about a smooth curve, and half a percent of its stress at least."""
+    least = LEAST_SCATTER * float(np.sqrt((test.stress**2).mean()))
+    if test.stretch.ndim > 1:
+        return least
+    stresses = test.stress.reshape(len(test.stress), -1).T
+    pairs = zip(test.mode.channels, stresses, strict=True)
+    return max(least, *(scatter(path.abscissa(test.stretch), stress) or least for path, stress in pairs))

@@ -156,7 +156,7 @@ class Posterior:
         """
         import pandas as pd
 
-        asked = self.model.experiment.mode if mode is None else loading_mode(mode)
+        asked = self.model.experiment.modes[0] if mode is None else loading_mode(mode)
         ends = calibrated_range(self.model.experiment, asked)
         at = np.linspace(*ends, points) if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=np.float64))
         found = stability(self.solution, asked, at)
@@ -309,7 +309,13 @@ class Posterior:
                 point,
             ),
             "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
-            "constant_data": xr.Dataset({"stretch": ("measurement", experiment.stretch, {"units": "1"})}, point),
+            "constant_data": xr.Dataset(
+                {
+                    "stretch": ("measurement", experiment.mode.abscissa(experiment.stretch), {"units": "1"}),
+                    "test": ("measurement", np.repeat([p.name for p in experiment.parts], _sizes(experiment))),
+                },
+                point,
+            ),
         }
         tree = xr.DataTree.from_dict(groups)
         tree.attrs.update(self._labels())
@@ -326,7 +332,7 @@ class Posterior:
         labels: dict[str, str | float] = {
             "inference_library": "tissuq",
             "experiment": model.experiment.name,
-            "loading_mode": model.experiment.mode.name,
+            "loading_mode": ", ".join(mode.name for mode in model.experiment.modes),
             "material": model.material.name,
             "discrepancy": model.discrepancy.name,
             "noise": str(model.noise),
@@ -353,3 +359,8 @@ class Posterior:
             f"<Posterior of {', '.join(model.symbols)}: {model.material.name}, discrepancy {model.discrepancy.name}, "
             f"{len(model.experiment)} measurements, {self.solution.route}>"
         )
+
+
+def _sizes(experiment: Experiment) -> list[int]:
+    """Return the number of measured stresses of each test."""
+    return [part.stress.size for part in experiment.parts]

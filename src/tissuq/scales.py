@@ -39,19 +39,25 @@ def _unit(parameter: Parameter, data: Experiment) -> float:
             return float(np.abs(data.stress).max())
         case "modulus":
             return _pilot_modulus(data)
-        case "stretch" if not np.ptp(data.stretch):
+        case "stretch" if not _range_of_stretch(data):
             raise ModelError(
                 f"experiment '{data.name}' has one stretch only, so nothing tells the {parameter.description} "
                 f"{parameter.symbol}: measure at other stretches, or choose another discrepancy."
             )
         case "stretch":
-            return float(np.ptp(data.stretch))
+            return _range_of_stretch(data)
         case "limit":
             return max(parameter.support[0], _largest_strain(data))
         case "rate":
             return 1 / _largest_strain(data)
         case "number":
             return 1.0
+
+
+def _range_of_stretch(data: Experiment) -> float:
+    """Return the range of what the stress is drawn against, the largest of all tests."""
+    parts = data.parts
+    return max(float(np.ptp(path.abscissa(part.stretch))) for part in parts for path in part.mode.channels)
 
 
 def _largest_strain(data: Experiment) -> float:

@@ -17,9 +17,11 @@ NEAR = 0.15
 
 def design_warnings(experiment: Experiment) -> Iterator[str]:
     """Yield what the design of a test leaves open, each with what to measure next."""
-    strain = experiment.stretch - 1
+    strain = np.concatenate(
+        [path.abscissa(part.stretch) - 1 for part in experiment.parts for path in part.mode.channels]
+    )
     reach = float(np.abs(strain).max())
-    if not (strain > 1e-9).any() or not (strain < -1e-9).any():
+    if len(experiment.modes) == 1 and not ((strain > 1e-9).any() and (strain < -1e-9).any()):
         done, other = ("tension", "compression") if (strain > 0).any() else ("compression", "tension")
         yield (
             f"there is {done} only, which leaves the initial modulus about twice as uncertain as both directions: "

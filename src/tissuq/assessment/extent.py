@@ -241,7 +241,7 @@ def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
     kept = (*model.material_symbols, *(parameter.symbol for parameter in model.noise.parameters))
     own = {symbol: prior for symbol, prior in model.priors.items() if symbol in kept}
     try:
-        return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None)])[0]
+        return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None, curve=None)])[0]
     except ModelError:  # a sampler that was asked for has nothing left to sample
         return None
 
@@ -264,9 +264,11 @@ def _evidence_changes(solution: Solution, others: Mapping[str, Solution]) -> dic
 
 def _shares(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals."""
-    data = np.unique(solution.model.experiment.stretch)
+    experiment, components = solution.model.experiment, solution.components
+    data = np.unique(experiment.stretch, axis=0)
     some = data[np.linspace(0, len(data) - 1, min(len(data), POINTS)).astype(int)]
-    components, at = solution.components, np.append(some, [1 - STEP, 1 + STEP])
+    _, reference = experiment.along(experiment.parts[0].mode, np.array([1 - STEP, 1 + STEP]))
+    at = np.concatenate([some, reference])
     alone, other = drawn_curves(solution.model, components[systematic(components.weights[None], DRAWS)[0]], at)
     size = np.sqrt((other[:, :-2] ** 2).mean(axis=1) / ((alone + other)[:, :-2] ** 2).mean(axis=1))
     slope, own = (curve[:, -1] - curve[:, -2] for curve in (other, alone))

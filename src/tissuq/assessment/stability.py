@@ -109,8 +109,9 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
 def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]:
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
-    if mode == data.mode:
-        return min(1.0, float(data.stretch.min())), max(1.0, float(data.stretch.max()))
+    own = [part.mode.abscissa(part.stretch) for part in data.parts if part.mode == mode]
+    if own:
+        return min(1.0, *(float(each.min()) for each in own)), max(1.0, *(float(each.max()) for each in own))
     return _end(mode, most, -1), _end(mode, most, 1)
 
 

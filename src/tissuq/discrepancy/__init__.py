@@ -10,6 +10,7 @@ from tissuq.discrepancy.orthogonal import OrthogonalProcess
 from tissuq.discrepancy.pinned import PinnedProcess
 from tissuq.discrepancy.polynomial import Constant, Linear, Quadratic
 from tissuq.discrepancy.scaled import ScaledProcess
+from tissuq.discrepancy.separate import separated
 
 __all__ = [
     "Auto",
@@ -30,4 +31,5 @@ __all__ = [
     "YeohTerms",
     "discrepancies",
     "discrepancy_named",
+    "separated",
 ]

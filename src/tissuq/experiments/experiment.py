@@ -32,6 +32,9 @@ class Experiment:
         Where the values come from (a file and its columns, or a citation).
     stress_unit : str
         The unit in which people want to read the stresses; the values here are MPa whatever it is.
+    specimen : str
+        Which specimen it was, where several tests are fitted together: those of one specimen share its errors of area
+        and length. Without a name every test counts as one of a specimen of its own.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class Experiment:
     name: str = "experiment"
     source: str = ""
     stress_unit: str = "MPa"
+    specimen: str = ""
 
     def __init__(
         self,
@@ -61,6 +65,7 @@ class Experiment:
         name: str = "experiment",
         source: str = "",
         stress_unit: str = "MPa",
+        specimen: str = "",
     ) -> None:
         values = {
             "mode": loading_mode(mode),
@@ -69,6 +74,7 @@ class Experiment:
             "name": name,
             "source": source,
             "stress_unit": stress_unit,
+            "specimen": specimen,
         }
         for field, value in values.items():
             object.__setattr__(self, field, value)
@@ -88,6 +94,20 @@ class Experiment:
     def __len__(self) -> int:
         return len(self.stretch)
 
+    @property
+    def parts(self) -> tuple[Experiment, ...]:
+        """The tests that it is made of: itself."""
+        return (self,)
+
+    @property
+    def modes(self) -> tuple[LoadingMode, ...]:
+        """The different modes of its tests."""
+        return tuple(dict.fromkeys(part.mode for part in self.parts))
+
+    def along(self, mode: LoadingMode, points: NDArray[np.float64]) -> tuple[LoadingMode, NDArray[np.float64]]:
+        """Return a path and its points that stand for points of a mode: what models of this experiment speak of."""
+        return mode, points
+
     def joined(self, other: Experiment) -> Experiment:
         """Return this experiment with the measurements of another one in the same loading mode added.
 
@@ -104,7 +124,7 @@ class Experiment:
         stretch, stress = (
             np.concatenate(pair) for pair in ((self.stretch, other.stretch), (self.stress, other.stress))
         )
-        return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit)
+        return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit, self.specimen)
 
 
 def _column(name: str, values: Any) -> NDArray[np.float64]:

@@ -88,6 +88,7 @@ class ConditionalGaussian:
         log_volume = -np.log(np.einsum("bnii->bni", cholesky)).sum(axis=2) - reduced.log_size[each]
         exponent = misfit - (whitened**2).sum(axis=2) + log_determinant
         constant = self._log_prior_constant[:, None] - 0.5 * (len(self.model.experiment) - p) * log(2 * pi)
+        constant += self.model.log_whitening
         return Conditional(log_volume - 0.5 * exponent + constant, mean, root)
 
     def _moments(self, reduced: Reductions, group: NDArray[np.intp], h: FloatArray) -> tuple[FloatArray, FloatArray]:

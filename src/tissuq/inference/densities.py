@@ -54,7 +54,7 @@ def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
 
 
 def _measurements(model: StatisticalModel) -> dict[str, Any]:
-    data: dict[str, Any] = {"stretch": model.experiment.stretch, "stress": model.experiment.stress}
+    data: dict[str, Any] = {"stretch": model.experiment.stretch, "stress": model.stress}
     data["other"] = model.discrepancy.mean_basis(model.experiment.mode, model.experiment.stretch)
     return data | {"levels": model.levels if model.noise.depends_on_level else np.zeros(1)}
 
@@ -66,7 +66,7 @@ def _is_reduced(model: StatisticalModel) -> bool:
 
 def _remembered(density: Callable[..., Any], model: StatisticalModel) -> Density:
     """Return one function object for all models that differ only in their data, so that JAX compiles it once."""
-    parts = model.material, model.discrepancy, model.noise, model.experiment.mode
+    parts = model.material, model.discrepancy, model.noise, model.experiment.mode, model.whitening
     return _shared(density, _Key((*parts, tuple(model.priors.items())), model))
 
 
@@ -98,7 +98,7 @@ def _design(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[st
         return data["design"]
     bent = jnp.stack([values[symbol] for symbol in model.bent_symbols])
     own = traced_stress_basis(model.material, model.experiment.mode, data["stretch"], bent)
-    return jnp.hstack([own, data["other"]])
+    return model.white(jnp.hstack([own, data["other"]]))
 
 
 def _whitened(
@@ -109,7 +109,7 @@ def _whitened(
     white = jnp.broadcast_to(model.white_variance(values, data["levels"]), n)
     if not model.is_correlated:
         return columns / jnp.sqrt(white)[:, None], jnp.log(white).sum()
-    correlation = model.correlation(data["stretch"], data["stretch"], values)
+    correlation = model.white(model.white(model.correlation(data["stretch"], data["stretch"], values)).T)
     root = jnp.linalg.cholesky(model.correlated_variance(values) * correlation + jnp.diag(white))
     return solve_triangular(root, columns, lower=True), 2 * jnp.log(jnp.diag(root)).sum()
 
@@ -120,7 +120,7 @@ def _joint(model: StatisticalModel, vector: Any, data: Mapping[str, Any]) -> Any
     residual = data["stress"] - _design(model, values, data) @ vector[columns]
     (whitened, log_determinant) = _whitened(model, values, data, residual[:, None])
     exponent = (whitened**2).sum() + log_determinant + len(residual) * log(2 * pi)
-    return _log_prior(model, values) - 0.5 * exponent
+    return _log_prior(model, values) + model.log_whitening - 0.5 * exponent
 
 
 def _orthogonal(model: StatisticalModel, design: Any, stress: Any) -> tuple[Any, Any, Any, Any]:
@@ -147,7 +147,9 @@ def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[An
     whitened = solve_triangular(cholesky, pull, lower=True)
     root = inverse @ solve_triangular(cholesky, jnp.eye(p), lower=True).T
     exponent = misfit - whitened @ whitened + log_determinant + (count - p) * log(2 * pi)
-    log_likelihood = data["constant"] - jnp.log(jnp.diag(cholesky)).sum() - log_size - 0.5 * exponent
+    log_likelihood = (
+        data["constant"] + model.log_whitening - jnp.log(jnp.diag(cholesky)).sum() - log_size - 0.5 * exponent
+    )
     return log_likelihood, _log_prior(model, values), centre + root @ whitened, root
 
 

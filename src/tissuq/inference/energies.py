@@ -27,7 +27,7 @@ from tissuq.inference.box import Boxes
 from tissuq.inference.lattice import STEP, Reduced
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
-from tissuq.inference.nodes import OUTER_STEP, Node, features_of, single_nodes, weighted_nodes
+from tissuq.inference.nodes import OUTER_STEP, Node, single_nodes, weighted_nodes
 from tissuq.inference.outer import Outer
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Components, Solution
@@ -145,7 +145,7 @@ class EnergySolution(Solution):
         settings = self._settings(points, self._node)
         self._bounded = bounded(Components(self._weights, settings, mean, root), beyond, self._box)
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
-            self.log_evidence = float(top + np.log(total) + self._priors.log_height)
+            self.log_evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
             of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
             self.log_evidence_error = float(error + of_sums + self._weights @ error_of_mass + LIGHT)
 
@@ -192,7 +192,7 @@ class EnergySolution(Solution):
             chosen = order[systematic((weights**power)[order][None], REPRESENTED)[0]]  # neighbours are alike
             points, node, weights = points[chosen], node[chosen], weights[chosen] ** (1 - power)
             weights = weights / weights.sum()
-        features = {int(place): features_of(self.model, place) for place in np.unique(points.lattice)}
+        features = {int(place): self.model.energy_features(place) for place in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
         for number in np.unique(node):
@@ -226,7 +226,7 @@ class EnergySolution(Solution):
         member, start = self.components.member[chosen], len(self.model.linear)
         values = np.zeros((*chosen.shape, len(self.model.experiment)))
         for place in np.unique(member):
-            features = np.hstack([np.zeros((values.shape[2], 0)), *features_of(self.model, place)])
+            features = np.hstack([np.zeros((values.shape[2], 0)), *self.model.energy_features(place)])
             own = member == place
             values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
         return values

@@ -48,6 +48,8 @@ def correlation_spectrum(model: StatisticalModel, shape: tuple[float, ...]) -> S
     points = model.experiment.stretch
     if model.is_repeated:
         return _of_repeats(points)
+    if model.whitening is not None:
+        return _decompose(model.discrepancy, points, shape, model.whitening)
     if len(points) <= FEW_POINTS:
         return _remembered(model.discrepancy, points.tobytes(), shape)
     return _decompose(model.discrepancy, points, shape)
@@ -56,7 +58,8 @@ def correlation_spectrum(model: StatisticalModel, shape: tuple[float, ...]) -> S
 def scaled_spectrum(model: StatisticalModel, shape: Mapping[str, float], scale: FloatArray) -> Spectrum:
     """Return the spectrum of a model's correlation at its measurements, rows and columns divided by a scale (n,)."""
     points = model.experiment.stretch
-    correlation = model.correlation(points, points, shape) / np.multiply.outer(scale, scale)
+    correlation = model.white(model.white(model.correlation(points, points, shape)).T)
+    correlation = correlation / np.multiply.outer(scale, scale)
     values, vectors = np.linalg.eigh(correlation)
     kept = values > ROUNDING * np.trace(correlation)
     return Spectrum(vectors[:, kept], values[kept])
@@ -75,16 +78,21 @@ def _remembered(discrepancy: Discrepancy, points: bytes, shape: tuple[float, ...
     return _decompose(discrepancy, np.frombuffer(points), shape)
 
 
-def _decompose(discrepancy: Discrepancy, points: FloatArray, shape: tuple[float, ...]) -> Spectrum:
+def _decompose(
+    discrepancy: Discrepancy,
+    points: FloatArray,
+    shape: tuple[float, ...],
+    white: Callable[[FloatArray], FloatArray] = lambda columns: columns,
+) -> Spectrum:
     values = dict(zip(discrepancy.shape_symbols, shape, strict=True))
     if len(points) <= FEW_POINTS:
         with one_thread():
-            spectrum, vectors = np.linalg.eigh(discrepancy.correlation(points, points, values))
-        kept = spectrum > ROUNDING * len(points)
+            spectrum, vectors = np.linalg.eigh(white(white(discrepancy.correlation(points, points, values)).T))
+        kept = spectrum > ROUNDING * spectrum.sum()
         return Spectrum(vectors[:, kept], spectrum[kept])
     variance = np.asarray(discrepancy.relative_variance(points, values))
     root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points, variance)
-    vectors, singular, _ = np.linalg.svd(root, full_matrices=False)
+    vectors, singular, _ = np.linalg.svd(white(root), full_matrices=False)
     return Spectrum(vectors, singular**2)
 
 

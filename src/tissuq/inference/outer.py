@@ -26,7 +26,7 @@ RATIO_SPREAD = 3.0
 
 def plain_rows(models: Sequence[StatisticalModel]) -> Rows:
     """Return the rows of models on the same stretches in which everything is linear or on a lattice."""
-    stresses = np.array([each.experiment.stress for each in models]).T
+    stresses = np.array([each.stress for each in models]).T
     return Rows(models[0].design, stresses, np.ones(len(stresses)))
 
 
@@ -77,10 +77,10 @@ class Outer:
         scale = np.asarray(model.noise.sd(values | {"noise_sd": 1.0}, model.levels)) if self.of_noise.any() else 1.0
         scale = np.broadcast_to(scale, len(model.experiment)).astype(float)
         bent = [values[symbol] for symbol in model.bent_symbols]
-        basis = model.basis(model.experiment.stretch, bent) if bent else model.design
+        basis = model.design_at(bent) if bent else model.design
         is_linear = np.isin(model.column_symbols, model.linear)
         given = basis[:, ~is_linear] @ [values[symbol] for symbol in np.array(model.column_symbols)[~is_linear]]
-        stresses = (model.experiment.stress - given) / scale
+        stresses = (model.stress - given) / scale
         return Rows(basis[:, is_linear] / scale[:, None], stresses[:, None], scale)
 
 

@@ -110,7 +110,7 @@ class Reducer:
         model = self._models[0]
         n, bent = len(model.experiment), len(model.bent_symbols)
         if bent:
-            bases = (model.basis(model.experiment.stretch, np.array(setting[:bent])) for setting in settings)
+            bases = (model.design_at(np.array(setting[:bent])) for setting in settings)
             fits = (_Fit.of(self._models, basis) for basis in bases)
             pairs = zip(fits, settings, strict=True)
             return [reduction for fit, setting in pairs for reduction in _reduced(model, fit, [setting[bent:]])]
@@ -138,7 +138,7 @@ class _Fit:
         free, fixed = divided_columns(models[0])
         basis, triangle = np.linalg.qr(design[:, free])
         inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
-        stresses = np.array([each.experiment.stress for each in models])
+        stresses = np.array([each.stress for each in models])
         centre = (stresses @ basis) @ inverse.T
         residual = stresses - centre @ design[:, free].T
         log_size = float(np.log(np.abs(np.diag(triangle))).sum())

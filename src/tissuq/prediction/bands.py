@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import Components, Solution
+from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import stress_moments
 
 __all__ = ["Band", "predict_average", "predict_band", "share_inside"]
@@ -19,6 +21,8 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
+STEP = 1e-5
+"""Relative, of the stretch, for the slope of a curve."""
 MANY, FEW = 1500, 200
 """Components that stand for the posterior at a block of stretches, and at more."""
 
@@ -85,7 +89,7 @@ def predict_average(
         raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    asked = loading_mode(mode) if mode is not None else parts[0][1].model.experiment.mode
+    asked = loading_mode(mode) if mode is not None else _only_mode(parts[0][1].model.experiment)
     for _, solution in parts if discrepancy else ():
         _check_mode(solution, asked)
     count = FEW if len(points) > BLOCK else MANY
@@ -95,7 +99,7 @@ def predict_average(
     curves = []
     for block in np.array_split(points, max(1, len(points) // BLOCK)):
         moments = [
-            stress_moments(model, components, block, discrepancy=discrepancy, noise=noise, mode=asked)
+            _moments(model, components, block, asked, discrepancy=discrepancy, noise=noise)
             for _, model, components in mixture
         ]
         mean, variance = (np.concatenate(each) for each in zip(*moments, strict=True))
@@ -106,16 +110,48 @@ def predict_average(
 
 def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
     """Return the share of the measurements inside the predictive band at their own stretches."""
-    data = solution.model.experiment
-    band = predict_band(solution, data.stretch, discrepancy=discrepancy, prob=prob)
-    return float(np.mean((band.low <= data.stress) & (data.stress <= band.high)))
+    inside = []
+    for data in solution.model.experiment.parts:
+        band = predict_band(solution, data.stretch, discrepancy=discrepancy, prob=prob, mode=data.mode)
+        inside.append((band.low <= data.stress) & (data.stress <= band.high))
+    return float(np.mean(np.concatenate(inside)))
+
+
+def _moments(
+    model: StatisticalModel,
+    components: Components,
+    points: FloatArray,
+    mode: LoadingMode,
+    *,
+    discrepancy: bool,
+    noise: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and variance (M, g) of the stress at points of a mode; those of a new test with its own errors."""
+
+    def at(points: FloatArray, noise: bool) -> tuple[FloatArray, FloatArray]:
+        path, rows = model.experiment.along(mode, points)
+        return stress_moments(model, components, rows, discrepancy=discrepancy, noise=noise, mode=path)
+
+    mean, variance = at(points, noise)
+    if noise and model.tolerances:
+        slope = (at(points * (1 + STEP), False)[0] - mean) / (STEP * points) if model.tolerances.need_slope else 0.0
+        variance = variance + model.tolerances.variance(points, mean, slope)
+    return mean, variance
+
+
+def _only_mode(experiment: Experiment) -> LoadingMode:
+    if len(experiment.modes) > 1:
+        names = ", ".join(mode.name for mode in experiment.modes)
+        raise InputError(f"the tests were made in several modes ({names}): say which one to predict, by mode=.")
+    return experiment.modes[0]
 
 
 def _check_mode(solution: Solution, asked: LoadingMode) -> None:
     model = solution.model
-    if asked != model.experiment.mode and not model.discrepancy.is_energy:
+    if asked not in model.experiment.modes and not model.discrepancy.is_energy:
+        names = ", ".join(mode.name for mode in model.experiment.modes)
         raise InputError(
-            f"discrepancy '{model.discrepancy.name}' is an error of the {model.experiment.mode.name} "
+            f"discrepancy '{model.discrepancy.name}' is an error of the {names} "
             f"stress and says nothing about the {asked.name} one: predict without it, or fit with one that is an "
             "energy, such as 'auto'."
         )

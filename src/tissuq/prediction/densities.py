@@ -91,9 +91,12 @@ def left_out_log_density(model: StatisticalModel, components: Components) -> Flo
 
 def _left_out(model: StatisticalModel, components: Components) -> FloatArray:
     mean_b, root_b = coefficients(model, components)
-    stretch, stress = model.experiment.stretch, model.experiment.stress
-    basis = basis_of(model, stretch, components.settings) if model.bent_symbols else model.design
-    residual = stress - (basis @ mean_b[:, :, None])[:, :, 0]
+    if model.bent_symbols:
+        bases = basis_of(model, model.experiment.stretch, components.settings)
+        basis = np.array([model.white(each) for each in bases])
+    else:
+        basis = model.design
+    residual = model.stress - (basis @ mean_b[:, :, None])[:, :, 0]
     root = basis @ root_b
     if components.member is not None:
         for place in np.unique(components.member):
@@ -112,6 +115,9 @@ def _left_out(model: StatisticalModel, components: Components) -> FloatArray:
         precision[:] = 1 / _white_variance(model, components.settings)
         residual *= precision
         root *= precision[:, :, None]
+    if model.whitening is not None:
+        residual, precision = model.whitening.transposed(residual.T).T, model.whitening.precisions(precision)
+        root = np.array([model.whitening.transposed(each) for each in root])
     left = np.maximum(precision - (root**2).sum(axis=2), LEAST * precision)
     return np.asarray(-0.5 * (residual**2 / left - np.log(left) + log(2 * pi)))
 
@@ -141,7 +147,7 @@ def joint_log_likelihood(solution: Solution) -> FloatArray:
 def _joint(
     model: StatisticalModel, columns: FloatArray, settings: FloatArray, member: NDArray[np.intp] | None
 ) -> FloatArray:
-    residual = model.experiment.stress - mean_stress(model, columns, settings)
+    residual = model.stress - mean_stress(model, columns, settings)
     exponent = np.empty(len(residual))  # the squared residual plus the log determinant
     if model.is_correlated:
         for part in correlated_parts(model, settings):
@@ -155,7 +161,7 @@ def _joint(
             for place in np.unique(member):
                 mine = np.flatnonzero(member == place)
                 exponent[mine] += _with_energies(model, int(place), residual[mine], settings[mine], white[mine])
-    return np.asarray(-0.5 * (exponent + residual.shape[1] * log(2 * pi)))
+    return np.asarray(model.log_whitening - 0.5 * (exponent + residual.shape[1] * log(2 * pi)))
 
 
 def _with_energies(
@@ -164,7 +170,7 @@ def _with_energies(
     """Return what an energy discrepancy adds to the squared residual and the log determinant (Woodbury)."""
     member, features = model.energy_members[place], _features(model, place)
     amplitudes = settings[:, [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]]
-    sizes = [each.shape[1] for each in member.stress_features(model.experiment.mode, model.experiment.stretch)]
+    sizes = [each.shape[1] for each in model.energy_features(place)]
     scale = np.repeat(amplitudes, sizes, axis=1)
     if model.noise.depends_on_level:
         products = np.stack([features.T @ (features / own[:, None]) for own in white])
@@ -178,8 +184,7 @@ def _with_energies(
 
 def _features(model: StatisticalModel, place: int) -> FloatArray:
     """Return the stresses (n, q) of all terms of one member of an energy discrepancy at the measurements."""
-    parts = model.energy_members[place].stress_features(model.experiment.mode, model.experiment.stretch)
-    return np.hstack([np.zeros((len(model.experiment), 0)), *parts])
+    return np.hstack([np.zeros((len(model.experiment), 0)), *model.energy_features(place)])
 
 
 def _white_variance(model: StatisticalModel, settings: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
-from tissuq.inference.solution import Components
+from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "coefficients",
     "correlated_parts",
     "drawn_curves",
+    "mean_curve",
     "mean_stress",
     "stress_moments",
 ]
@@ -99,7 +100,7 @@ def basis_of(
     return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]], mode)
 
 
-def _borne(model: StatisticalModel, stretch: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
+def _borne(model: StatisticalModel, at: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
     """Return a basis without the components, of next to no weight, in which the material has locked.
 
     Raises
@@ -110,9 +111,9 @@ def _borne(model: StatisticalModel, stretch: FloatArray, basis: FloatArray, weig
     is_borne = np.asarray(np.isfinite(basis).all(axis=-1))
     if is_borne.all():
         return basis
-    locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(stretch)))
+    locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(at)))
     if locked.max() > NEXT_TO_NOTHING:
-        beyond = stretch[locked > NEXT_TO_NOTHING]
+        beyond = at[locked > NEXT_TO_NOTHING]
         raise ModelError(
             f"material '{model.material.name}' has no stress at a stretch of {beyond[np.abs(beyond - 1).argmin()]:g}: "
             f"its {', '.join(model.bent_symbols)} may be such that it locks before (up to a probability of "
@@ -122,13 +123,13 @@ def _borne(model: StatisticalModel, stretch: FloatArray, basis: FloatArray, weig
 
 
 def mean_stress(model: StatisticalModel, coefficients: FloatArray, settings: FloatArray) -> FloatArray:
-    """Return the mean stress (M, n) at the measurements for coefficients (M, k) and settings (M, d)."""
+    """Return the mean stress (M, n) at the measurements, whitened, for coefficients (M, k) and settings (M, d)."""
     if not model.bent_symbols:
         return np.asarray(coefficients @ model.design.T)
     stretch = model.experiment.stretch
     blocks = np.array_split(np.arange(len(settings)), max(1, settings.shape[0] * len(stretch) // BLOCK))
     curves = [basis_of(model, stretch, settings[block]) @ coefficients[block][:, :, None] for block in blocks]
-    return np.concatenate(curves)[:, :, 0]
+    return np.asarray(model.white(np.concatenate(curves)[:, :, 0].T).T)
 
 
 def correlated_parts(model: StatisticalModel, settings: FloatArray) -> Iterator[CorrelatedPart]:
@@ -144,7 +145,7 @@ def correlated_parts(model: StatisticalModel, settings: FloatArray) -> Iterator[
         chosen = np.flatnonzero(group.ravel() == index)
         shape = {symbol: own[symbol] for symbol in model.discrepancy.shape_symbols}
         bent = np.array([own[symbol] for symbol in model.bent_symbols])
-        design = model.basis(model.experiment.stretch, bent) if len(bent) else model.design
+        design = model.design_at(bent) if len(bent) else model.design
         if model.noise.depends_on_level:
             scale = np.sqrt(model.white_variance(own, model.levels))
             spectrum, white = scaled_spectrum(model, shape, scale), np.ones(len(chosen))
@@ -172,7 +173,8 @@ def stress_moments(
     """
     values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
-    basis = _borne(model, stretch, basis_of(model, stretch, components.settings, mode), components.weights)
+    at = (mode or model.experiment.mode).abscissa(stretch)
+    basis = _borne(model, at, basis_of(model, stretch, components.settings, mode), components.weights)
     if not discrepancy:
         basis = basis * np.isin(model.column_symbols, model.material_symbols)
     mean = (basis @ mean_b[:, :, None])[:, :, 0]
@@ -193,8 +195,15 @@ def stress_moments(
     if discrepancy and not model.is_repeated:
         extra += model.discrepancy.independent_variance(values)
     if noise:
-        extra += model.noise_variance(values, level)
+        extra += model.noise_variance(values, level) * model.relative_noise(stretch) ** 2
     return mean, extra + (root**2).sum(axis=2)
+
+
+def mean_curve(solution: Solution) -> FloatArray:
+    """Return the posterior mean of the stress (n,) at the measurements, without noise and errors of whole tests."""
+    model, components = solution.model, solution.components
+    mean, _ = stress_moments(model, components, model.experiment.stretch, discrepancy=True, noise=False)
+    return np.asarray(components.weights @ mean)
 
 
 def drawn_curves(
@@ -235,7 +244,7 @@ def _condition_jointly(
 ) -> tuple[FloatArray, FloatArray]:
     """Return means (N, g) and covariances (N, g, g) of the correlated discrepancy given the data and coefficients b."""
     shift, _, _ = _condition(model, part, stretch, b)
-    inside = (model.correlation(stretch, model.experiment.stretch, part.shape) / part.scale) @ part.correlation.vectors
+    inside = _with_data(model, part, stretch) @ part.correlation.vectors
     gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
     explained = np.einsum("gr,nr,hr->ngh", inside, gain, inside)
     return shift, part.amplitude[:, None, None] * (model.correlation(stretch, stretch, part.shape) - explained)
@@ -264,6 +273,12 @@ def _energies(
         yield components.mean[own, chosen] @ every.T, every @ components.root[own, chosen], variance, own
 
 
+def _with_data(model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray) -> FloatArray:
+    """Return the correlation (g, n) of the discrepancy at stretches with that at the measurements, whitened."""
+    cross = model.white(model.correlation(model.experiment.stretch, stretch, part.shape)).T
+    return np.asarray(cross / part.scale)
+
+
 def _condition(
     model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray, mean_b: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -271,12 +286,10 @@ def _condition(
 
     Returns its mean (N, g), the sensitivity (N, g, k) of minus that mean to b, and its variance (N, g) given b.
     """
-    data = model.experiment
-    cross = model.correlation(stretch, data.stretch, part.shape) / part.scale
     vectors = part.correlation.vectors
-    inside = cross @ vectors
+    inside = _with_data(model, part, stretch) @ vectors
     gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
-    columns = np.column_stack([part.design, data.stress]) / part.scale[:, None]
+    columns = np.column_stack([part.design, model.stress]) / part.scale[:, None]
     smoothed = np.einsum("gr,nr,rk->ngk", inside, gain, vectors.T @ columns)
     pull, of_data = smoothed[:, :, :-1], smoothed[:, :, -1]
     explained = gain @ (inside**2).T

@@ -34,13 +34,15 @@ def replicate_data(solution: Solution, seed: int) -> FloatArray:
     mean, settings, white = _given_draws(solution)
     replicate = mean + np.sqrt(white) * generator.standard_normal(mean.shape)
     if solution.model.is_correlated:
-        residual = solution.model.experiment.stress - mean
+        residual = solution.model.stress - mean
         for part in correlated_parts(solution.model, settings):
             share = part.kernel / (part.kernel + part.white[:, None])
             score = generator.standard_normal(share.shape)
             along = share * ((residual[part.chosen] / part.scale) @ part.correlation.vectors)
             along += np.sqrt(share * part.white[:, None]) * score
             replicate[part.chosen] += (along @ part.correlation.vectors.T) * part.scale
+    if solution.model.whitening is not None:
+        replicate = solution.model.whitening.undone(replicate.T).T
     return replicate.reshape(solution.shape[0], -1, mean.shape[1])
 
 
@@ -51,12 +53,17 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
     form of leave-one-out conditioning (Sundararajan & Keerthi 2001), which is what PSIS-LOO of the draws needs.
     """
     mean, settings, white = _given_draws(solution)
-    residual = solution.model.experiment.stress - mean
-    variance = np.broadcast_to(white, residual.shape).copy()
+    whitening = solution.model.whitening
+    precision = 1 / np.broadcast_to(white, mean.shape)
+    solved = (solution.model.stress - mean) * precision
     if solution.model.is_correlated:
+        residual = solution.model.stress - mean
         for part in correlated_parts(solution.model, settings):
-            solved = part.solved(residual[part.chosen][:, :, None])[..., 0]
-            residual[part.chosen], variance[part.chosen] = solved / part.precision, 1 / part.precision
+            solved[part.chosen] = part.solved(residual[part.chosen][:, :, None])[..., 0]
+            precision[part.chosen] = part.precision
+    if whitening is not None:
+        solved, precision = whitening.transposed(solved.T).T, whitening.precisions(precision)
+    residual, variance = solved / precision, 1 / precision
     density = -0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi))
     return density.reshape(solution.shape[0], -1, mean.shape[1])
 
@@ -70,7 +77,7 @@ def draws_by_symbol(solution: Solution) -> dict[str, FloatArray]:
 def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return mean stress (D, n), nonlinear parameters (D, d) and white variance (D, 1 or n) of every `stride`-th draw.
 
-    D draws in all.
+    D draws in all; the stress is whitened.
     """
     model, step = solution.model, stride(solution)
     values = draws_by_symbol(solution)

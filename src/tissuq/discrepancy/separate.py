@@ -1,0 +1,84 @@
+"""A discrepancy in stress on several tests: another one in each, of the same size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.discrepancy.discrepancy import Discrepancy
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
+from tissuq.mechanics.joint import ABSCISSA, TEST
+from tissuq.mechanics.material import Material
+from tissuq.parameters import Parameter
+
+__all__ = ["Separate", "separated"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Separate(Discrepancy):
+    """Independent copies of a discrepancy, one for each test: an error of one mode's stress says nothing of another's.
+
+    Means have parameters of their own (m0_1, m0_2, in the order of the tests); S, c and psi are shared. S counts in
+    proportion to the noise of each test.
+    """
+
+    every: tuple[Discrepancy, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("name", "formula", "source", "shape_symbols", "is_best_fit", "caution"):
+            object.__setattr__(self, name, getattr(self.every[0], name))
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]  # of the object, not the class
+        """Those of the means for every test, and the shared ones."""
+        own = self.every[0].parameters
+        means = [
+            replace(each, symbol=f"{each.symbol}_{number}", description=f"{each.description}, test {number}")
+            for number in range(1, len(self.every) + 1)
+            for each in own
+            if each.is_linear
+        ]
+        return (*means, *(each for each in own if not each.is_linear))
+
+    def mean_basis(self, mode: LoadingMode, stretch: FloatArray) -> FloatArray:
+        blocks = [
+            each.mean_basis(mode, stretch[:, ABSCISSA]) * (stretch[:, TEST] == number)[:, None]
+            for number, each in enumerate(self.every)
+        ]
+        return np.hstack(blocks)
+
+    def independent_variance(self, values: Mapping[str, Any]) -> Any:
+        return self.every[0].independent_variance(values)
+
+    def correlated_variance(self, values: Mapping[str, Any]) -> Any:
+        return self.every[0].correlated_variance(values)
+
+    def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
+        return sum(
+            (first[:, TEST] == number)[:, None]
+            * (second[:, TEST] == number)
+            * each.correlation(first[:, ABSCISSA], second[:, ABSCISSA], values)
+            for number, each in enumerate(self.every)
+        )
+
+    def relative_variance(self, stretch: Any, values: Mapping[str, Any]) -> Any:
+        return sum(
+            (stretch[:, TEST] == number) * each.relative_variance(stretch[:, ABSCISSA], values)
+            for number, each in enumerate(self.every)
+        )
+
+
+def separated(discrepancy: Discrepancy, material: Material, experiment: Experiment) -> Discrepancy:
+    """Return a discrepancy as adapted to material and experiment; one in stress on several tests, to each of them."""
+    is_one = discrepancy.is_energy or not discrepancy.parameters or isinstance(discrepancy, Separate)
+    if len(experiment.parts) == 1 or is_one:
+        return discrepancy.adapted_to(material, experiment)
+    return Separate(tuple(discrepancy.adapted_to(material, part) for part in experiment.parts))

@@ -1,0 +1,125 @@
+"""Several tests as one: the rows of all their measurements, whatever the mode of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import Deformation, LoadingMode, Path
+from tissuq.mechanics.path import STEP
+
+__all__ = ["ABSCISSA", "TEST", "JointExperiment", "Rows", "joined", "rows_along"]
+
+FloatArray = NDArray[np.float64]
+
+TEST, ABSCISSA, STRETCHES, RATES, PLANE, PLANE_RATES = 0, 1, slice(2, 5), slice(5, 8), slice(8, 11), slice(11, 14)
+"""Columns of a row: its test, what it is drawn against, and deformation and rate of it along the measured stress."""
+
+
+class Rows(LoadingMode):
+    """The path of measurements of many kinds: a point is a row, which holds its deformation and the rate of it."""
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # no name of the class, so that nobody can choose it
+        """What it is in a few words."""
+        return "several tests"
+
+    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+        return self.moved(stretch, 0.0).stretches
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        columns = [point[..., place] for place in range(PLANE_RATES.stop)]
+        stretches, plane = (
+            tuple(at + step * rate for at, rate in zip(columns[values], columns[rates], strict=True))
+            for values, rates in ((STRETCHES, RATES), (PLANE, PLANE_RATES))
+        )
+        return Deformation(stretches, plane)
+
+    def abscissa(self, points: Any) -> Any:
+        return points[..., ABSCISSA]
+
+
+def rows_along(path: Path, points: FloatArray, test: int) -> FloatArray:
+    """Return the rows (n, 14) of points on a path, measured in a test of that number (-1: in none)."""
+    moved = path.moved(points, 1j * STEP)
+    found = np.empty((len(points), PLANE_RATES.stop))
+    found[:, TEST], found[:, ABSCISSA] = test, path.abscissa(points)
+    for parts, values, rates in ((moved.stretches, STRETCHES, RATES), (moved.plane, PLANE, PLANE_RATES)):
+        columns = np.stack([np.broadcast_to(each, len(points)).astype(complex) for each in parts], axis=1)
+        found[:, values], found[:, rates] = columns.real, columns.imag / STEP / path.loaded_axes
+    return found
+
+
+class JointExperiment(Experiment):
+    """Several tests, or one with several stresses, as one experiment along one path: that of their rows.
+
+    Attributes
+    ----------
+    parts : tuple of Experiment
+    stretch : (n, 14) array
+        The rows of all measurements, test by test and stress by stress.
+    stress : (n,) array, MPa
+        Theirs.
+    """
+
+    _parts: tuple[Experiment, ...]
+
+    def __init__(self, parts: Sequence[Experiment]) -> None:
+        rows = [
+            rows_along(path, part.stretch, number) for number, part in enumerate(parts) for path in part.mode.channels
+        ]
+        values = {
+            "_parts": tuple(parts),
+            "specimen": "",
+            "mode": Rows(),
+            "stretch": np.concatenate(rows),
+            "stress": np.concatenate([part.stress.T.ravel() for part in parts]),
+            "name": " + ".join(part.name for part in parts),
+            "source": "; ".join(part.source for part in parts if part.source),
+            "stress_unit": parts[0].stress_unit,
+        }
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+    @property
+    def parts(self) -> tuple[Experiment, ...]:
+        """The tests."""
+        return self._parts
+
+    def along(self, mode: LoadingMode, points: FloatArray) -> tuple[LoadingMode, FloatArray]:
+        """Return the path of rows and those of points of a mode, as measured in the first test of that mode."""
+        tests = [number for number, part in enumerate(self.parts) if part.mode == mode]
+        return self.mode, rows_along(mode, points, tests[0] if tests else -1)
+
+    def __len__(self) -> int:
+        return len(self.stress)
+
+    def joined(self, other: Experiment) -> Experiment:
+        """Refuse: further measurements of one test are no test of their own."""
+        raise InputError(
+            f"experiment '{other.name}' cannot be added to a fit of several tests: fit all of them together again."
+        )
+
+
+def joined(tests: Experiment | Sequence[Experiment]) -> Experiment:
+    """Return tests as what a model is fitted to: one with one stress as it is, all else joined.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
+    parts = (tests,) if isinstance(tests, Experiment) else tuple(tests)
+    if not parts:
+        raise InputError("there is no experiment to fit.")
+    for number, part in enumerate(parts):
+        if not isinstance(part, Experiment):
+            raise InputError(f"experiment number {number + 1} is no tissuq.Experiment, but {part!r:.80}.")
+    if len(parts) == 1 and parts[0].stress.ndim == 1 and parts[0].stretch.ndim == 1:
+        return parts[0]
+    return JointExperiment(parts)
