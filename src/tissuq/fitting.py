@@ -24,7 +24,7 @@ from tissuq.noise import Noise, noise_named
 from tissuq.posterior import Posterior
 from tissuq.prediction.moments import mean_curve
 from tissuq.priors import Prior
-from tissuq.whitening import BETWEEN_SPECIMENS, Tolerances
+from tissuq.whitening import BETWEEN_SPECIMENS, Tolerances, specimens_of
 
 __all__ = ["METHODS", "Method", "fit", "fit_many"]
 
@@ -253,9 +253,8 @@ class _Recipe:
 
 def _usual_tolerances(model: StatisticalModel) -> Tolerances:
     """Return the tolerances where nothing is said: none within a specimen, or where something else takes them up."""
-    specimens = [part.specimen or number for number, part in enumerate(model.experiment.parts)]
     is_plain = not (model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy)
-    return BETWEEN_SPECIMENS if len(set(specimens)) > 1 and is_plain else Tolerances()
+    return BETWEEN_SPECIMENS if len(specimens_of(model.experiment)) > 1 and is_plain else Tolerances()
 
 
 def _why_not_soon(model: StatisticalModel) -> str:

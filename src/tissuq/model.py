@@ -172,6 +172,22 @@ class StatisticalModel:
             noise_sd = np.full(len(noise_sd), usual)
         return whitening(self.experiment, noise_sd, usual, self.tolerances, self.curve)
 
+    @property
+    def common_error(self) -> float:
+        """The relative standard deviation of the error of stress that all measurements have in common.
+
+        It is not in the data: everything that is inferred is the tissue's stress times it.
+        """
+        return self.tolerances.in_common(self.experiment)
+
+    @property
+    def scaled_symbols(self) -> tuple[str, ...]:
+        """The parameters that an error of all stresses multiplies: all stresses and moduli but the noise."""
+        of_noise = [p.symbol for p in self.noise.parameters]
+        return tuple(
+            p.symbol for p in self.parameters if p.dimension in ("stress", "modulus") and p.symbol not in of_noise
+        )
+
     def white(self, columns: Any) -> Any:
         """Return columns (n,) or (n, k) of the measurements in units in which their errors are independent and equal.
 

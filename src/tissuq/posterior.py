@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment import Assessment, assess, known_evidence_changes
 from tissuq.assessment.modulus import modulus
@@ -293,7 +293,7 @@ class Posterior:
             "posterior": xr.Dataset(
                 {
                     symbol: (("chain", "draw"), values, {"units": parameters[symbol].unit or "1"})
-                    for symbol, values in solution.draws.items()
+                    for symbol, values in self._draws().items()
                 },
                 sample,
             ),
@@ -320,6 +320,15 @@ class Posterior:
         tree = xr.DataTree.from_dict(groups)
         tree.attrs.update(self._labels())
         return tree
+
+    def _draws(self) -> dict[str, NDArray[np.float64]]:
+        """Return the draws of every parameter, those of stresses with the error that all tests have in common."""
+        model, drawn = self.model, self.solution.draws
+        if not model.common_error:
+            return drawn
+        score = np.random.default_rng([self.seed, 17]).standard_normal(self.solution.shape)
+        factor = 1 + model.common_error * score
+        return {symbol: each * (factor if symbol in model.scaled_symbols else 1.0) for symbol, each in drawn.items()}
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""

@@ -14,7 +14,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.smoothing import smoothed
 
-__all__ = ["BETWEEN_SPECIMENS", "Tolerances", "Whitening", "whitening"]
+__all__ = ["BETWEEN_SPECIMENS", "Tolerances", "Whitening", "specimens_of", "whitening"]
 
 FloatArray = NDArray[np.float64]
 
@@ -24,7 +24,9 @@ class Tolerances:
     """By how much a whole test may be off: standard deviations of errors that all its measurements share.
 
     Tests of one specimen share them. To first order in the errors they move the measured stresses along fixed curves,
-    the stress and its slope, so that they are integrated in closed form, as everything that is linear.
+    the stress and its slope, so that they are integrated in closed form, as everything that is linear. Of the stress
+    only the specimens' differences from their mean count there: an error that all have in common is not in the data,
+    and multiplies the answer.
 
     Parameters
     ----------
@@ -55,6 +57,10 @@ class Tolerances:
 
     def __bool__(self) -> bool:
         return any(vars(self).values())
+
+    def in_common(self, experiment: Experiment) -> float:
+        """Return the standard deviation of the relative error of stress that all specimens have in common."""
+        return float(self.stress / np.sqrt(len(specimens_of(experiment))))
 
     @property
     def need_slope(self) -> bool:
@@ -147,6 +153,11 @@ class Whitening:
         return float(-np.log(self.size).sum() - 0.5 * np.log1p(self.spread).sum())
 
 
+def specimens_of(experiment: Experiment) -> list[str | int]:
+    """Return the different specimens of an experiment: their names, or the numbers of tests without one."""
+    return list(dict.fromkeys(part.specimen or number for number, part in enumerate(experiment.parts)))
+
+
 def whitening(
     experiment: Experiment,
     noise_sd: FloatArray,
@@ -176,9 +187,12 @@ def whitening(
     if tolerances and curve is not None:
         curves = np.split(curve, np.cumsum(count)[:-1])
         shares = [tolerances.columns(part, own) for part, own in zip(parts, curves, strict=True)]
-        for specimen in dict.fromkeys(specimens):
-            own = [share * (each == specimen) for share, each in zip(shares, specimens, strict=True)]
-            every.append(np.concatenate(own))
+        names = specimens_of(experiment)
+        of = np.array([[each == name for name in names] for each in specimens], dtype=np.float64)
+        between = of - of.mean(axis=1, keepdims=True)
+        for number in range(len(names)):
+            weights = np.where(np.arange(4) == 0, between[:, number, None], of[:, number, None])
+            every.append(np.concatenate([share * own for share, own in zip(shares, weights, strict=True)]))
     columns = np.column_stack([np.zeros((len(size), 0)), *every]) / (size * usual)[:, None]
     along, singular, _ = np.linalg.svd(columns, full_matrices=False)
     kept = singular > 1e-8 * singular.max(initial=0.0)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.modes import loading_mode
-from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points
+from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points, widened
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import stress_basis
 from tissuq.model import StatisticalModel
@@ -44,7 +44,7 @@ def modulus(solution: Solution) -> Marginal:
     if not is_wide.all():
         own = marginal_of_points(means[~is_wide], parts.weights[~is_wide], (-np.inf, np.inf))
         found.append((float(parts.weights[~is_wide].sum()), own))
-    return blended(found, (-np.inf, np.inf))
+    return widened(blended(found, (-np.inf, np.inf)), model.common_error)
 
 
 def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ __all__ = [
     "marginal_of_points",
     "marginal_of_quadrature",
     "marginal_of_table",
+    "widened",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,8 @@ COARSE = 101
 NODES = 160
 BETWEEN = 6
 FEW = 60
+PARTS = 800
+"""Of equal probability, into which a marginal is divided."""
 MANY_VALUES = 300_000
 FAR = 15.0
 """Standard deviations beyond a bound from which a cut Gaussian's variance is taken from its expansion."""
@@ -78,6 +81,17 @@ class Marginal:
             place = int(rising.argmin()) if not rising.all() else COARSE - 1
             low, high = inner[max(place - 1, 0)], inner[place]
         return float(self.quantile(low)), float(self.quantile(low + prob))
+
+
+def widened(marginal: Marginal, error: float) -> Marginal:
+    """Return the marginal of a parameter times 1 + e, e a normal error of some standard deviation."""
+    if not error:
+        return marginal
+    values = marginal.quantile((np.arange(PARTS) + 0.5) / PARTS)
+    sds = np.sqrt((error * values) ** 2 + np.gradient(values) ** 2 / 12)
+    found = marginal_of_mixture(np.full(PARTS, 1 / PARTS), values, sds)
+    sd = float(np.sqrt(marginal.sd**2 * (1 + error**2) + (error * marginal.mean) ** 2))
+    return replace(found, mean=marginal.mean, sd=sd)
 
 
 def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray) -> Marginal:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.marginal import Marginal
+from tissuq.inference.marginal import Marginal, widened
 from tissuq.inference.resampling import systematic
 from tissuq.model import StatisticalModel
 
@@ -167,8 +167,11 @@ class Solution(ABC):
 
     @cached_property
     def marginals(self) -> Marginals:
-        """The marginal posterior of every parameter."""
-        return Marginals(self.model.symbols, self._marginal)
+        """The marginal posterior of every parameter; of stresses with the error that all tests have in common."""
+        return Marginals(self.model.symbols, self._widened_marginal)
+
+    def _widened_marginal(self, symbol: str) -> Marginal:
+        return widened(self._marginal(symbol), self.model.common_error if symbol in self.model.scaled_symbols else 0.0)
 
     @abstractmethod
     def _marginal(self, symbol: str) -> Marginal:

@@ -133,6 +133,7 @@ def _moments(
         return stress_moments(model, components, rows, discrepancy=discrepancy, noise=noise, mode=path)
 
     mean, variance = at(points, noise)
+    variance = variance + (model.common_error * mean) ** 2
     if noise and model.tolerances:
         slope = (at(points * (1 + STEP), False)[0] - mean) / (STEP * points) if model.tolerances.need_slope else 0.0
         variance = variance + model.tolerances.variance(points, mean, slope)
