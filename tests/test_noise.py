@@ -18,7 +18,7 @@ def test_a_number_is_known_noise_and_a_name_finds_its_kind():
     assert noise_named(kept) is kept
 
 
-@pytest.mark.parametrize("value", [0, -1.0, np.inf, np.nan, True, None, [0.1], 1j])
+@pytest.mark.parametrize("value", [0, -1.0, np.inf, np.nan, True, None, [0.1, 0.2], [-0.1], 1j])
 def test_noise_that_is_no_positive_number_is_refused(value):
     with pytest.raises(tq.InputError, match="noise"):
         noise_named(value)

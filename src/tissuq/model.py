@@ -188,6 +188,11 @@ class StatisticalModel:
             p.symbol for p in self.parameters if p.dimension in ("stress", "modulus") and p.symbol not in of_noise
         )
 
+    @property
+    def is_joint(self) -> bool:
+        """Whether measurements belong together in more than the material: several tests, or errors of a whole one."""
+        return self.experiment.stretch.ndim > 1 or self.whitening is not None
+
     def white(self, columns: Any) -> Any:
         """Return columns (n,) or (n, k) of the measurements in units in which their errors are independent and equal.
 
@@ -215,7 +220,7 @@ class StatisticalModel:
     @cached_property
     def design(self) -> FloatArray:
         """`basis` at the measurements, whitened; at the medians of the priors where it depends on parameters."""
-        if len(self.experiment) > CHUNK or self.whitening is not None:
+        if len(self.experiment) > CHUNK or self.is_joint:
             return self.design_at(self.usual_bent)
         key = self.experiment.stretch.tobytes()
         return _remembered_basis(self.material, self.discrepancy, self.experiment.mode, key, self.usual_bent)
@@ -243,8 +248,8 @@ class StatisticalModel:
             When the further measurements are in another loading mode.
         """
         both = self.experiment.joined(experiment)
-        if self.whitening is not None:
-            return replace(self, experiment=both)
+        if self.is_joint:
+            return replace(self, experiment=both, curve=None)
         rows = np.column_stack([self.basis(experiment.stretch, self.usual_bent), experiment.stress])
         return replace(self, experiment=both, known_statistics=self.statistics.joined(Statistics.of_rows([rows])))
 
@@ -302,7 +307,7 @@ class StatisticalModel:
     def _rows(self) -> Iterator[FloatArray]:
         """Yield the rows [X y], block by block; every block has one length, so that JAX compiles once."""
         stretch, stress = self.experiment.stretch, self.experiment.stress
-        if len(stress) <= CHUNK or self.whitening is not None:
+        if len(stress) <= CHUNK or self.is_joint:
             yield np.column_stack([self.design, self.stress])
             return
         for start in range(0, len(stress), CHUNK):
@@ -323,7 +328,7 @@ class StatisticalModel:
     def _shortest_columns(self) -> FloatArray:
         """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
         stretch = self.experiment.stretch
-        some = stretch if self.whitening is not None else stretch[:: max(1, len(stretch) // CHUNK)]
+        some = stretch if self.is_joint else stretch[:: max(1, len(stretch) // CHUNK)]
         bent = np.array([[_off_zero(prior, q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
         bases = stress_basis(self.material, self.experiment.mode, some, bent)
         columns = np.array([self.white(basis) for basis in bases])
@@ -371,6 +376,8 @@ class StatisticalModel:
             )
 
     def _check_tolerances(self) -> None:
+        if not self.noise.parameters:
+            self.noise.of_tests(self.experiment)  # says where there is not one for each test
         if not self.tolerances:
             return
         if self.discrepancy.is_correlated:

@@ -48,8 +48,8 @@ def correlation_spectrum(model: StatisticalModel, shape: tuple[float, ...]) -> S
     points = model.experiment.stretch
     if model.is_repeated:
         return _of_repeats(points)
-    if model.whitening is not None:
-        return _decompose(model.discrepancy, points, shape, model.whitening)
+    if model.is_joint:
+        return _decompose(model.discrepancy, points, shape, model.white)
     if len(points) <= FEW_POINTS:
         return _remembered(model.discrepancy, points.tobytes(), shape)
     return _decompose(model.discrepancy, points, shape)

@@ -1,0 +1,212 @@
+"""Several tests in one posterior, against full covariance matrices written out here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import halfcauchy, multivariate_normal
+
+import tissuq as tq
+from tissuq.prediction.densities import leave_one_out
+
+UNIAXIAL, PLANAR = np.array([0.75, 0.85, 0.95, 1.05, 1.2, 1.35, 1.5]), np.array([1.05, 1.15, 1.25, 1.4, 1.5])
+STRETCH = np.concatenate([UNIAXIAL, PLANAR])
+X = np.concatenate([2 * (UNIAXIAL - UNIAXIAL**-2), 2 * (PLANAR - PLANAR**-3)])
+STRAIN = np.concatenate([UNIAXIAL**2 + 2 / UNIAXIAL - 3, PLANAR**2 + PLANAR**-2 - 2])
+TEST = np.repeat([0, 1], [7, 5])
+NOISE_SD = np.array([0.02, 0.06])
+SIZE = NOISE_SD[TEST]
+USUAL = float(np.sqrt(NOISE_SD.prod()))
+Y = 0.6 * X * (1 + 0.3 * STRAIN) * np.array([1.05, 0.93])[TEST]
+Y = Y + SIZE * np.random.default_rng(5).standard_normal(12)
+
+
+def experiments(specimens=("", "")):
+    modes = ("uniaxial", "planar")
+    parts = zip(modes, (UNIAXIAL, PLANAR), (Y[:7], Y[7:]), specimens, strict=True)
+    return [tq.Experiment(mode, stretch, stress, name=mode, specimen=name) for mode, stretch, stress, name in parts]
+
+
+def fit(discrepancy, **options):
+    return tq.fit(experiments(), discrepancy=discrepancy, **({"noise_sd": list(NOISE_SD)} | options))
+
+
+def between(model):
+    """What the difference of two specimens adds to the covariance, along the model's own curve."""
+    sign = 1 - 2.0 * TEST
+    return model.tolerances.stress**2 / 2 * np.outer(sign * model.curve, sign * model.curve)
+
+
+def given(covariance, columns, prior_width=1.0):
+    """Mean and sd of the first coefficient, and the log evidence, for flat priors of some density."""
+    inverse = np.linalg.inv(covariance)
+    precision = columns.T @ inverse @ columns
+    mean = np.linalg.solve(precision, columns.T @ inverse @ Y)
+    rest = Y @ inverse @ (Y - columns @ mean)
+    constant = (len(Y) - len(mean)) * np.log(2 * np.pi)
+    evidence = -0.5 * (rest + np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(precision)[1] + constant)
+    return mean[0], np.sqrt(np.linalg.inv(precision)[0, 0]), evidence - np.log(prior_width)
+
+
+def width(posterior, *symbols):
+    return np.prod([np.ptp(posterior.model.priors[symbol].support) for symbol in symbols])
+
+
+@pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
+def test_without_discrepancy_it_is_generalised_least_squares(tolerances):
+    posterior = fit("none", tolerances=tolerances)
+    model, usual = posterior.model, 0.15 if tolerances is None else 0.0
+    assert model.tolerances.stress == usual
+    covariance = np.diag(SIZE**2) + (between(model) if usual else 0.0)
+    mean, sd, evidence = given(covariance, X[:, None], width(posterior, "C10"))
+    found = posterior.solution.marginals["C10"]
+    assert found.mean == pytest.approx(mean, rel=1e-8)
+    assert found.sd == pytest.approx(np.sqrt(sd**2 * (1 + usual**2 / 2) + mean**2 * usual**2 / 2), rel=1e-8)
+    assert posterior.solution.log_evidence == pytest.approx(evidence, abs=1e-8)
+
+
+def test_the_curve_along_which_tests_err_is_that_of_the_fit_itself():
+    model = fit("none").model
+    again = given(np.diag(SIZE**2) + between(model), X[:, None])[0]
+    assert np.allclose(model.curve / X, model.curve[0] / X[0], rtol=1e-10)
+    assert model.curve[0] / X[0] == pytest.approx(again, rel=0.02)
+
+
+@pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
+def test_an_energy_acts_in_all_tests(tolerances):
+    posterior = fit("taylor", tolerances=tolerances)
+    model = posterior.model
+    base = np.diag(SIZE**2) + (between(model) if model.tolerances else 0.0)
+    scale = np.median(np.abs(Y / X))
+    logs = np.linspace(-9, 9, 1201) + np.log(scale)
+    found = []
+    for length in (0.4, 0.8, 1.6, 3.2):
+        energy = np.outer(X, X) * (np.exp(np.outer(STRAIN, STRAIN) / (length * STRAIN.max()) ** 2) - 1)
+        found += [(c, *given(base + c**2 * energy, X[:, None], width(posterior, "C10"))) for c in np.exp(logs)]
+    amplitude, mean, sd, evidence = np.array(found).T
+    weight = np.exp(evidence - evidence.max()) * halfcauchy.pdf(amplitude / scale) / scale * amplitude
+    mass = weight.sum() * (logs[1] - logs[0]) / 4
+    expected = weight @ mean / weight.sum()
+    variance = weight @ (sd**2 + (mean - expected) ** 2) / weight.sum()
+    common = model.common_error
+    marginal = posterior.solution.marginals["C10"]
+    assert marginal.mean == pytest.approx(expected, rel=1e-4)
+    assert marginal.sd**2 == pytest.approx(variance * (1 + common**2) + (expected * common) ** 2, rel=1e-3)
+    assert posterior.solution.log_evidence == pytest.approx(np.log(mass) + evidence.max(), abs=2e-3)
+
+
+def test_a_mean_in_stress_is_another_in_each_test_and_its_scatter_goes_with_the_noise():
+    posterior = fit("constant", tolerances=tq.Tolerances())
+    model = posterior.model
+    assert model.symbols == ("C10", "m0_1", "m0_2", "S")
+    columns = np.column_stack([X, TEST == 0, TEST == 1])
+    nodes, weights = np.polynomial.legendre.leggauss(4000)
+    top = model.priors["S"].support[1]
+    S, share = 0.5 * top * (1 + nodes), 0.5 * weights
+    box = width(posterior, "C10", "m0_1", "m0_2")
+    relative = SIZE / USUAL
+    every = np.array([given(np.diag(relative**2) * (USUAL**2 + s**2), columns, box) for s in S])
+    weight = share * np.exp(every[:, 2] - every[:, 2].max())
+    assert posterior.solution.marginals["C10"].mean == pytest.approx(weight @ every[:, 0] / weight.sum(), rel=1e-4)
+    assert posterior.solution.log_evidence == pytest.approx(np.log(weight.sum()) + every[:, 2].max(), abs=2e-3)
+
+
+def test_a_process_in_stress_is_independent_between_tests():
+    posterior = fit("gp")
+    model = posterior.model
+    assert not model.tolerances
+    same = TEST[:, None] == TEST
+    (_, most), (short, long) = (model.priors[symbol].support for symbol in ("c", "psi"))
+    nodes, share = np.polynomial.legendre.leggauss(80)
+    nodes, share = 0.5 * (1 + nodes), 0.5 * share
+    box, found = width(posterior, "C10"), []
+    for psi, own in zip(short + (long - short) * nodes, share, strict=True):
+        correlation = same * np.exp(-0.5 * (np.subtract.outer(STRETCH, STRETCH) / psi) ** 2)
+        for c, other in zip(most * nodes, share, strict=True):
+            found.append((own * other, *given(np.diag(SIZE**2) + c**2 * correlation, X[:, None], box)))
+    share, mean, _, evidence = np.array(found).T
+    weight = share * np.exp(evidence - evidence.max())
+    assert posterior.solution.marginals["C10"].mean == pytest.approx(weight @ mean / weight.sum(), rel=2e-3)
+    assert posterior.solution.log_evidence == pytest.approx(np.log(weight.sum()) + evidence.max(), abs=0.01)
+
+
+def test_parts_of_one_test_are_the_test():
+    data = tq.simulate("yeoh", {"C10": 1.2, "C20": -0.057, "C30": 0.004}, np.linspace(0.6, 2.4, 19), noise_sd=0.05)
+    parts = [
+        tq.Experiment("uniaxial", data.stretch[own], data.stress[own], specimen="one")
+        for own in (slice(0, 8), slice(8, None))
+    ]
+    whole = tq.fit(data, noise_sd=0.05)
+    both = tq.fit(parts, noise_sd=0.05)
+    assert np.allclose(both.summary(), whole.summary(), rtol=1e-6, equal_nan=True)
+    assert both.solution.log_evidence == pytest.approx(whole.solution.log_evidence, abs=1e-6)
+    asked = np.array([0.7, 1.5, 2.2])
+    assert np.allclose(both.predict(asked, mode="planar"), whole.predict(asked, mode="planar"), rtol=1e-6)
+
+
+@pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
+def test_leaving_out_a_measurement_is_conditioning_on_the_others(tolerances):
+    posterior = fit("none", tolerances=tolerances)
+    model = posterior.model
+    wide = 1e3 * np.outer(X, X)  # C10 with next to no prior
+    covariance = np.diag(SIZE**2) + (between(model) if model.tolerances else 0.0) + wide
+    found = leave_one_out(posterior.solution).log_density
+    for place in range(len(Y)):
+        rest = np.arange(len(Y)) != place
+        gain = np.linalg.solve(covariance[np.ix_(rest, rest)], covariance[rest, place])
+        variance = covariance[place, place] - gain @ covariance[rest, place]
+        expected = multivariate_normal.logpdf(Y[place], gain @ Y[rest], variance)
+        assert found[place] == pytest.approx(expected, abs=2e-3)
+
+
+def test_replicates_have_the_errors_of_whole_tests():
+    posterior = fit("none")
+    model = posterior.model
+    drawn = posterior.data["posterior_predictive"]["stress"].to_numpy().reshape(-1, len(Y))
+    _, sd, _ = given(np.diag(SIZE**2) + between(model), X[:, None])
+    expected = np.diag(SIZE**2) + between(model) + sd**2 * np.outer(X, X)
+    scale = np.sqrt(np.diag(expected))
+    assert np.allclose(np.cov(drawn.T) / np.outer(scale, scale), expected / np.outer(scale, scale), atol=0.1)
+
+
+def test_a_band_is_that_of_a_new_test():
+    posterior = fit("none")
+    band = posterior.predict([1.3], mode="planar").iloc[0]
+    mean, sd, _ = given(np.diag(SIZE**2) + between(posterior.model), X[:, None])
+    unit = 2 * (1.3 - 1.3**-3)
+    variance = (sd * unit) ** 2 + (mean * unit * 0.15) ** 2 * 1.5 + NOISE_SD[1] ** 2
+    assert band["mean"] == pytest.approx(mean * unit, rel=1e-8)
+    assert band["high"] - band["low"] == pytest.approx(2 * 1.959964 * np.sqrt(variance), rel=1e-5)
+
+
+def test_unknown_noise_has_the_ratios_of_the_scatter():
+    stretch = np.linspace(0.7, 1.6, 40)
+    parts = [
+        tq.simulate("neo-hookean", {"C10": 0.5}, stretch, mode=mode, noise_sd=sd, seed=seed)
+        for mode, sd, seed in (("uniaxial", 0.02, 1), ("planar", 0.1, 2))
+    ]
+    posterior = tq.fit(parts, discrepancy="none")
+    ratio = posterior.model.whitening.size[-1] / posterior.model.whitening.size[0]
+    assert ratio == pytest.approx(5, rel=0.35)
+    low, high = posterior.summary().loc["noise_sd", ["hdi_low", "hdi_high"]]
+    assert low < np.sqrt(0.02 * 0.1) * 1.2
+    assert high > np.sqrt(0.02 * 0.1) / 1.2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"noise_sd": [0.1]}, "noise_sd has 1 values for 2 tests"),
+        ({"noise_sd": None, "noise": "repeats"}, "noise 'repeats' is for one test"),
+        ({"discrepancy": "gp", "tolerances": tq.Tolerances(stress=0.1)}, "takes up errors of a whole test itself"),
+        ({"noise_sd": None, "noise": "proportional", "tolerances": tq.Tolerances(stress=0.1)}, "do not go together"),
+    ],
+)
+def test_what_does_not_go_together_is_said(options, message):
+    with pytest.raises(tq.TissuqError, match=message):
+        fit(**({"discrepancy": "none"} | options))
+
+
+def test_a_prediction_says_its_mode():
+    with pytest.raises(tq.InputError, match="in several modes \\(uniaxial, planar\\): say which one"):
+        fit("none").predict([1.1])
