@@ -1,0 +1,161 @@
+"""Cross-section and length of a specimen: as the user gives them, or from the lines above the table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isclose, pi
+
+from tissuq.errors import InputError
+from tissuq.experiments.columns import heading
+from tissuq.experiments.layout import WHITESPACE, split
+from tissuq.experiments.quantities import AREA, LENGTH, Kind, number_and_unit
+from tissuq.experiments.table import Table
+from tissuq.experiments.vocabulary import DIMENSION_NAMES
+
+__all__ = ["Dimension", "Dimensions", "dimensions_of"]
+
+SAME = 0.01
+"""Relative difference from which two statements of one dimension contradict each other."""
+SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """One dimension in mm or mm², and the words that tell where it comes from."""
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """What is known of a specimen's dimensions, and what is strange about it."""
+
+    file: str
+    known: Mapping[str, Dimension]
+    given: frozenset[str]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def length(self) -> Dimension:
+        """The undeformed length.
+
+        Raises
+        ------
+        InputError
+            When it is not known.
+        """
+        if "length" not in self.known:
+            raise InputError(
+                f"{self.file}: to turn displacements into stretches give the undeformed length: length '20 mm' "
+                '(--length "20 mm"; in Python dimensions={"length": "20 mm"}). The lines above the table state none.'
+            )
+        return self.known["length"]
+
+    @property
+    def area(self) -> Dimension:
+        """The undeformed cross-section.
+
+        Raises
+        ------
+        InputError
+            When it is not known, or follows in two ways that contradict each other.
+        """
+        areas = {name: area for name, parts in SECTIONS.items() if (area := self._area(parts)) is not None}
+        own = {name: area for name, area in areas.items() if self.given & set(SECTIONS[name])}
+        areas = own or areas
+        if not areas:
+            raise InputError(
+                f"{self.file}: to turn forces into stresses give the undeformed cross-section: area "
+                '(--area "10 mm2"), or width and thickness (--width "5 mm" --thickness "2 mm"), or diameter. '
+                f"{self._found()}"
+            )
+        first, *others = areas.values()
+        if any(not isclose(first.value, other.value, rel_tol=SAME) for other in others):
+            found = " or ".join(f"{each.value:g} mm2 ({each.source})" for each in areas.values())
+            raise InputError(
+                f"{self.file}: the cross-section could be {found}. "
+                'Say which: --area "10 mm2", and leave out the others.'
+            )
+        return first
+
+    def _area(self, parts: tuple[str, ...]) -> Dimension | None:
+        if not all(part in self.known for part in parts):
+            return None
+        values = [self.known[part] for part in parts]
+        if parts == ("area",):
+            return values[0]
+        source = " and ".join(
+            f"{part} {value.value:g} mm {value.source}" for part, value in zip(parts, values, strict=True)
+        )
+        return Dimension(
+            values[0].value * values[1].value if len(values) == 2 else pi / 4 * values[0].value ** 2, source
+        )
+
+    def _found(self) -> str:
+        parts = [name for name in ("width", "thickness") if name in self.known]
+        return f"Known is only the {parts[0]}." if parts else "The lines above the table state none."
+
+
+def dimensions_of(table: Table, given: Mapping[str, str] | None) -> Dimensions:
+    """Return the dimensions that the user gives, and those of the file where the user gives none.
+
+    Raises
+    ------
+    InputError
+        When a dimension is unknown or has no unit, or the file states one in two ways.
+    """
+    given = dict(given or {})
+    unknown = [name for name in given if name not in DIMENSION_NAMES]
+    if unknown:
+        raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
+    if len([name for name in ("area", "diameter", "width") if name in given]) > 1:
+        raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
+    known: dict[str, Dimension] = {}
+    warnings = []
+    for name in DIMENSION_NAMES:
+        stated = _stated(table, name, name in given)
+        if stated is not None:
+            known[name] = stated
+        if name in given:
+            own = Dimension(_kind(name).value(str(given[name])), "as given")
+            if stated is not None and not isclose(own.value, stated.value, rel_tol=SAME):
+                warnings.append(
+                    f"the {name} given is {own.value:g} {_kind(name).unit}, but the file says {stated.value:g} "
+                    f"{stated.source}; yours was used."
+                )
+            known[name] = own
+    return Dimensions(table.file, known, frozenset(given), tuple(warnings))
+
+
+def _stated(table: Table, name: str, is_given: bool) -> Dimension | None:
+    """Return a dimension that the lines above the table state."""
+    found = [each for line, text in table.above for each in _read(line, text, table.separator, name)]
+    if found and not is_given and any(not isclose(each.value, found[0].value, rel_tol=SAME) for each in found):
+        values = " and ".join(f"{each.value:g} {_kind(name).unit} {each.source}" for each in found)
+        raise InputError(f"{table.file}: the file states two {name}s: {values}. Say which: --{name} NUMBER_AND_UNIT.")
+    return found[0] if found else None
+
+
+def _read(line: int, text: str, separator: str, name: str) -> Iterator[Dimension]:
+    """Give what a line like ``Width : 5 mm`` or ``"Probendicke";1,55;"mm"`` states of one dimension."""
+    text = text.lstrip("# ")
+    cells = [text] if separator == WHITESPACE else split(text, separator)
+    words = [word.strip(' "') for cell in cells for word in re.split(r"[:=\t]|\s{2,}", cell)]
+    words = [word for word in words if word]
+    for place, word in enumerate(words):
+        label = heading(word)
+        if label.quantity not in DIMENSION_NAMES[name]:
+            continue
+        for texts in (words[place + 1 : place + 3], words[place + 1 : place + 2]):
+            number, unit = number_and_unit(" ".join(texts))
+            factor = _kind(name).factors.get((unit or label.unit).replace("²", "2").replace("µ", "u"))
+            if number and number > 0 and factor:
+                yield Dimension(number * factor, f"in line {line}")
+                break
+
+
+def _kind(name: str) -> Kind:
+    return AREA if name == "area" else LENGTH
