@@ -94,9 +94,9 @@ def _position(file: str, count: int, cycle: str | int) -> int:
         return 0 if text == "first" else count - 1
     if text.isdecimal() and 1 <= int(text) <= count:
         return int(text) - 1
-    raise InputError(
-        f"{file} has {count} cycle{'s' * (count != 1)}; cycle must be first, last or 1 to {count}, not '{cycle}'."
-    )
+    if count == 1:
+        raise InputError(f"{file} has one cycle, and no '{cycle}'. Leave cycle (--cycle) out.")
+    raise InputError(f"{file} has {count} cycles; cycle must be first, last or 1 to {count}, not '{cycle}'.")
 
 
 def _labels(table: Table) -> list[str]:

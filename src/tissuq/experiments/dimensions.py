@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from math import isclose, pi
+from dataclasses import dataclass, replace
+from math import isclose, pi, prod
 
 from tissuq.errors import InputError
 from tissuq.experiments.columns import heading
@@ -63,7 +63,7 @@ class Dimensions:
         InputError
             When it is not known, or follows in two ways that contradict each other.
         """
-        areas = {name: area for name, parts in SECTIONS.items() if (area := self._area(parts)) is not None}
+        areas = _sections(self.known)
         own = {name: area for name, area in areas.items() if self.given & set(SECTIONS[name])}
         areas = own or areas
         if not areas:
@@ -80,19 +80,6 @@ class Dimensions:
                 'Say which: --area "10 mm2", and leave out the others.'
             )
         return first
-
-    def _area(self, parts: tuple[str, ...]) -> Dimension | None:
-        if not all(part in self.known for part in parts):
-            return None
-        values = [self.known[part] for part in parts]
-        if parts == ("area",):
-            return values[0]
-        source = " and ".join(
-            f"{part} {value.value:g} mm {value.source}" for part, value in zip(parts, values, strict=True)
-        )
-        return Dimension(
-            values[0].value * values[1].value if len(values) == 2 else pi / 4 * values[0].value ** 2, source
-        )
 
     def _found(self) -> str:
         parts = [name for name in ("width", "thickness") if name in self.known]
@@ -113,21 +100,37 @@ def dimensions_of(table: Table, given: Mapping[str, str] | None) -> Dimensions:
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
     if len([name for name in ("area", "diameter", "width") if name in given]) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    known: dict[str, Dimension] = {}
-    warnings = []
-    for name in DIMENSION_NAMES:
-        stated = _stated(table, name, name in given)
-        if stated is not None:
-            known[name] = stated
-        if name in given:
-            own = Dimension(_kind(name).value(str(given[name])), "as given")
-            if stated is not None and not isclose(own.value, stated.value, rel_tol=SAME):
-                warnings.append(
-                    f"the {name} given is {own.value:g} {_kind(name).unit}, but the file says {stated.value:g} "
-                    f"{stated.source}; yours was used."
-                )
-            known[name] = own
-    return Dimensions(table.file, known, frozenset(given), tuple(warnings))
+    stated = {name: found for name in DIMENSION_NAMES if (found := _stated(table, name, name in given)) is not None}
+    own = {name: Dimension(_kind(name).value(str(text)), "as given") for name, text in given.items()}
+    dimensions = Dimensions(table.file, stated | own, frozenset(given))
+    return replace(dimensions, warnings=tuple(_contradictions(dimensions, stated)))
+
+
+def _sections(known: Mapping[str, Dimension]) -> dict[str, Dimension]:
+    """Return the cross-section in every way in which it follows from what is known."""
+    found = {}
+    for name, parts in SECTIONS.items():
+        if all(part in known for part in parts):
+            sizes = [known[part] for part in parts]
+            words = (f"{part} {size.value:g} mm {size.source}" for part, size in zip(parts, sizes, strict=True))
+            value = pi / 4 * sizes[0].value ** 2 if name == "circle" else prod(size.value for size in sizes)
+            found[name] = sizes[0] if name == "area" else Dimension(value, " and ".join(words))
+    return found
+
+
+def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> Iterator[str]:
+    """Tell where the file states another length or cross-section than the user."""
+    pairs = []
+    if "length" in dimensions.given and "length" in stated:
+        pairs.append(("length", "mm", dimensions.length, stated["length"]))
+    if dimensions.given - {"length"} and _sections(stated) and _sections(dimensions.known):
+        pairs.append(("cross-section", "mm2", dimensions.area, next(iter(_sections(stated).values()))))
+    for what, unit, own, theirs in pairs:
+        if not isclose(own.value, theirs.value, rel_tol=SAME):
+            yield (
+                f"the {what} is {own.value:g} {unit} ({own.source}), but the file says {theirs.value:g} {unit} "
+                f"({theirs.source})."
+            )
 
 
 def _stated(table: Table, name: str, is_given: bool) -> Dimension | None:
@@ -151,7 +154,7 @@ def _read(line: int, text: str, separator: str, name: str) -> Iterator[Dimension
             continue
         for texts in (words[place + 1 : place + 3], words[place + 1 : place + 2]):
             number, unit = number_and_unit(" ".join(texts))
-            factor = _kind(name).factors.get((unit or label.unit).replace("²", "2").replace("µ", "u"))
+            factor = _kind(name).known(unit or label.unit)
             if number and number > 0 and factor:
                 yield Dimension(number * factor, f"in line {line}")
                 break

@@ -131,7 +131,7 @@ def _initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> D
     axis, _ = on_axis(chosen.quantity)
     names = [heading(name) for name in table.names]
     sizes = [k for k, name in enumerate(names) if on_axis(name.quantity) == (axis, "size") or name.quantity == "size"]
-    if len(sizes) != 1 or names[sizes[0]].unit != chosen.unit or chosen.unit not in LENGTH.factors:
+    if len(sizes) != 1 or names[sizes[0]].unit != chosen.unit or LENGTH.known(chosen.unit) is None:
         return None
     (size,) = table.taken(np.arange(1)).numbers(sizes)
     value = float(size[0] - displacement[0]) * LENGTH.factor(chosen.unit)
@@ -150,7 +150,7 @@ def _factor(table: Table, column: int, kind: Kind, option: str, given: str | Non
         except InputError as error:
             raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
     factor = kind.factor(given)
-    in_file = kind.factors.get(declared)
+    in_file = kind.known(declared)
     if in_file is not None and in_file != factor:
         raise InputError(
             f"{table.place(column)}: {option}='{given}' is given, but the file says '{declared}'. Leave {option} out, "

@@ -9,7 +9,10 @@ from dataclasses import dataclass
 from tissuq.errors import InputError
 from tissuq.experiments.layout import NUMBER
 
-__all__ = ["AREA", "FORCE", "LENGTH", "Kind", "number_and_unit"]
+__all__ = ["AREA", "FORCE", "LENGTH", "MASSES", "Kind", "number_and_unit"]
+
+
+MASSES = ("g", "kg")
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,10 @@ class Kind:
     name: str
     unit: str
     factors: Mapping[str, float]
+
+    def known(self, text: str) -> float | None:
+        """Return what one unit of that name is in the unit of this kind; None when it is not one of this kind."""
+        return self.factors.get(re.sub(r"[\s^]", "", text).replace("µ", "u").replace("μ", "u").replace("²", "2"))
 
     def factor(self, text: str) -> float:
         """Return what one unit of that name is in the unit of this kind.
@@ -33,12 +40,12 @@ class Kind:
         >>> FORCE.factor("mN")
         0.001
         """
-        compact = re.sub(r"[\s^]", "", text).replace("µ", "u").replace("μ", "u").replace("²", "2")
-        if compact in self.factors:
-            return self.factors[compact]
-        if self.name == "force" and compact in ("g", "kg"):
-            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {compact}f.")
-        raise InputError(f"'{text}' is not a unit of {self.name}; write one of {', '.join(self.factors)}.")
+        factor = self.known(text)
+        if factor is None and self.name == "force" and text in MASSES:
+            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {text}f.")
+        if factor is None:
+            raise InputError(f"'{text}' is not a unit of {self.name}; write one of {', '.join(self.factors)}.")
+        return factor
 
     def value(self, text: str) -> float:
         """Return a positive number with its unit, such as ``1.5 mm``, in the unit of this kind.

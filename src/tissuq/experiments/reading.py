@@ -179,7 +179,7 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
         curve = curve.told("Cauchy stress divided by stretch to engineering stress")
     if every > 1:
         kept = np.arange(0, len(curve), every)
-        curve = curve.kept(kept, f"not every {every}th").told(f"only every {every}th row")
+        curve = curve.kept(kept, f"one row in {every} asked for").told(f"one row in {every}")
     check_signs(curve.table, choice, curve.stretch, curve.stress, options.get("compression_positive", False))
     curve = curve.told(f"{len(curve)} rows (lines {curve.table.lines[0]} to {curve.table.lines[-1]})")
     sheet = table.file.removeprefix(str(path))

@@ -8,7 +8,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.curve import Curve
-from tissuq.experiments.quantities import FORCE, number_and_unit
+from tissuq.experiments.quantities import FORCE, MASSES, number_and_unit
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["preload_stress", "taut"]
@@ -32,7 +32,7 @@ def preload_stress(preload: str, area: float | None) -> float:
         raise InputError(
             f"preload must be a positive force or stress with its unit, such as '0.05 N', not '{preload}'."
         )
-    if unit not in FORCE.factors:
+    if FORCE.known(unit) is None and unit not in MASSES:
         return number * stress_unit(unit).to_mpa
     if area is None:
         raise InputError(f"preload '{preload}' is a force, but the file gives stresses; give it as a stress.")
@@ -57,7 +57,7 @@ def taut(curve: Curve, preload: str, threshold: float, peak: int) -> Curve:
         largest = size[: peak + 1].max()
         raise InputError(
             f"{curve.table.file}: the preload {preload} is not reached: the largest stress is {largest:g} MPa, and "
-            f" the preload is {threshold:g} MPa. Give a lower one, and check the units of force and area."
+            f"the preload is {threshold:g} MPa. Give a lower one, and check the units of force and area."
         )
     below = np.flatnonzero(~loaded[: peak + 1])
     below = below[below < np.flatnonzero(loaded[: peak + 1])[-1]]

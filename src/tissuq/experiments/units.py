@@ -39,7 +39,7 @@ SYMBOLS = (
     {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
     | {"bar", "mbar", "atm"}
     | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
-    | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "s", "ms", "Hz", "K", "C", "F"}
+    | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
     | {"V", "mV", "deg", "rad", "percent", "pct"}
 )
 

@@ -67,7 +67,8 @@ def _only_table(path: str | os.PathLike[str], sheets: dict[str, list[str]]) -> s
     tables = [name for name, lines in sheets.items() if find_layout([line for line in lines if line.strip()], "\t")]
     if not tables:
         raise InputError(
-            f"{path} holds no sheet with a table of numbers. The sheets are: {', '.join(map(repr, sheets))}."
+            f"{path} holds no sheet with a table of numbers (cells shown as percentages are not read as numbers). The "
+            f"sheets are: {', '.join(map(repr, sheets))}."
         )
     if len(tables) > 1:
         raise InputError(
