@@ -1,10 +1,12 @@
 """Simulated tests written as testing machines export them: each layout with what must be read from it.
 
 The curves are those of a neo-Hookean specimen (shear modulus 40 kPa), rounded to the digits that the machine writes.
+``python tests/machine_files.py FOLDER`` writes them all into a folder.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -168,3 +170,7 @@ def mts() -> MachineFile:
 LAYOUTS: dict[str, Callable[[], MachineFile]] = {
     layout.__name__: layout for layout in (instron, instron_compression, zwick, biotester, univert, wintest, mts)
 }
+
+if __name__ == "__main__":
+    for layout in LAYOUTS.values():
+        print(layout().written(Path(sys.argv[1])))
