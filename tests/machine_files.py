@@ -35,8 +35,6 @@ class MachineFile:
     stretch: np.ndarray
     stress: np.ndarray
     options: dict[str, Any] = field(default_factory=dict)
-    stretch_digit: float = 1e-5
-    stress_digit: float = 1e-5
 
     def written(self, folder: Path) -> Path:
         path = folder / self.name

@@ -31,11 +31,12 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """What is known of a specimen's dimensions, and what is strange about it."""
+    """What is known of a specimen's dimensions, what the file states in two ways, and what it contradicts."""
 
     file: str
     known: Mapping[str, Dimension]
     given: frozenset[str]
+    unclear: Mapping[str, str]
     warnings: tuple[str, ...] = ()
 
     @property
@@ -47,6 +48,7 @@ class Dimensions:
         InputError
             When it is not known.
         """
+        self._refuse_unclear("length")
         if "length" not in self.known:
             raise InputError(
                 f"{self.file}: to turn displacements into stretches give the undeformed length: length '20 mm' "
@@ -65,12 +67,14 @@ class Dimensions:
         """
         areas = _sections(self.known)
         own = {name: area for name, area in areas.items() if self.given & set(SECTIONS[name])}
+        if not own:
+            self._refuse_unclear("area", "width", "thickness", "diameter")
         areas = own or areas
         if not areas:
             raise InputError(
                 f"{self.file}: to turn forces into stresses give the undeformed cross-section: area "
-                '(--area "10 mm2"), or width and thickness (--width "5 mm" --thickness "2 mm"), or diameter. '
-                f"{self._found()}"
+                '(--area "10 mm2"), or width and thickness (--width "5 mm" --thickness "2 mm"), or diameter '
+                f'(--diameter "4 mm"). {self._found()}'
             )
         first, *others = areas.values()
         if any(not isclose(first.value, other.value, rel_tol=SAME) for other in others):
@@ -80,6 +84,14 @@ class Dimensions:
                 'Say which: --area "10 mm2", and leave out the others.'
             )
         return first
+
+    def _refuse_unclear(self, *names: str) -> None:
+        for name in names:
+            if name in self.unclear:
+                raise InputError(
+                    f"{self.file}: the file states two {name}s: {self.unclear[name]}. Say which: --{name} "
+                    f'"NUMBER {_kind(name).unit}".'
+                )
 
     def _found(self) -> str:
         parts = [name for name in ("width", "thickness") if name in self.known]
@@ -92,7 +104,7 @@ def dimensions_of(table: Table, given: Mapping[str, str] | None) -> Dimensions:
     Raises
     ------
     InputError
-        When a dimension is unknown or has no unit, or the file states one in two ways.
+        When a dimension is unknown or has no unit.
     """
     given = dict(given or {})
     unknown = [name for name in given if name not in DIMENSION_NAMES]
@@ -100,9 +112,15 @@ def dimensions_of(table: Table, given: Mapping[str, str] | None) -> Dimensions:
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
     if len([name for name in ("area", "diameter", "width") if name in given]) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    stated = {name: found for name in DIMENSION_NAMES if (found := _stated(table, name, name in given)) is not None}
+    found = {name: _stated(table, name) for name in DIMENSION_NAMES}
+    unclear = {
+        name: " and ".join(f"{each.value:g} {_kind(name).unit} {each.source}" for each in several)
+        for name, several in found.items()
+        if name not in given and any(not isclose(each.value, several[0].value, rel_tol=SAME) for each in several)
+    }
+    stated = {name: several[0] for name, several in found.items() if several and name not in unclear}
     own = {name: Dimension(_kind(name).value(str(text)), "as given") for name, text in given.items()}
-    dimensions = Dimensions(table.file, stated | own, frozenset(given))
+    dimensions = Dimensions(table.file, stated | own, frozenset(given), unclear)
     return replace(dimensions, warnings=tuple(_contradictions(dimensions, stated)))
 
 
@@ -123,7 +141,8 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
     pairs = []
     if "length" in dimensions.given and "length" in stated:
         pairs.append(("length", "mm", dimensions.length, stated["length"]))
-    if dimensions.given - {"length"} and _sections(stated) and _sections(dimensions.known):
+    uses_given = any(dimensions.given & set(SECTIONS[name]) for name in _sections(dimensions.known))
+    if uses_given and _sections(stated):
         pairs.append(("cross-section", "mm2", dimensions.area, next(iter(_sections(stated).values()))))
     for what, unit, own, theirs in pairs:
         if not isclose(own.value, theirs.value, rel_tol=SAME):
@@ -133,13 +152,9 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
             )
 
 
-def _stated(table: Table, name: str, is_given: bool) -> Dimension | None:
-    """Return a dimension that the lines above the table state."""
-    found = [each for line, text in table.above for each in _read(line, text, table.separator, name)]
-    if found and not is_given and any(not isclose(each.value, found[0].value, rel_tol=SAME) for each in found):
-        values = " and ".join(f"{each.value:g} {_kind(name).unit} {each.source}" for each in found)
-        raise InputError(f"{table.file}: the file states two {name}s: {values}. Say which: --{name} NUMBER_AND_UNIT.")
-    return found[0] if found else None
+def _stated(table: Table, name: str) -> list[Dimension]:
+    """Return what the lines above the table state of one dimension."""
+    return [each for line, text in table.above for each in _read(line, text, table.separator, name)]
 
 
 def _read(line: int, text: str, separator: str, name: str) -> Iterator[Dimension]:
