@@ -5,6 +5,7 @@ from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments import datasets
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.inspection import Inspection, inspect
 from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.experiments.reading import read_experiment
 from tissuq.fitting import fit, fit_many
@@ -38,6 +39,7 @@ __all__ = [
     "HalfCauchy",
     "HalfNormal",
     "InputError",
+    "Inspection",
     "KnownNoise",
     "LoadingMode",
     "LogNormal",
@@ -64,6 +66,7 @@ __all__ = [
     "fit",
     "fit_many",
     "initial_shear_modulus",
+    "inspect",
     "load_material",
     "loading_modes",
     "materials",

@@ -14,7 +14,7 @@ FIT = [
     (["a" * 300 + ".csv"], ["aaa.csv", "too long"]),
     ([], ["FILE", "--config"]),
     (["SPECIMEN", "--column", "stress=Load"], ["no column 'Load'", "'stretch', 'stress_kPa'"]),
-    (["SPECIMEN", "--column", "force=Load"], ["'force'", "stretch or strain, and stress"]),
+    (["SPECIMEN", "--column", "torque=Load"], ["'torque'", "stress or force"]),
     (["SPECIMEN", "--column", "stress"], ["--column", "ROLE=COLUMN"]),
     (["SPECIMEN", "--column", "stress="], ["--column", "ROLE=COLUMN"]),
     (["SPECIMEN", "--column", "stress=1", "--column", "stress=2"], ["--column", "twice", "'stress'"]),

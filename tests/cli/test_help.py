@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-HEAVY = ["jax", "pandas", "xarray", "matplotlib", "scipy", "pint"]
+HEAVY = ["jax", "pandas", "xarray", "matplotlib", "scipy", "pint", "openpyxl"]
 
 
 def test_help_is_shown_without_importing_a_heavy_library():
@@ -21,7 +21,7 @@ def test_help_is_shown_without_importing_a_heavy_library():
     assert json.loads(said.splitlines()[-1]) == [0, []]
 
 
-@pytest.mark.parametrize("name", ["paper", "fit", "show", "materials", "discrepancies", "datasets", "study"])
+@pytest.mark.parametrize("name", ["paper", "fit", "inspect", "show", "materials", "discrepancies", "datasets", "study"])
 def test_every_command_has_help(cli, name):
     said = cli(name, "--help")
     assert (said.status, said.err) == (0, "")

@@ -42,15 +42,15 @@ BAD = {
     "workbook.csv": ["Excel workbook", "CSV"],
     "one_line.csv": ["not a table in text form"],
     "unknown_columns.csv": [
-        "no column is recognised as stress",
+        "no column is recognised as stretch, strain or displacement",
         "'elongation', 'load'",
-        "--column stress=NAME",
+        "--column stretch=NAME",
     ],
     "no_header.csv": ["2 columns have no names", 'columns={"stretch": 1, "stress": 2}'],
     "stretch_and_strain.csv": ["'stretch' (number 1) and 'strain' (number 2)", 'columns={"stretch": "NAME"}'],
     "two_stresses.csv": ["'stress_kPa' (number 2) and 'nominal stress [kPa]' (number 3)"],
     "true_stress.csv": ["'true stress [kPa]' is a stress of the cauchy kind", "--stress-type cauchy"],
-    "log_strain.csv": ["no column is recognised as stretch or strain", "'log strain'"],
+    "log_strain.csv": ["no column is recognised as stretch, strain or displacement", "'log strain'"],
     "text_in_number_column.csv": ["line 3, column 'stress': 'n/a' is not a number"],
     "text_in_first_row.csv": ["line 2, column 'stretch': '--' is not a number"],
     "footer.csv": ["line 4, column 'stretch': 'End of test' is not a number"],
@@ -235,7 +235,8 @@ def test_a_strain_given_as_stretch_is_answered_with_how_to_say_it(written):
         ({"stress": 0}, "no column '0'"),
         ({"strain": 1, "stretch": 1}, "both stretch and strain"),
         ({"strain": 2, "stress": 2}, "cannot be both strain and stress"),
-        ({"force": "Stress"}, "cannot be given as 'force'"),
+        ({"torque": "Stress"}, "cannot be given as 'torque'"),
+        ({"force": 2, "stress": 3}, "both stress and force"),
     ],
 )
 def test_a_mapping_that_does_not_fit_is_refused(written, columns, words):

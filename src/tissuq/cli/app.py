@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, fit, paper, show, study
+from tissuq.cli import catalogue, check, compare, fit, inspect, paper, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -23,6 +23,7 @@ app = typer.Typer(
     help="Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted.",
 )
 app.command("paper")(paper.paper)
+app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
 app.command("compare")(compare.compare)
 app.command("show")(show.show)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from tissuq.cli import reading
 from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
 from tissuq.errors import InputError
 
@@ -16,7 +17,7 @@ __all__ = ["fit"]
 
 def fit(
     file: Annotated[
-        Path | None, typer.Argument(help="CSV file, or the name of a built-in data set (tissuq datasets).")
+        Path | None, typer.Argument(help="CSV or Excel file, or the name of a built-in data set (tissuq datasets).")
     ] = None,
     material: Annotated[
         str | None,
@@ -42,18 +43,26 @@ def fit(
         list[str] | None,
         typer.Option(help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more."),
     ] = None,
-    mode: Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")] = None,
-    column: Annotated[
-        list[str] | None,
-        typer.Option(help="ROLE=COLUMN for stretch, strain or stress, such as stretch=Strain; repeat."),
-    ] = None,
-    stress_unit: Annotated[str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")] = None,
-    stress_type: Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")] = None,
-    strain_unit: Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")] = None,
-    compression_positive: Annotated[
-        bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
-    ] = None,
-    skip_rows: Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")] = None,
+    mode: reading.Mode = None,
+    column: reading.Column = None,
+    stress_unit: reading.StressUnit = None,
+    stress_type: reading.StressType = None,
+    strain_unit: reading.StrainUnit = None,
+    force_unit: reading.ForceUnit = None,
+    displacement_unit: reading.DisplacementUnit = None,
+    length: reading.Length = None,
+    area: reading.Area = None,
+    width: reading.Width = None,
+    thickness: reading.Thickness = None,
+    diameter: reading.Diameter = None,
+    compression_positive: reading.CompressionPositive = None,
+    cycle: reading.Cycle = None,
+    branch: reading.Branch = None,
+    preload: reading.Preload = None,
+    every: reading.Every = None,
+    axis: reading.Axis = None,
+    sheet: reading.Sheet = None,
+    skip_rows: reading.SkipRows = None,
     method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
@@ -62,22 +71,20 @@ def fit(
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
     """Identify a material's parameters from a file of stretches and stresses."""
+    given = reading.reading_options(locals())
     from tissuq.cli.tables import print_summary, print_warnings
     from tissuq.mechanics import material_named
     from tissuq.report.run_folder import check_target, run_folder
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
-    options: dict[str, Any] = {
-        "file": str(_resolve(file)) if file and not config else None, "material": material, "mode": mode,
-        "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "stress_unit": stress_unit,
-        "stress_type": stress_type, "strain_unit": strain_unit, "compression_positive": compression_positive,
-        "skip_rows": skip_rows, "noise": noise, "method": method, "seed": seed,
+    options: dict[str, Any] = given | {
+        "file": str(reading.resolve(file)) if file and not config else None, "material": material,
+        "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "noise": noise, "method": method,
+        "seed": seed,
     }  # fmt: skip
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))
-    if column:
-        options["columns"] = once_each("--column", map(_role, column))
     if not file and not config:
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     law = material_named(material, laws=True) if material else None
@@ -85,7 +92,7 @@ def fit(
     beside = config.parent if config else Path()
     source = beside / settings.file
     if file and config:
-        _check_same(_resolve(file), source, config)
+        _check_same(reading.resolve(file), source, config)
     target = out or Path("runs") / source.stem
     check_target(target, force=force)
     with progress() as step:
@@ -98,16 +105,6 @@ def fit(
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     not_converged(study.not_converged)
-
-
-def _resolve(file: Path) -> Path:
-    """Return the user's file, or the built-in data set of that name, which must be one that can be fitted."""
-    from tissuq.experiments import datasets
-
-    if file.exists() or str(file) not in datasets.names():
-        return file
-    datasets.load(str(file))
-    return datasets.path(str(file))
 
 
 def _check_same(file: Path, named: Path, config: Path) -> None:
@@ -130,10 +127,3 @@ def _noise(text: str | None) -> float | str | None:
         return float(text)
     except ValueError as error:
         raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error
-
-
-def _role(text: str) -> tuple[str, str | int]:
-    role, _, name = text.partition("=")
-    if not name:
-        raise InputError(f"--column needs ROLE=COLUMN, such as stress='Stress (kPa)', not '{text}'.")
-    return role.strip(), int(name) if name.strip().isdecimal() else name.strip()

@@ -1,4 +1,4 @@
-"""Which columns of a table hold the deformation and the stress, and the units that their headings state."""
+"""Which columns of a table hold the deformation and the stress or force, and the units that their headings state."""
 
 from __future__ import annotations
 
@@ -10,16 +10,12 @@ from difflib import get_close_matches
 from tissuq.errors import InputError
 from tissuq.experiments.table import Table
 from tissuq.experiments.units import looks_like_unit
+from tissuq.experiments.vocabulary import STRESS_NAMES, on_axis, plain, role_names
 
 __all__ = ["ColumnChoice", "Heading", "choose_columns", "declared_unit", "heading"]
 
-STRETCH_NAMES = frozenset(["stretch", "stretch ratio", "lambda", "λ"])
-STRAIN_NAMES = frozenset(["strain", "engineering strain", "nominal strain"])
-STRESS_NAMES = {
-    "engineering": frozenset(["stress", "engineering stress", "nominal stress"]),
-    "cauchy": frozenset(["stress", "cauchy stress", "true stress"]),
-}
-ROLES = ("stretch", "strain", "stress")
+DEFORMATIONS = ("stretch", "strain", "displacement")
+LOADS = ("stress", "force")
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]"),
     re.compile(r"(?P<quantity>.+?)\s*/\s*(?P<unit>.+)"),
@@ -38,11 +34,27 @@ class Heading:
 
 @dataclass(frozen=True)
 class ColumnChoice:
-    """The columns (counted from 0) of the deformation and the stress; the deformation may be a strain."""
+    """The columns (counted from 0) of the deformation and of the stress or force, and what they hold.
+
+    Parameters
+    ----------
+    deformation, stress : int
+        The columns.
+    measure : str
+        What the deformation is: stretch, strain or displacement.
+    load : str
+        What the other column holds: stress or force.
+    """
 
     deformation: int
-    is_strain: bool
     stress: int
+    measure: str = "stretch"
+    load: str = "stress"
+
+    @property
+    def is_strain(self) -> bool:
+        """Whether the deformation is a strain."""
+        return self.measure == "strain"
 
 
 def heading(name: str) -> Heading:
@@ -52,8 +64,8 @@ def heading(name: str) -> Heading:
     if parts is None:
         parts = UNIT_AS_SUFFIX.fullmatch(name)
         if parts is None or not looks_like_unit(parts["unit"]):
-            return Heading(_plain(name))
-    return Heading(_plain(parts["quantity"]), parts["unit"].strip())
+            return Heading(plain(name))
+    return Heading(plain(parts["quantity"]), parts["unit"].strip())
 
 
 def declared_unit(table: Table, column: int) -> str:
@@ -74,17 +86,23 @@ def declared_unit(table: Table, column: int) -> str:
     return beneath or in_heading
 
 
-def choose_columns(table: Table, mapping: Mapping[str, str | int] | None, stress_type: str) -> ColumnChoice:
+def choose_columns(
+    table: Table, mapping: Mapping[str, str | int] | None, stress_type: str, axis: str | None = None
+) -> ColumnChoice:
     """Return the columns to read: those of the mapping, the others by their names.
+
+    A stress goes before a force, a stretch or strain before a displacement.
 
     Parameters
     ----------
     table : Table
         The table to choose from.
     mapping : mapping or None
-        From a role (stretch or strain, stress) to the name or the number, from 1, of a column.
+        From a role (stretch, strain or displacement; stress or force) to the name or the number, from 1, of a column.
     stress_type : str
         ``engineering`` or ``cauchy``: what a stress column may be called.
+    axis : str, optional
+        ``x`` or ``y``: whose columns are read from the file of a biaxial machine.
 
     Raises
     ------
@@ -93,39 +111,60 @@ def choose_columns(table: Table, mapping: Mapping[str, str | int] | None, stress
     """
     mapping = dict(mapping or {})
     _check_roles(table, mapping)
-    if "stress" in mapping:
-        stress = _find(table, "stress", mapping["stress"])
+    quantities = _quantities(table, axis, mapping)
+    load = next((role for role in LOADS if role in mapping), None)
+    if load:
+        stress = _find(table, load, mapping[load])
     else:
-        stress = _recognise(table, "stress", STRESS_NAMES[stress_type], _stress_hint(table, stress_type))
-    role = next((role for role in ("stretch", "strain") if role in mapping), None)
-    if role:
-        deformation = _find(table, role, mapping[role])
-        is_strain = role == "strain"
+        load = "stress" if _fitting(quantities, ["stress"], stress_type) else "force"
+        hint = _stress_hint(table, stress_type)
+        stress = _recognise(table, quantities, "stress", [load], stress_type, "stress or force", hint)
+    measure = next((role for role in DEFORMATIONS if role in mapping), None)
+    if measure:
+        deformation = _find(table, measure, mapping[measure])
     else:
-        deformation = _recognise(table, "stretch", STRETCH_NAMES | STRAIN_NAMES)
-        is_strain = heading(table.names[deformation]).quantity in STRAIN_NAMES
+        known = DEFORMATIONS[:2] if _fitting(quantities, DEFORMATIONS[:2]) else DEFORMATIONS[2:]
+        what = "stretch, strain or displacement"
+        deformation = _recognise(table, quantities, "stretch", known, stress_type, what)
+        measure = next(role for role in known if quantities[deformation] in role_names(role))
     if deformation == stress:
         raise InputError(
-            f"{table.file}: column {table.label(stress)} cannot be both {role or 'stretch'} and stress; "
+            f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
             f"give two columns. {_columns_there_are(table)}"
         )
-    _check_measures(table, ColumnChoice(deformation, is_strain, stress), stress_type)
-    return ColumnChoice(deformation, is_strain, stress)
+    choice = ColumnChoice(deformation, stress, measure, load)
+    _check_measures(table, choice, stress_type)
+    return choice
 
 
-def _plain(name: str) -> str:
-    return re.sub(r"[\s_-]+", " ", name).strip().lower()
+def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
+    """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
+    found = [on_axis(heading(name).quantity) for name in table.names]
+    axes = sorted({each for each, _ in found if each})
+    if axis is not None and axis not in axes:
+        raise InputError(
+            f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
+        )
+    if axis is None and len(axes) == 2 and not mapping:
+        raise InputError(
+            f"{table.file} is of a biaxial test. Say which axis is read: axis='x' (--axis x) or axis='y' (--axis y), "
+            "with the loading mode that belongs to it. Both axes at once belong to a biaxial mode, not to this reader."
+        )
+    wanted = axis or (axes[0] if len(axes) == 1 else "")
+    return [name if each in ("", wanted) else "" for each, name in found]
 
 
 def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
-    unknown = [role for role in mapping if role not in ROLES]
+    unknown = [role for role in mapping if role not in DEFORMATIONS + LOADS]
     if unknown:
         raise InputError(
-            f"{table.file}: a column cannot be given as '{unknown[0]}'. Give stretch or strain, and stress, "
-            'as in columns={"strain": "Strain"} or --column strain=Strain.'
+            f"{table.file}: a column cannot be given as '{unknown[0]}'. Give stretch, strain or displacement, and "
+            'stress or force, as in columns={"strain": "Strain"} or --column strain=Strain.'
         )
-    if "stretch" in mapping and "strain" in mapping:
-        raise InputError(f"{table.file}: columns are given for both stretch and strain; give only one of them.")
+    for roles in (DEFORMATIONS, LOADS):
+        both = [role for role in roles if role in mapping]
+        if len(both) > 1:
+            raise InputError(f"{table.file}: columns are given for both {' and '.join(both)}; give only one of them.")
 
 
 def _find(table: Table, role: str, wanted: str | int) -> int:
@@ -135,7 +174,7 @@ def _find(table: Table, role: str, wanted: str | int) -> int:
         [name.lower() for name in table.names],
         [heading(name).quantity for name in table.names],
     )
-    for names, key in zip(readings, (text, text.lower(), _plain(text)), strict=True):
+    for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
         found = [column for column, name in enumerate(names) if name and name == key]
         if len(found) > 1:
             raise _ambiguous(table, role, found)
@@ -150,12 +189,25 @@ def _find(table: Table, role: str, wanted: str | int) -> int:
     )
 
 
-def _recognise(table: Table, role: str, known: frozenset[str], hint: str = "") -> int:
-    found = [column for column, name in enumerate(table.names) if heading(name).quantity in known]
+def _fitting(quantities: Sequence[str], roles: Sequence[str], stress_type: str = "engineering") -> list[int]:
+    names = frozenset().union(*(role_names(role, stress_type) for role in roles))
+    return [column for column, quantity in enumerate(quantities) if quantity in names]
+
+
+def _recognise(
+    table: Table,
+    quantities: Sequence[str],
+    role: str,
+    known: Sequence[str],
+    stress_type: str,
+    what: str,
+    hint: str = "",
+) -> int:
+    """Return the one column whose name says that it has one of the known roles."""
+    found = _fitting(quantities, known, stress_type)
     if len(found) > 1:
-        raise _ambiguous(table, role, found)
+        raise _ambiguous(table, known[0], found)
     if not found:
-        what = "stretch or strain" if role == "stretch" else role
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
             f"{_columns_there_are(table)} {_how_to_say(table, role)}"

@@ -17,6 +17,8 @@ SEPARATORS = ("\t", ";", ",", WHITESPACE)
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 MISSING = frozenset(["", "-", "--", "---", "n/a", "#n/a", "na", "nan", "null", "none", "inf", "+inf", "-inf"])
 LINES_TO_JUDGE = 500
+SHORT, FAR_LONGER = 3, 10
+"""Rows that a table passed over has at most, and how many times more the one beneath it has at least."""
 
 Split = Callable[[str], list[str]]
 
@@ -46,11 +48,15 @@ class Layout:
     units: int | None
 
 
-def find_layout(lines: Sequence[str]) -> Layout | None:
-    """Return the layout of the first table in lines without blanks and comments; None if there is none."""
-    separator = _likely_separator(lines[:LINES_TO_JUDGE])
+def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | None:
+    """Return the layout of the first table in lines without blanks and comments; None if there is none.
+
+    A table of a few rows, such as a machine's table of results, is passed over for a far longer one beneath it with
+    other names.
+    """
+    separator = separator or _likely_separator(lines[:LINES_TO_JUDGE])
     cells = partial(split, separator=separator)
-    confirmed = _first_numeric_row(lines, cells)
+    confirmed = _main_row(lines, cells)
     if confirmed is None:
         return None
     first = _with_faulty_rows_above(lines, cells, confirmed)
@@ -94,9 +100,30 @@ def _likely_separator(lines: Sequence[str]) -> str:
     return max(SEPARATORS, key=lambda separator: sum(share_of_numbers(line, separator) for line in lines))
 
 
-def _first_numeric_row(lines: Sequence[str], cells: Split) -> int | None:
+def _main_row(lines: Sequence[str], cells: Split) -> int | None:
+    """Find the first row of the first table that is not far shorter than a named one after it."""
+    first = _first_numeric_row(lines, cells)
+    if first is None:
+        return None
+    length = _length(lines, cells, first, limit=SHORT + 1)
+    if length > SHORT:
+        return first
+    later = _first_numeric_row(lines, cells, first + length)
+    headings = [] if later is None else lines[max(later - 2, first + length) : later]
+    if later is None or not any(_are_names(cells(line)) and line not in lines[:first] for line in headings):
+        return first
+    return later if _length(lines, cells, later, limit=FAR_LONGER * length) == FAR_LONGER * length else first
+
+
+def _length(lines: Sequence[str], cells: Split, first: int, limit: int) -> int:
+    """Count the rows of data from the first on, up to a limit."""
+    rows = lines[first : first + limit]
+    return next((count for count, line in enumerate(rows) if not _is_data(cells(line))), len(rows))
+
+
+def _first_numeric_row(lines: Sequence[str], cells: Split, start: int = 0) -> int | None:
     """Find a row of numbers alone, or of two numbers before more data: metadata may hold numbers too."""
-    for position, line in enumerate(lines):
+    for position, line in enumerate(lines[start:], start):
         row = cells(line)
         next_row = cells(lines[position + 1]) if position + 1 < len(lines) else []
         if _count_numbers(row) >= 2 and (_are_values(row) or _is_data(next_row)):

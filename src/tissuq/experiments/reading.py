@@ -1,63 +1,129 @@
-"""From a laboratory's file to an experiment: columns chosen, units and stress measures converted."""
+"""From a laboratory's file to an experiment, in steps of which each leaves a sentence."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments import units
-from tissuq.experiments.columns import ColumnChoice, choose_columns, declared_unit
+from tissuq.experiments.columns import ColumnChoice, choose_columns
+from tissuq.experiments.curve import Curve
+from tissuq.experiments.cycles import Cycle, chosen, find_cycles
+from tissuq.experiments.dimensions import dimensions_of
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.measures import stress_of, stretch_of
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.plausibility import check_signs, check_strain, check_stretch
+from tissuq.experiments.plausibility import check_signs, check_stretch
+from tissuq.experiments.signs import with_compression_negative
+from tissuq.experiments.slack import preload_stress, taut
 from tissuq.experiments.table import Table, read_table
 
-__all__ = ["STRESS_TYPES", "read_experiment"]
+__all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file"]
 
 STRESS_TYPES = ("engineering", "cauchy")
+AXES = ("x", "y")
 
-Column = NDArray[np.float64]
+
+class ReadingOptions(TypedDict, total=False):
+    """How to read a file where it does not tell by itself: the options of :func:`read_experiment`."""
+
+    mode: str | LoadingMode
+    columns: Mapping[str, str | int] | None
+    stress_unit: str | None
+    stress_type: str
+    strain_unit: str | None
+    force_unit: str | None
+    displacement_unit: str | None
+    dimensions: Mapping[str, str] | None
+    compression_positive: bool
+    cycle: str | int | None
+    branch: str | None
+    preload: str | None
+    every: int
+    axis: str | None
+    sheet: str | int | None
+    name: str | None
+    skip_rows: int
 
 
-def read_experiment(
-    path: str | os.PathLike[str],
-    *,
-    mode: str | LoadingMode = "uniaxial",
-    columns: Mapping[str, str | int] | None = None,
-    stress_unit: str | None = None,
-    stress_type: str = "engineering",
-    strain_unit: str | None = None,
-    compression_positive: bool = False,
-    name: str | None = None,
-    skip_rows: int = 0,
-) -> Experiment:
-    """Read stretches and stresses from a text file (CSV, TSV, columns of numbers).
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A file, the experiment that was read from it, and what was done on the way.
 
-    Separators, decimal points or commas, encodings, lines above the table, a row of column names and a
-    row of units are recognised. Nothing is guessed where a wrong guess would change the numbers.
+    Parameters
+    ----------
+    experiment : Experiment
+    table : Table
+        All rows of the file.
+    choice : ColumnChoice
+        The columns that were read.
+    recorded : Curve
+        All rows as stretch and stress, before any was dropped or stretch counted from a preload.
+    used : Curve
+        The rows of the experiment, and the steps that led to it.
+    cycles : tuple of Cycle
+        Of the recorded rows.
+    warnings : tuple of str
+    """
+
+    experiment: Experiment
+    table: Table
+    choice: ColumnChoice
+    recorded: Curve
+    used: Curve
+    cycles: tuple[Cycle, ...]
+    warnings: tuple[str, ...]
+
+
+def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Experiment:
+    """Read stretches and stresses from a file: CSV, TSV, columns of numbers, or an Excel workbook.
+
+    Separators, decimal points or commas, encodings, lines above the table, a row of column names, a
+    row of units, and columns and dimensions in English or German are recognised. Nothing is guessed where a wrong
+    guess would change the numbers.
 
     Parameters
     ----------
     path : str or path
         The file.
     mode : str or LoadingMode
-        How the specimen was loaded.
+        How the specimen was loaded; uniaxial unless given.
     columns : mapping, optional
-        From ``stretch`` or ``strain``, and ``stress``, to the name of a column or its number from 1.
-        Columns named stretch, lambda, strain or stress (with a unit or not) need none.
+        From ``stretch``, ``strain`` or ``displacement``, and ``stress`` or ``force``, to the name of a column or its
+        number from 1. Columns with usual names (with a unit or not) need none.
     stress_unit : str, optional
-        Unit of the stresses; without it the file's own, and MPa when the file states none.
+        Unit of the stresses; without it the file's own, and MPa when the file states none. For a file of forces,
+        the unit in which people want to read the stresses, kPa unless given.
     stress_type : str
         ``engineering`` (force over undeformed area) or ``cauchy``, which is divided by the stretch.
     strain_unit : str, optional
         ``%`` or ``1``, for a column of strains; without it the file's own, and 1 when it states none.
+    force_unit, displacement_unit : str, optional
+        Such as ``mN`` and ``um``, for columns of which the file states no unit.
+    dimensions : mapping, optional
+        Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
+        Without it those in the lines above the table. Only displacements and forces need them.
     compression_positive : bool
-        Whether the file counts compression as positive: flips stresses at stretches below 1.
+        Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
+        displacements that are positive, too.
+    cycle : str or int, optional
+        ``first``, ``last`` or the number (from 1) of the only cycle to use; all unless given.
+    branch : str, optional
+        ``loading`` or ``unloading``: the only branch to use.
+    preload : str, optional
+        Force or stress with its unit (``0.05 N``, ``1 kPa``) at which the specimen counts as taut: stretches are
+        counted from there, and rows that carry less are dropped.
+    every : int
+        Use only every second (2), third (3) ... of these rows.
+    axis : str, optional
+        ``x`` or ``y``: whose columns to read from the file of a biaxial machine.
+    sheet : str or int, optional
+        Name or number (from 1) of the sheet of an Excel workbook.
     name : str, optional
         Name of the experiment; the name of the file without its ending when not given.
     skip_rows : int
@@ -67,7 +133,7 @@ def read_experiment(
     -------
     Experiment
         Stretches (dimensionless) and engineering stresses (MPa) in the order of the file; its ``source``
-        tells the file, columns, units and conversions.
+        tells the file, columns, units and every step. :func:`tissuq.inspect` shows them.
 
     Raises
     ------
@@ -81,109 +147,57 @@ def read_experiment(
     >>> data.stress_unit, len(data)
     ('MPa', 21)
     """
-    mode = loading_mode(mode)
+    return read_file(path, **options).experiment
+
+
+def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
+    """Read a file as :func:`read_experiment` does, and keep what was done on the way."""
+    mode = loading_mode(options.get("mode", "uniaxial"))
+    stress_type, axis = options.get("stress_type", "engineering"), options.get("axis")
+    every, name = options.get("every", 1), options.get("name")
+    _check_options(stress_type, axis, every)
+    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
+    choice = choose_columns(table, options.get("columns"), stress_type, axis)
+    dimensions = dimensions_of(table, options.get("dimensions"))
+    deformation, load = table.numbers([choice.deformation, choice.stress])
+    stretch, stretch_source = stretch_of(
+        table, choice, deformation, load, dimensions, options.get("strain_unit"), options.get("displacement_unit")
+    )
+    measured = stress_of(
+        table, choice, load, dimensions, stress_type, options.get("stress_unit"), options.get("force_unit")
+    )
+    curve = Curve(table, np.arange(len(stretch)), stretch, measured.stress, (stretch_source, measured.source))
+    curve = with_compression_negative(curve, choice, options.get("compression_positive", False))
+    recorded, cycles = curve, find_cycles(table, curve.stretch)
+    curve = chosen(curve, cycles, options.get("cycle"), options.get("branch"))
+    if (preload := options.get("preload")) is not None:
+        threshold = preload_stress(preload, measured.area)
+        curve = taut(curve, preload, threshold, peak=find_cycles(curve.table, curve.stretch)[0].peak)
+    check_stretch(curve.table, choice, curve.stretch)
+    if stress_type == "cauchy":
+        recorded, curve = (replace(each, stress=each.stress / each.stretch) for each in (recorded, curve))
+        curve = curve.told("Cauchy stress divided by stretch to engineering stress")
+    if every > 1:
+        kept = np.arange(0, len(curve), every)
+        curve = curve.kept(kept, f"one row in {every} asked for").told(f"one row in {every}")
+    check_signs(curve.table, choice, curve.stretch, curve.stress, options.get("compression_positive", False))
+    curve = curve.told(f"{len(curve)} rows (lines {curve.table.lines[0]} to {curve.table.lines[-1]})")
+    sheet = table.file.removeprefix(str(path))
+    experiment = Experiment(
+        mode=mode,
+        stretch=curve.stretch,
+        stress=curve.stress,
+        name=Path(path).stem if name is None else name,
+        source=f"{Path(path).name}{sheet}: {'; '.join(curve.steps)}",
+        stress_unit=measured.unit.name,
+    )
+    return Reading(experiment, table, choice, recorded, curve, tuple(cycles), dimensions.warnings)
+
+
+def _check_options(stress_type: str, axis: str | None, every: int) -> None:
     if stress_type not in STRESS_TYPES:
         raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
-    table = read_table(path, skip_rows)
-    choice = choose_columns(table, columns, stress_type)
-    deformation, stress = table.numbers([choice.deformation, choice.stress])
-    stretch, stretch_source = _stretch(table, choice, deformation, stress, strain_unit)
-    unit, unit_source = _stress_unit(table, choice, stress_unit)
-    stress = stress * unit.to_mpa
-    stress_source = f"{stress_type} stress from column {table.label(choice.stress)} in {unit_source}"
-    if stress_type == "cauchy":
-        stress = stress / stretch
-        stress_source += ", divided by stretch to engineering stress"
-    if compression_positive and (stretch >= 1).all():
-        raise InputError(
-            f"{table.place(choice.deformation)}: compression_positive=True (--compression-positive) is given, but no "
-            "stretch is below 1, so nothing would change. If the file counts compressive strains as positive, too, "
-            "change their sign in the file; otherwise leave it out."
-        )
-    if compression_positive:
-        stress = np.where(stretch < 1, -stress, stress)
-        stress_source += ", sign changed at stretch < 1"
-    check_signs(table, choice, stretch, stress, compression_positive)
-    rows = f"{len(stretch)} rows (lines {table.lines[0]} to {table.lines[-1]})"
-    return Experiment(
-        mode=mode,
-        stretch=stretch,
-        stress=stress,
-        name=Path(path).stem if name is None else name,
-        source=f"{Path(path).name}: {stretch_source}; {stress_source}; {rows}",
-        stress_unit=unit.name,
-    )
-
-
-def _stretch(
-    table: Table, choice: ColumnChoice, values: Column, stress: Column, strain_unit: str | None
-) -> tuple[Column, str]:
-    """Return the stretches and how they were obtained."""
-    if strain_unit is not None and not choice.is_strain:
-        raise InputError(
-            f"{table.place(choice.deformation)} is read as stretch, but strain_unit='{strain_unit}' is "
-            "given. Leave strain_unit (--strain-unit) out, or give the column as strain."
-        )
-    declared = declared_unit(table, choice.deformation)
-    if not choice.is_strain and not units.looks_like_unit(declared):
-        declared = ""
-    factor = _strain_factor(table, choice, declared, strain_unit)
-    label = table.label(choice.deformation)
-    scaled = "" if factor == 1 else f" x {factor:g}"
-    if choice.is_strain:
-        check_strain(table, choice, values * factor, stress, has_unit=bool(declared or strain_unit))
-        stretch, source = 1 + values * factor, f"stretch = 1 + column {label}{scaled}"
-    else:
-        stretch, source = values * factor, f"stretch = column {label}{scaled}"
-    check_stretch(table, choice, stretch)
-    return stretch, source
-
-
-def _strain_factor(table: Table, choice: ColumnChoice, declared: str, given: str | None) -> float:
-    place = table.place(choice.deformation)
-    try:
-        in_file = units.strain_factor(declared)
-    except InputError as error:
-        if given is None:
-            hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.is_strain else ""
-            raise InputError(f"{place}: {error}{hint}") from error
-        declared, in_file = "", 1.0
-    if given is None:
-        return in_file
-    factor = units.strain_factor(given)
-    if declared and in_file != factor:
-        raise InputError(
-            f"{place}: strain_unit='{given}' is given, but the file says '{declared}'. Leave strain_unit "
-            "(--strain-unit) out, or correct the file."
-        )
-    return factor
-
-
-def _stress_unit(table: Table, choice: ColumnChoice, given: str | None) -> tuple[units.StressUnit, str]:
-    """Return the unit of the stresses and the words for where it comes from."""
-    declared = declared_unit(table, choice.stress)
-    if given is not None:
-        unit = units.stress_unit(given)
-        in_file = _unit_or_none(declared)
-        if in_file and not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
-            raise InputError(
-                f"{table.place(choice.stress)}: stress_unit='{given}' is given, but the file says "
-                f"'{declared}'. Leave stress_unit (--stress-unit) out, or correct the file."
-            )
-        return unit, f"{unit.name} (as given)"
-    if not declared:
-        return units.StressUnit("MPa", 1.0), "MPa (assumed: the file states no unit)"
-    try:
-        unit = units.stress_unit(declared)
-    except InputError as error:
-        raise InputError(
-            f"{table.place(choice.stress)}: {error} To say it yourself, give stress_unit (--stress-unit)."
-        ) from error
-    return unit, f"{unit.name} (from the file)"
-
-
-def _unit_or_none(text: str) -> units.StressUnit | None:
-    try:
-        return units.stress_unit(text) if text else None
-    except InputError:
-        return None
+    if axis is not None and axis not in AXES:
+        raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
+    if not isinstance(every, int) or every < 1:
+        raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")

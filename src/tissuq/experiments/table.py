@@ -1,4 +1,4 @@
-"""The table in a text file: named columns of numbers, each row with its line in the file."""
+"""The table in a file: named columns of numbers, each row with its line in the file."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.layout import NUMBER, WHITESPACE, column_names, find_layout, split
 from tissuq.experiments.text_file import read_lines
+from tissuq.experiments.workbook import is_workbook, sheet_lines
 
 __all__ = ["Table", "read_table"]
 
@@ -26,7 +27,7 @@ HEAD = 1000
 
 @dataclass(frozen=True)
 class Table:
-    """A table found in a text file.
+    """A table found in a file; a row of an Excel sheet is a line.
 
     Parameters
     ----------
@@ -42,6 +43,8 @@ class Table:
         The rows of data as text.
     lines : sequence of int
         The line in the file of every row, counted from 1.
+    above : sequence of (int, str)
+        The lines above the rows, with their numbers.
     block : (rows, columns) array, optional
         All cells, where they have been read as numbers already.
     """
@@ -52,6 +55,7 @@ class Table:
     separator: str
     rows: list[str]
     lines: Sequence[int]
+    above: Sequence[tuple[int, str]] = ()
     block: NDArray[np.float64] | None = None
 
     def label(self, column: int) -> str:
@@ -62,6 +66,17 @@ class Table:
         """Return the place of a column, or of its cell in a row, as an editor shows it."""
         line = "" if row is None else f", line {self.lines[row]}"
         return f"{self.file}{line}, column {self.label(column)}"
+
+    def taken(self, rows: NDArray[np.intp]) -> Table:
+        """Return the table with only some rows, in that order."""
+        kept = rows.tolist()
+        block = None if self.block is None else self.block[rows]
+        return replace(self, rows=[self.rows[k] for k in kept], lines=[self.lines[k] for k in kept], block=block)
+
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column (counted from 0) as text, empty ones where a row ends before it."""
+        cells = (split(row, self.separator) for row in self.rows)
+        return [row[column] if column < len(row) else "" for row in cells]
 
     def numbers(self, columns: Sequence[int]) -> list[NDArray[np.float64]]:
         """Return columns (counted from 0) as finite numbers, written with decimal points or decimal commas.
@@ -110,28 +125,31 @@ class Table:
         return InputError(f"{self.file}: columns {' and '.join(map(self.label, columns))} do not hold numbers.")
 
 
-def read_table(path: str | os.PathLike[str], skip_rows: int = 0) -> Table:
-    """Find the table in a text file.
-
-    Comment lines (``#``), blank lines and a block of other lines above the table are passed over; a row
-    of column names and a row of units beneath it are recognised.
+def read_table(path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None) -> Table:
+    """Return the table in a file: lines above it, names, units and rows are recognised.
 
     Parameters
     ----------
     path : str or path
-        Comma-, semicolon-, tab- or blank-separated text.
+        Comma-, semicolon-, tab- or blank-separated text, or an Excel workbook (.xlsx).
     skip_rows : int
         Number of lines at the top of the file to pass over unseen.
+    sheet : str or int, optional
+        Name or number (from 1) of a workbook's sheet; without it the only one that holds a table.
 
     Raises
     ------
     InputError
         When the file cannot be read, holds no table of numbers, or its rows do not match its header.
     """
-    file = str(path)
     if not isinstance(skip_rows, int) or skip_rows < 0:
         raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
-    lines = read_lines(path)
+    if is_workbook(path):
+        name, lines = sheet_lines(path, sheet)
+        return _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, "	")
+    if sheet is not None:
+        raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
+    file, lines = str(path), read_lines(path)
     return _read_long(file, lines, skip_rows) or _read_every_line(file, lines, skip_rows)
 
 
@@ -168,13 +186,13 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
     return replace(head, rows=rows, lines=numbers, block=block)
 
 
-def _read_every_line(file: str, lines: list[str], skip_rows: int) -> Table:
+def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str | None = None) -> Table:
     """Return the table of any file, looking at every line."""
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
     content = [(line, text) for line, text in filled if not text.lstrip().startswith("#")]
     texts = [text for _, text in content]
-    layout = find_layout(texts)
+    layout = find_layout(texts, separator)
     if layout is None:
         raise _no_table(file, content)
     first = layout.first_row
@@ -192,6 +210,7 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int) -> Table:
         separator=layout.separator,
         rows=texts[first:],
         lines=[line for line, _ in content[first:]],
+        above=[each for each in filled if each[0] < content[first][0]],
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     return table
@@ -257,6 +276,8 @@ def _problem(cell: str) -> str:
         return "" if finite else f"'{cell}' is too large for a number. Correct the value or delete the row."
     if "." in cell and "," in cell and NUMBER.fullmatch(cell.replace(",", "").replace(".", "")):
         return f"'{cell}' seems to have a thousands separator. Write numbers without one."
+    if NUMBER.fullmatch(cell.rstrip(" %")):
+        return f"'{cell}' is a percentage. Write plain numbers, and the unit % in the heading."
     if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
         return f"'{cell}' is not a finite number. Fill in the value or delete the row."
     return f"'{cell}' is not a number. Correct the value or delete the row."

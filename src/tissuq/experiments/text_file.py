@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -12,7 +13,6 @@ __all__ = ["read_lines"]
 
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_TEXT = {
-    b"PK\x03\x04": "an Excel workbook or zip archive",
     b"\xd0\xcf\x11\xe0": "an Excel workbook of the old kind",
     b"%PDF": "a PDF document",
     b"\x89HDF": "an HDF5 file",
@@ -62,12 +62,13 @@ def _close_file(path: Path) -> str:
 def _decoded(path: str | os.PathLike[str], content: bytes) -> str:
     for signature, kind in NOT_TEXT.items():
         if content.startswith(signature):
-            raise InputError(f"{path} is {kind}, not text; export the table as CSV and give that file.")
+            raise InputError(f"{path} is {kind}, not text; save it as .xlsx or CSV and give that file.")
     for encoding in _encodings(content):
         try:
             text = content.decode(encoding)
         except UnicodeDecodeError:
             continue
+        text = re.sub("\0(?=\r?\n)", "", text)  # some machines (WinTest) end their first line with a NUL
         if "\0" not in text:
             return text
     raise InputError(f"{path} is a binary file, not text; export the table as CSV and give that file.")

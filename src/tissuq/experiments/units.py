@@ -39,7 +39,7 @@ SYMBOLS = (
     {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
     | {"bar", "mbar", "atm"}
     | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
-    | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "s", "ms", "Hz", "K", "C", "F"}
+    | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
     | {"V", "mV", "deg", "rad", "percent", "pct"}
 )
 
@@ -129,7 +129,8 @@ def _factor_from_pint(name: str) -> float:
             )
         if quantity is not None and quantity.check("[force]"):
             raise InputError(
-                f"'{name}' is a force, not a stress. Divide the forces by the undeformed cross-section first."
+                f"'{name}' is a force, not a stress. Say that the column holds forces (--column force=NAME) and give "
+                "the undeformed cross-section (--area)."
             )
         if quantity is not None:
             raise InputError(f"'{name}' is not a unit of stress (a force over an area). {_CHOICES}")

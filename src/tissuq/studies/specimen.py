@@ -9,13 +9,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from tissuq.assessment import Assessment, design_warnings
 from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.doubts import doubts
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading import read_experiment
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.fitting import Method, fit
 from tissuq.mechanics import Material, material_named
@@ -23,6 +23,7 @@ from tissuq.noise import Noise, noise_named
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
+from tissuq.studies.measured_file import MeasuredFile
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
 
@@ -30,19 +31,9 @@ ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
 
 
-class SpecimenSettings(BaseModel):
+class SpecimenSettings(MeasuredFile):
     """Everything that a fit of a file depends on; stresses (noise, priors) in the file's unit of stress."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    file: str
-    mode: str = "uniaxial"
-    columns: dict[str, str | int] = Field(default_factory=dict)
-    stress_unit: str | None = None
-    stress_type: str = "engineering"
-    strain_unit: str | None = None
-    compression_positive: bool = False
-    skip_rows: int = Field(0, ge=0)
     material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     noise_sd: float | Literal["unknown"] = "unknown"
@@ -81,19 +72,6 @@ class SpecimenSettings(BaseModel):
             return noise_named(self.noise or "unknown")
         return noise_named(self.noise_sd * unit.to_mpa)
 
-    def experiment(self, folder: Path = Path()) -> Experiment:
-        """Read the measurements; a relative file lies in ``folder``."""
-        return read_experiment(
-            folder / self.file,
-            mode=self.mode,
-            columns=self.columns or None,
-            stress_unit=self.stress_unit,
-            stress_type=self.stress_type,
-            strain_unit=self.strain_unit,
-            compression_positive=self.compression_positive,
-            skip_rows=self.skip_rows,
-        )
-
 
 @dataclass(frozen=True)
 class SpecimenStudy:
@@ -108,6 +86,8 @@ class SpecimenStudy:
     seconds: dict[str, float]
     skipped: dict[str, str]
     assessments: dict[str, Assessment]
+    doubts: tuple[str, ...] = ()
+    """What is strange about the measurements."""
 
     @property
     def unit(self) -> StressUnit:
@@ -122,12 +102,7 @@ class SpecimenStudy:
             for text in posterior.warnings:
                 concerned.setdefault(text, []).append(name)
         found = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
-        found += design_warnings(self.experiment)
-        if "the file states no unit" in self.experiment.source:
-            found.insert(
-                0, "the file states no unit of stress, so MPa was assumed; if it is another, give --stress-unit."
-            )
-        return found
+        return [*self.doubts, *found, *design_warnings(self.experiment)]
 
     @property
     def headline(self) -> str:
@@ -160,7 +135,8 @@ def run_specimen(
         When file or settings cannot be used. A discrepancy that cannot be fitted is an error when it was named, and
         is skipped with the reason when all were asked for.
     """
-    experiment = settings.experiment(folder)
+    reading = settings.reading(folder)
+    experiment = reading.experiment
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
     is_all = settings.discrepancies == (ALL,)
@@ -194,7 +170,7 @@ def run_specimen(
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
     step("assessing")
     assessments = {name: each.assess() for name, each in posteriors.items() if name != "none" and not each.diagnostics}
-    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped, assessments)
+    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped, assessments, doubts(reading))
 
 
 def _every() -> list[str]:

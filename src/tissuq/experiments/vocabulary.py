@@ -1,0 +1,77 @@
+"""What laboratories and testing machines call columns and dimensions of a specimen, in English and German."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["CYCLE_NAMES", "DIMENSION_NAMES", "ROLES", "SET_NAMES", "STRESS_NAMES", "on_axis", "plain", "role_names"]
+
+
+def _names(text: str) -> frozenset[str]:
+    return frozenset(text.split(", "))
+
+
+ROLES = {
+    "stretch": _names("stretch, stretch ratio, lambda, λ"),
+    "strain": _names(
+        "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung"
+    ),
+    "displacement": _names(
+        "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
+        "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg"
+    ),
+    "force": _names(
+        "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
+        "kraft, standardkraft, prüfkraft, druckkraft"
+    ),
+}
+"""Names of columns by their role, as :func:`plain` writes them; those of stresses depend on the kind of stress."""
+
+STRESS_NAMES = {
+    "engineering": _names(
+        "stress, engineering stress, nominal stress, tensile stress, compressive stress, spannung, druckspannung"
+    ),
+    "cauchy": _names("stress, cauchy stress, true stress"),
+}
+CYCLE_NAMES = _names("cycle, cycles, cycle count, cycle number, total cycles, total cycle count, zyklus, zyklen")
+SET_NAMES = _names("setname, set name, set")
+"""Names of the column in which parts of a test are named."""
+
+DIMENSION_NAMES = {
+    "area": _names(
+        "area, specimen area, initial area, cross section, cross sectional area, querschnitt, querschnittsfläche, "
+        "probenquerschnitt, s0"
+    ),
+    "width": _names("width, specimen width, sample width, breite, probenbreite, b0"),
+    "thickness": _names("thickness, specimen thickness, sample thickness, dicke, probendicke, a0"),
+    "diameter": _names("diameter, specimen diameter, sample diameter, durchmesser, probendurchmesser, d0"),
+    "length": _names(
+        "length, specimen length, sample length, initial length, gauge length, gage length, l0, grip separation, "
+        "grip to grip separation, messlänge, anfangsmesslänge, einspannlänge"
+    ),
+}
+
+
+def plain(name: str) -> str:
+    """Return a name in lower case with blanks for hyphens and underscores."""
+    return re.sub(r"[\s_-]+", " ", name).strip().lower()
+
+
+def role_names(role: str, stress_type: str = "engineering") -> frozenset[str]:
+    """Return the names that columns of a role may have."""
+    return STRESS_NAMES[stress_type] if role == "stress" else ROLES[role]
+
+
+def on_axis(quantity: str) -> tuple[str, str]:
+    """Return the axis (x, y, or nothing) that a column of a biaxial machine belongs to, and its name without it.
+
+    Examples
+    --------
+    >>> on_axis("xforce"), on_axis("stress y"), on_axis("load")
+    (('x', 'force'), ('y', 'stress'), ('', 'load'))
+    """
+    known = frozenset().union(*ROLES.values(), *STRESS_NAMES.values(), ["size"])
+    for axis, rest in ((quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())):
+        if axis in ("x", "y") and rest in known:
+            return axis, rest
+    return "", quantity

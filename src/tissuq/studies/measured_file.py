@@ -1,0 +1,50 @@
+"""A file of measurements and how to read it: what `tissuq fit` and `tissuq inspect` have in common."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.reading import Reading, ReadingOptions, read_file
+
+__all__ = ["MeasuredFile"]
+
+
+class MeasuredFile(BaseModel):
+    """A file and the options of :func:`tissuq.read_experiment`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: str
+    mode: str = "uniaxial"
+    columns: dict[str, str | int] = Field(default_factory=dict)
+    stress_unit: str | None = None
+    stress_type: str = "engineering"
+    strain_unit: str | None = None
+    force_unit: str | None = None
+    displacement_unit: str | None = None
+    dimensions: dict[str, str] = Field(default_factory=dict)
+    compression_positive: bool = False
+    cycle: str | int | None = None
+    branch: str | None = None
+    preload: str | None = None
+    every: int = Field(1, ge=1)
+    axis: str | None = None
+    sheet: str | int | None = None
+    skip_rows: int = Field(0, ge=0)
+
+    @property
+    def reading_options(self) -> ReadingOptions:
+        """How to read the file."""
+        return cast(ReadingOptions, {name: getattr(self, name) for name in MeasuredFile.model_fields if name != "file"})
+
+    def reading(self, folder: Path = Path()) -> Reading:
+        """Read the file, a relative one in ``folder``, and keep what was done on the way."""
+        return read_file(folder / self.file, **self.reading_options)
+
+    def experiment(self, folder: Path = Path()) -> Experiment:
+        """Read the measurements; a relative file lies in ``folder``."""
+        return self.reading(folder).experiment

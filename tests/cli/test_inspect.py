@@ -1,0 +1,110 @@
+"""``tissuq inspect``, and the same options with ``tissuq fit``."""
+
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+from machine_files import instron, wintest, zwick
+
+from .conftest import tree
+
+WINTEST = ["--length", "10 mm", "--area", "6 mm2", "--cycle", "3", "--branch", "loading", "--preload", "0.01 N"]
+
+
+def test_what_is_understood_is_printed_and_nothing_is_written(cli, here):
+    file = zwick().written(here)
+    before = tree(here)
+    said = cli("inspect", file)
+    assert (said.status, said.err) == (0, "")
+    assert "'Standardkraft' is force, 'Standardweg' is displacement" in said.out
+    assert "length in line 4" in said.out
+    assert tree(here) == before
+
+
+def test_a_built_in_data_set_is_inspected(cli):
+    said = cli("inspect", "brain-cortex-uniaxial")
+    assert (said.status, said.err) == (0, "")
+    assert "34 of 34 used" in said.out
+
+
+def test_figure_data_and_text_are_written_where_asked(cli, here):
+    file = wintest()
+    said = cli("inspect", file.written(here), *WINTEST, "--out", "seen")
+    assert (said.status, said.err) == (0, "")
+    assert said.out.rstrip().endswith("Figure: seen/figures/curve.png")
+    assert set(tree(here / "seen")) == {
+        "contents.txt", "data.csv", "figures", "figures/curve.png", "figures/curve.svg", "inspection.txt"
+    }  # fmt: skip
+    data = np.loadtxt(here / "seen" / "data.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(data[:, 0], file.stretch, atol=1e-5)
+    assert (here / "seen" / "inspection.txt").read_text() in said.out
+    again = cli("inspect", file.name, *WINTEST, "--out", "seen")
+    assert again.status == 2
+    assert "--force" in again.err
+    assert cli("inspect", file.name, *WINTEST, "--out", "seen", "--force").status == 0
+
+
+def test_a_fit_reads_with_the_same_options_and_is_repeated_from_its_run_toml(cli, here):
+    file = wintest()
+    path = file.written(here)
+    said = cli("fit", path, *WINTEST, "--discrepancy", "none", "--no-figures")
+    assert said.status == 0, said.err
+    data = np.loadtxt(here / "runs" / "wintest" / "data.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(data, np.column_stack([file.stretch, file.stress]), atol=1e-5)
+    recipe = tomllib.loads((here / "runs" / "wintest" / "run.toml").read_text())
+    assert recipe["dimensions"] == {"length": "10 mm", "area": "6 mm2"}
+    assert (recipe["cycle"], recipe["branch"], recipe["preload"]) == ("3", "loading", "0.01 N")
+    said = cli("fit", "--config", "runs/wintest/run.toml", "--out", "again", "--no-figures")
+    assert said.status == 0, said.err
+    assert (here / "again" / "data.csv").read_bytes() == (here / "runs" / "wintest" / "data.csv").read_bytes()
+
+
+def test_a_fit_says_what_is_strange_about_the_measurements(cli, here):
+    path = wintest().written(here)
+    said = cli("fit", path, "--length", "10 mm", "--area", "6 mm2", "--discrepancy", "none", "--no-figures")
+    assert said.status == 0, said.err
+    assert "all 3 cycles are used; to fit one" in said.out
+
+
+@pytest.mark.parametrize("command", ["inspect", "fit"])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], ["wintest.txt", "undeformed length", "--length"]),
+        (["--length", "10"], ["'10' has no unit"]),
+        (["--length", "10 mm"], ["undeformed cross-section", "--area", "--width", "--diameter"]),
+        ([*WINTEST, "--cycle", "9"], ["3 cycles", "'9'"]),
+        ([*WINTEST, "--branch", "up"], ["loading, unloading", "'up'"]),
+        ([*WINTEST, "--preload", "9 N"], ["9 N is not reached"]),
+        ([*WINTEST, "--every", "0"], ["every", "greater than or equal to 1"]),
+        ([*WINTEST, "--sheet", "1"], ["not an Excel workbook"]),
+        ([*WINTEST, "--axis", "x"], ["no columns of an axis 'x'"]),
+    ],
+)
+def test_bad_options_end_with_status_2_and_one_message(cli, here, command, arguments, words):
+    wintest().written(here)
+    before = tree(here)
+    said = cli(command, "wintest.txt", *arguments)
+    assert (said.status, said.out) == (2, "")
+    assert said.err.startswith("tissuq: ")
+    assert said.err.count("\n") == 1
+    for word in words:
+        assert word in said.err
+    assert tree(here) == before
+
+
+def test_an_inspection_needs_neither_jax_nor_matplotlib(tmp_path):
+    path = instron().written(tmp_path)
+    code = (
+        "import sys\n"
+        "from tissuq.cli import main\n"
+        f"sys.argv = ['tissuq', 'inspect', {str(path)!r}]\n"
+        "try:\n    main()\n"
+        "except SystemExit as end:\n    assert not end.code\n"
+        "print([name for name in ('jax', 'matplotlib', 'openpyxl') if name in sys.modules])"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.splitlines()[-1] == "[]"

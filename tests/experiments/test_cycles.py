@@ -1,0 +1,113 @@
+import numpy as np
+import pytest
+
+from machine_files import cycles as made
+from machine_files import neo_hookean
+from tissuq.errors import InputError
+from tissuq.experiments.cycles import find_cycles
+from tissuq.experiments.reading import read_experiment, read_file
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(stretch, **columns):
+        path = tmp_path / "test.csv"
+        columns = {"stretch": stretch, "stress": neo_hookean(np.asarray(stretch)), **columns}
+        rows = "\n".join(",".join(map(str, row)) for row in zip(*columns.values(), strict=True))
+        path.write_text(",".join(columns) + "\n" + rows + "\n")
+        return path
+
+    return write
+
+
+def found(path):
+    return [(cycle.start, cycle.peak, cycle.stop) for cycle in read_file(path).cycles]
+
+
+def test_turning_points_part_cycles(written):
+    stretch, _ = made([1.1, 1.2, 1.3], rows=21)
+    assert found(written(stretch)) == [(0, 20, 40), (40, 60, 80), (80, 100, 121)]
+
+
+def test_noise_and_holds_make_no_cycles(written):
+    random = np.random.default_rng(3)
+    stretch = np.concatenate([np.linspace(1, 1.3, 200), np.full(50, 1.3), np.linspace(1.3, 1.0, 200)])
+    cycles = read_file(written(stretch + random.normal(0, 0.003, len(stretch)))).cycles
+    assert len(cycles) == 1
+    assert 190 <= cycles[0].peak <= 260
+
+
+def test_a_ramp_is_one_cycle_that_ends_at_its_turning_point(written):
+    assert found(written(np.linspace(1, 1.3, 50))) == [(0, 49, 50)]
+    assert found(written(np.linspace(1, 0.7, 50))) == [(0, 49, 50)]
+
+
+def test_one_row_is_one_cycle():
+    assert [(c.start, c.peak, c.stop) for c in find_cycles(_table(), np.array([1.1]))] == [(0, 0, 1)]
+
+
+def _table():
+    from tissuq.experiments.table import Table
+
+    return Table("none", ("stretch", "stress"), ("", ""), ",", ["1.1,0.5"], [1])
+
+
+def test_a_column_of_cycles_goes_before_turning_points(written):
+    stretch, _ = made([1.2, 1.2], rows=21)
+    number = np.where(np.arange(len(stretch)) < 4, 7, 8)
+    assert found(written(stretch, cycle=number)) == [(0, 3, 4), (4, 20, len(stretch))]
+
+
+@pytest.mark.parametrize(
+    ("options", "rows"),
+    [
+        ({"cycle": "last"}, range(80, 121)),
+        ({"cycle": 1}, range(40)),
+        ({"cycle": "2"}, range(40, 80)),
+        ({"cycle": "first", "branch": "loading"}, range(21)),
+        ({"cycle": 2, "branch": "unloading"}, range(60, 80)),
+        ({"branch": "loading"}, [*range(21), *range(40, 61), *range(80, 101)]),
+        ({"cycle": "last", "every": 10}, [80, 90, 100, 110, 120]),
+    ],
+)
+def test_a_cycle_and_a_branch_are_chosen(written, options, rows):
+    stretch, _ = made([1.1, 1.2, 1.3], rows=21)
+    data = read_experiment(written(stretch), **options)
+    np.testing.assert_array_equal(data.stretch, stretch[list(rows)])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"cycle": 4}, "has 3 cycles; cycle must be first, last or 1 to 3, not '4'"),
+        ({"cycle": "middle"}, "not 'middle'"),
+        ({"branch": "up"}, "branch must be one of loading, unloading, not 'up'"),
+        ({"every": 0}, "every must be a number of rows, 1 or more, not 0"),
+    ],
+)
+def test_a_cycle_or_branch_that_is_not_there_is_refused(written, options, words):
+    stretch, _ = made([1.1, 1.2, 1.3], rows=21)
+    with pytest.raises(InputError) as caught:
+        read_experiment(written(stretch), **options)
+    assert words in str(caught.value)
+
+
+def test_unloading_that_was_not_measured_is_refused(written):
+    with pytest.raises(InputError, match="there is no unloading in cycle 1 of 1"):
+        read_experiment(written(np.linspace(1, 1.3, 50)), branch="unloading")
+
+
+def test_dropped_rows_are_counted_with_their_reasons(written):
+    stretch, _ = made([1.1, 1.2], rows=21)
+    used = read_file(written(stretch), cycle=2, branch="loading", every=2).used
+    assert [(each.count, each.reason) for each in used.dropped] == [
+        (len(stretch) - 21, "not loading of cycle 2 of 2"),
+        (10, "one row in 2 asked for"),
+    ]
+
+
+def test_messages_after_a_choice_name_the_lines_of_the_file(written):
+    stretch, _ = made([1.2, 1.2], rows=21)
+    path = written(np.where(np.arange(len(stretch)) < 45, stretch, 2 - stretch))
+    with pytest.raises(InputError, match=r"line \d\d, column 'stress'"):
+        read_experiment(path, cycle=2, columns={"stress": "stress"}, compression_positive=True)

@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import biotester, cycles, instron, neo_hookean, wintest
+from tissuq.experiments.inspection import noise_between_neighbours
+
+
+@pytest.fixture
+def inspected(tmp_path):
+    def inspect(stretch, stress, heading="stretch,stress [kPa]", **options):
+        path = tmp_path / "test.csv"
+        rows = "".join(f"{a:.9g},{b:.9g}\n" for a, b in zip(stretch, stress, strict=True))
+        path.write_text(f"{heading}\n{rows}")
+        return tq.inspect(path, **options)
+
+    return inspect
+
+
+def notes(inspection):
+    return " ".join(inspection.warnings)
+
+
+def curve(top=1.4, rows=100):
+    stretch = np.linspace(1, top, rows)
+    return stretch, 1e3 * neo_hookean(stretch)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_noise_is_estimated_within_its_error(seed):
+    """The median of |r| over n neighbours has a relative error of about 1.2 / sqrt(n), correlation included: 2 %."""
+    random = np.random.default_rng(seed)
+    stretch, stress = curve(rows=4000)
+    sd = noise_between_neighbours(stretch, stress + random.normal(0, 0.3, len(stress)))
+    assert sd == pytest.approx(0.3, rel=0.1)
+
+
+def test_turning_points_do_not_raise_the_noise():
+    stretch, _ = cycles([1.3] * 5, rows=100)
+    random = np.random.default_rng(1)
+    sd = noise_between_neighbours(stretch, 1e3 * neo_hookean(stretch) + random.normal(0, 0.2, len(stretch)))
+    assert sd == pytest.approx(0.2, rel=0.15)
+
+
+def test_few_measurements_do_not_tell_the_noise(inspected):
+    assert inspected(*curve(rows=20)).noise_sd is None
+    assert "not told" in str(inspected(*curve(rows=20)))
+
+
+def test_what_is_printed_tells_columns_rows_ranges_steps_and_cycles(tmp_path):
+    file = wintest()
+    text = str(tq.inspect(file.written(tmp_path), **file.options))
+    for words in (
+        "3 columns, separated by commas; rows in lines 5 to 299, 4 lines above them",
+        "'Elapsed Time' not read, 'Disp' is displacement, 'Load' is force",
+        "41 of 295 used; 245 dropped: not loading of cycle 3 of 3; 9 dropped: carrying less than 0.01 N",
+        "stretch   1.00043 to 1.23264",
+        "stress    1.71767 to 24.4 kPa",
+        "step 4    stretch counted from 1.05465, where the preload 0.01 N is reached between lines 209 and 210",
+        "3         201 to 299               1.0000       1.3000       1.0000",
+    ):
+        assert words in text
+
+
+def test_a_plain_curve_raises_no_doubt(inspected, tmp_path):
+    assert inspected(*curve()).warnings == ()
+    assert tq.inspect(instron().written(tmp_path)).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("stretch", "stress", "words"),
+    [
+        (curve()[0], 1e9 * curve()[1], "check the units of force and area"),
+        (30 * curve()[0] - 29, curve()[1], "the largest stretch is 13"),
+        (curve()[0] + 0.2, curve()[1], "begin at stretch 1.2, not near 1"),
+        (curve()[0], curve()[1] + 5, "at stretch 1 the stress is already 5 kPa, 12% of the largest"),
+        (curve()[0], np.maximum(curve()[1] - 20, 0), "% of the stretches there is less than 1% of the largest stress"),
+        (*curve(rows=20_000), "all 20000 rows would be fitted; --every 20 would leave about a thousand"),
+    ],
+)
+def test_what_is_strange_is_said(inspected, stretch, stress, words):
+    assert words in notes(inspected(stretch, stress))
+
+
+def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
+    stretch, _ = cycles([1.3, 1.3], rows=50)
+    unloads = np.diff(stretch, append=1.0) < 0
+    stress = 1e3 * neo_hookean(stretch) * np.where(unloads, 0.7, 1.0)
+    text = notes(inspected(stretch, stress))
+    assert "all 2 cycles are used; to fit one, give --cycle last" in text
+    assert "% of the largest stress, and an elastic material has one curve" in text
+    assert inspected(stretch, stress, cycle="last", branch="loading").warnings == ()
+
+
+def test_a_table_in_any_order_is_not_taken_for_cycles(inspected):
+    stretch, stress = curve(rows=30)
+    order = np.random.default_rng(5).permutation(30)
+    assert "cycles" not in notes(inspected(stretch[order], stress[order]))
+
+
+def test_an_assumed_unit_is_said(inspected):
+    assert "so MPa was assumed" in notes(inspected(*curve(), heading="stretch,stress"))
+
+
+def test_a_biaxial_test_read_as_uniaxial_is_doubted(tmp_path):
+    file = biotester()
+    path = file.written(tmp_path)
+    options = {**file.options, "mode": "uniaxial"}
+    assert "column 'YForce_mN' carries force, too" in notes(tq.inspect(path, **options))
+    assert "carries force" not in notes(tq.inspect(path, **file.options))

@@ -1,0 +1,102 @@
+import sys
+
+import numpy as np
+import openpyxl
+import pytest
+
+from machine_files import neo_hookean, ramp
+from tissuq.errors import InputError
+from tissuq.experiments.reading import read_experiment, read_file
+
+
+def specimen_sheet(sheet, length=20.0):
+    stretch = ramp()
+    sheet.append(["Prüfer", "Jörg"])
+    sheet.append(["Einspannlänge", length, "mm"])
+    sheet.append(["Probenquerschnitt", 10, "mm²"])
+    sheet.append([])
+    sheet.append(["Prüfzeit", "Standardweg", "Standardkraft"])
+    sheet.append(["s", "mm", "N"])
+    for number, value in enumerate(stretch):
+        sheet.append([number, float(length * (value - 1)), float(neo_hookean(value) * 10)])
+    return stretch
+
+
+@pytest.fixture
+def book(tmp_path):
+    """A workbook with a sheet of remarks and two specimens."""
+    book = openpyxl.Workbook()
+    book.active.title = "Remarks"
+    book.active.append(["wet, 37 degrees"])
+    specimen_sheet(book.create_sheet("Probe 1"))
+    specimen_sheet(book.create_sheet("Probe 2"), length=25.0)
+    book.save(tmp_path / "zwick.xlsx")
+    return tmp_path / "zwick.xlsx"
+
+
+def message(path, **options):
+    with pytest.raises(InputError) as caught:
+        read_experiment(path, **options)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("sheet", ["Probe 2", 3, "3"])
+def test_a_sheet_is_read_to_the_last_digit(book, sheet):
+    reading = read_file(book, sheet=sheet)
+    np.testing.assert_allclose(reading.experiment.stretch, ramp(), rtol=1e-15)
+    np.testing.assert_allclose(reading.experiment.stress, neo_hookean(ramp()), rtol=0, atol=1e-17)
+    assert "25 mm (length in line 2)" in reading.used.steps[0]
+    assert reading.experiment.source.startswith("zwick.xlsx, sheet 'Probe 2': stretch")
+    assert reading.experiment.name == "zwick"
+
+
+def test_the_only_sheet_with_a_table_needs_no_name(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["wet"])
+    specimen_sheet(book.create_sheet("Probe 1"))
+    book.save(tmp_path / "one.xlsx")
+    assert len(read_experiment(tmp_path / "one.xlsx")) == 60
+
+
+def test_several_sheets_with_tables_are_asked_about(book):
+    assert "several sheets hold tables: 'Probe 1', 'Probe 2'. Say which: sheet='Probe 1'" in message(book)
+
+
+def test_a_sheet_that_is_not_there_is_answered_with_those_that_are(book):
+    assert "has no sheet 'Probe 3'. The sheets are: 'Remarks', 'Probe 1', 'Probe 2'" in message(book, sheet="Probe 3")
+
+
+def test_a_text_file_has_no_sheets(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text("stretch,stress\n1,0\n")
+    assert "is not an Excel workbook and has no sheets" in message(path, sheet=1)
+
+
+def test_a_workbook_without_a_table_is_refused(tmp_path):
+    book = openpyxl.Workbook()
+    book.active.append(["nothing", "yet"])
+    book.save(tmp_path / "empty.xlsx")
+    assert "no sheet with a table of numbers" in message(tmp_path / "empty.xlsx")
+
+
+def test_a_bad_cell_is_named_by_its_row_and_column(tmp_path):
+    book = openpyxl.Workbook()
+    for row in (["stretch", "stress"], [1.0, 0], [1.1, None], [1.2, 3]):
+        book.active.append(row)
+    book.save(tmp_path / "test.xlsx")
+    assert "sheet 'Sheet', line 3, column 'stress': the cell is empty" in message(tmp_path / "test.xlsx")
+
+
+def test_percentages_of_excel_are_asked_about_because_their_values_are_not_what_is_shown(tmp_path):
+    book = openpyxl.Workbook()
+    for row in (["time", "strain", "stress"], [0, 0.0, 0], [1, 0.1, 2], [2, 0.2, 3]):
+        book.active.append(row)
+    for cell in book.active["B"][1:]:
+        cell.number_format = "0%"
+    book.save(tmp_path / "test.xlsx")
+    assert "'0 %' is a percentage. Write plain numbers" in message(tmp_path / "test.xlsx")
+
+
+def test_without_openpyxl_it_is_said_what_to_install(book, monkeypatch):
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    assert "reading it needs openpyxl: pip install 'tissuq[excel]'" in message(book, sheet=1)
