@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
-from tissuq.mechanics.path import invariants
+from tissuq.mechanics.path import farthest_stretch, invariants
 from tissuq.prediction.moments import drawn_curves
 
 __all__ = ["Stability", "calibrated_range", "probability_of_stability", "stability"]
@@ -108,10 +107,10 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
 
 def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]:
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
-    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     if mode == data.mode:
         return min(1.0, float(data.stretch.min())), max(1.0, float(data.stretch.max()))
-    return _end(mode, most, -1), _end(mode, most, 1)
+    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
+    return farthest_stretch(mode, most, -1), farthest_stretch(mode, most, 1)
 
 
 def probability_of_stability(solution: Solution) -> dict[str, float]:
@@ -123,17 +122,6 @@ def probability_of_stability(solution: Solution) -> dict[str, float]:
         result = stability(solution, mode, np.linspace(*ends, POINTS))
         found[name] = float(result.everywhere)
     return found
-
-
-def _end(mode: LoadingMode, most: Sequence[float], sign: int) -> float:
-    low, high = 0.0, np.log(10.0)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        is_inside = all(
-            each[0] <= limit for each, limit in zip(invariants(mode, [np.exp(sign * middle)]), most, strict=True)
-        )
-        low, high = (middle, high) if is_inside else (low, middle)
-    return float(np.exp(sign * low))
 
 
 def _from_reference(stretch: FloatArray, is_stable: Flags) -> Flags:
