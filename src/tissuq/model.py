@@ -133,6 +133,10 @@ class StatisticalModel:
             return ()
         return tuple(self.discrepancy.members(self.experiment.mode, self.experiment.stretch))
 
+    def energy_features(self, place: int) -> list[FloatArray]:
+        """Return the stresses (n, r) of each term of the blocks of one of the `energy_members` at the measurements."""
+        return self.energy_members[place].stress_features(self.experiment.mode, self.experiment.stretch)
+
     @property
     def energy_symbols(self) -> tuple[str, ...]:
         """The amplitudes of an energy discrepancy."""

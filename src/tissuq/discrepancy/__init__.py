@@ -2,7 +2,7 @@
 
 from tissuq.discrepancy.conditioned import ConditionedProcess
 from tissuq.discrepancy.discrepancy import Discrepancy, discrepancies, discrepancy_named
-from tissuq.discrepancy.energy import Auto, EnergyDiscrepancy, EnergySum, Member
+from tissuq.discrepancy.energy import Auto, EnergyDiscrepancy, EnergySum, Member, side_by_side
 from tissuq.discrepancy.gaussian_process import GaussianProcess
 from tissuq.discrepancy.hyperelastic import MooneyRivlinTerm, YeohTerms
 from tissuq.discrepancy.none import NoDiscrepancy
@@ -30,4 +30,5 @@ __all__ = [
     "YeohTerms",
     "discrepancies",
     "discrepancy_named",
+    "side_by_side",
 ]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy import side_by_side
 from tissuq.errors import ModelError
 from tissuq.inference.amplitudes import (
     LIGHT,
@@ -27,7 +28,7 @@ from tissuq.inference.box import Boxes
 from tissuq.inference.lattice import STEP, Reduced
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
-from tissuq.inference.nodes import OUTER_STEP, Node, features_of, single_nodes, weighted_nodes
+from tissuq.inference.nodes import OUTER_STEP, Node, single_nodes, weighted_nodes
 from tissuq.inference.outer import Outer
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Components, Solution
@@ -192,7 +193,7 @@ class EnergySolution(Solution):
             chosen = order[systematic((weights**power)[order][None], REPRESENTED)[0]]  # neighbours are alike
             points, node, weights = points[chosen], node[chosen], weights[chosen] ** (1 - power)
             weights = weights / weights.sum()
-        features = {int(place): features_of(self.model, place) for place in np.unique(points.lattice)}
+        features = {int(place): self.model.energy_features(place) for place in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
         for number in np.unique(node):
@@ -226,7 +227,7 @@ class EnergySolution(Solution):
         member, start = self.components.member[chosen], len(self.model.linear)
         values = np.zeros((*chosen.shape, len(self.model.experiment)))
         for place in np.unique(member):
-            features = np.hstack([np.zeros((values.shape[2], 0)), *features_of(self.model, place)])
+            features = side_by_side(self.model.energy_features(place), values.shape[2])
             own = member == place
             values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
         return values

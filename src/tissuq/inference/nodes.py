@@ -15,7 +15,7 @@ from tissuq.inference.resampling import systematic
 from tissuq.mechanics.path import invariant_rates
 from tissuq.model import StatisticalModel
 
-__all__ = ["OUTER_STEP", "Node", "features_of", "single_nodes", "weighted_nodes"]
+__all__ = ["OUTER_STEP", "Node", "single_nodes", "weighted_nodes"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -131,12 +131,7 @@ def _directions(
     unlikely = [min(float(m.priors[s].quantile(UNLIKELY)) / _most_noise(m) for m in models) for s in symbols]
     unit, _ = invariant_rates(models[0].experiment.mode, models[0].experiment.stretch)
     least = float(np.sqrt((unit**2).mean()))
-    return Directions(member, scale, features_of(models[0], place), least, unlikely, step, shift)
-
-
-def features_of(model: StatisticalModel, place: int) -> list[FloatArray]:
-    """Return the stresses (n, r) of each term of a member's blocks at the measurements."""
-    return model.energy_members[place].stress_features(model.experiment.mode, model.experiment.stretch)
+    return Directions(member, scale, models[0].energy_features(place), least, unlikely, step, shift)
 
 
 def _most_noise(model: StatisticalModel) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy import side_by_side
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
@@ -258,7 +259,7 @@ def _energies(
             for whole, each in zip(member.stress_variances(mode, stretch), features, strict=True)
         ]
         symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]
-        every = np.hstack([np.zeros((len(stretch), 0)), *features])
+        every = side_by_side(features, len(stretch))
         chosen = slice(start, start + every.shape[1])
         variance = components.settings[own][:, symbols] ** 2 @ np.reshape(left, (-1, len(stretch)))
         yield components.mean[own, chosen] @ every.T, every @ components.root[own, chosen], variance, own
