@@ -207,8 +207,8 @@ def drawn_curves(
 ) -> tuple[FloatArray, FloatArray]:
     """Return stresses (M, g) of the material alone and of the discrepancy, one joint draw for every component.
 
-    Scatter that is independent from point to point is no curve, and left out. In another loading mode than that of the
-    data, so is a discrepancy that is no energy.
+    Scatter that is independent from point to point is no curve, and left out. Where a loading mode is given, so is a
+    discrepancy that is no energy.
     """
     generator, settings = np.random.default_rng([seed, 11]), components.settings
     score = generator.standard_normal(components.mean.shape)
@@ -217,10 +217,12 @@ def drawn_curves(
     terms = basis_of(model, stretch, settings, mode) * drawn[:, None, :]
     own = np.isin(model.column_symbols, model.material_symbols)
     alone, other = terms[..., own].sum(axis=2), terms[..., ~own].sum(axis=2)
+    if mode is not None and not model.discrepancy.is_energy:
+        return alone, np.zeros_like(alone)
     if components.member is not None:
         for shift, _, _, chosen in _energies(model, replace(components, mean=linear), stretch, mode):
             other[chosen] += shift
-    if model.is_correlated and mode is None:
+    if model.is_correlated:
         for part in correlated_parts(model, settings):
             shift, covariance = _condition_jointly(model, part, stretch, drawn[part.chosen])
             values, vectors = np.linalg.eigh(covariance)
