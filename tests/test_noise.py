@@ -18,10 +18,16 @@ def test_a_number_is_known_noise_and_a_name_finds_its_kind():
     assert noise_named(kept) is kept
 
 
-@pytest.mark.parametrize("value", [0, -1.0, np.inf, np.nan, True, None, [0.1, 0.2], [-0.1], 1j])
+@pytest.mark.parametrize("value", [0, -1.0, np.inf, np.nan, True, None, [0.1, -0.2], 1j])
 def test_noise_that_is_no_positive_number_is_refused(value):
     with pytest.raises(tq.InputError, match="noise"):
         noise_named(value)
+
+
+def test_noise_of_several_tests_is_not_that_of_one():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.05)
+    with pytest.raises(tq.InputError, match="noise_sd has 2 values for 1 tests"):
+        tq.fit(data, noise_sd=[0.1, 0.2])
 
 
 @pytest.mark.parametrize("name", ["none", "known", "gaussian", ""])

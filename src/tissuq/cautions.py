@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import isfinite
 
 import numpy as np
 
+from tissuq.assessment.extent import has_energy
+from tissuq.assessment.stability import LOST, StableRange
 from tissuq.inference.solution import Solution
 
 __all__ = ["warnings_about"]
@@ -17,14 +19,18 @@ ROUGH = 0.1
 """Error of the log evidence, by integration, above which nothing rests on it."""
 VAGUE = 1.0
 """Width of the headline parameter's 95 % interval, over its median, above which it is hardly known."""
+UNSTABLE = 0.5
+"""Probability of stability over the measured range below which a simulation is likely to fail."""
 HIGH = 0.1
 """Density at a bound, relative to the largest, above which the bound decides."""
 
 
-def warnings_about(solution: Solution) -> Iterator[str]:
+def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Iterator[str]:
     """Yield the warnings that a posterior carries, the gravest first."""
     if solution.is_approximate and solution.diagnostics is not None:
         yield solution.diagnostics.verdict
+    if ranges and min(found.probability for found in ranges.values()) < UNSTABLE:
+        yield _instability(solution, min(ranges.values(), key=lambda found: found.probability))
     if solution.model.discrepancy.is_best_fit:
         yield solution.model.discrepancy.caution
     if solution.model.confounds_noise:
@@ -57,6 +63,17 @@ def warnings_about(solution: Solution) -> Iterator[str]:
             f"the posterior is cut by a bound of the prior of {', '.join(cut)}: there the bound, not the data, "
             "decides. Give a wider prior, unless the bound is meant."
         )
+
+
+def _instability(solution: Solution, found: StableRange) -> str:
+    """Return what it means that a material is hardly ever stable, in the loading mode in which it is least."""
+    what = "material and discrepancy together are" if has_energy(solution.model) else "the material is"
+    how = "hardly ever stable" if found.probability < LOST else "less often stable than not"
+    where = " (already at rest: its initial shear modulus is negative)" if found.loss.median == 1 else ""
+    return (
+        f"over the measured range {what} {how}{where}, so that no simulation with these parameters can be trusted: "
+        "measure in more loading modes, or choose another material."
+    )
 
 
 def _noise_is_inseparable(solution: Solution) -> bool:

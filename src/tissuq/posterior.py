@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment import Assessment, assess, known_evidence_changes
 from tissuq.assessment.modulus import modulus
-from tissuq.assessment.stability import calibrated_range, stability
+from tissuq.assessment.stability import StableRange, calibrated_range, stability, stable_ranges
 from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -104,7 +104,7 @@ class Posterior:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader of this posterior must know, in sentences."""
-        return tuple(warnings_about(self.solution))
+        return tuple(warnings_about(self.solution, self.stable_ranges))
 
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.
@@ -125,7 +125,9 @@ class Posterior:
 
     @cached_property
     def _assessment(self) -> Assessment:
-        return assess(self.solution, lambda models: [posterior.solution for posterior in self._solve(models)])
+        return assess(
+            self.solution, lambda models: [posterior.solution for posterior in self._solve(models)], self.stable_ranges
+        )
 
     def stability(
         self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41
@@ -160,7 +162,23 @@ class Posterior:
         ends = calibrated_range(self.model.experiment, asked)
         at = np.linspace(*ends, points) if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=np.float64))
         found = stability(self.solution, asked, at)
-        return pd.DataFrame({name: value for name, value in vars(found).items() if name not in ("mode", "everywhere")})
+        return pd.DataFrame({name: value for name, value in vars(found).items() if name != "mode"})
+
+    @cached_property
+    def stable_ranges(self) -> Mapping[str, StableRange]:
+        """How far from the reference it is stable, with what probability, and where it ceases to be, by loading mode.
+
+        Over the range in which both invariants were measured; empty where the material's energy does not tell.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.datasets.load("rubber-treloar-uniaxial")
+        >>> found = tq.fit(data, material="mooney-rivlin", discrepancy="none").stable_ranges["uniaxial"]
+        >>> found.probability < 0.05, found.above.median  # it has a negative modulus: lost at the reference
+        (True, 1.0)
+        """
+        return stable_ranges(self.solution)
 
     def update(self, more: Experiment) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.

@@ -61,6 +61,11 @@ def test_a_material_with_a_negative_modulus_is_said_not_to_be_stable():
     posterior = tq.fit(data, material="mooney-rivlin", discrepancy="none")
     assert posterior.initial_shear_modulus.mean < 0
     assert posterior.stability()["stable"].max() < 0.1
+    found = posterior.stable_ranges["uniaxial"]
+    assert (found.low, found.surely_high, found.above.median) == (1, 1, 1)
+    assert found.above.probability == 1 - found.probability > 0.9
+    (told,) = (text for text in posterior.warnings if "stable" in text)
+    assert "hardly ever stable (already at rest: its initial shear modulus is negative)" in told
 
 
 def test_the_calibrated_range_ends_where_an_invariant_leaves_what_was_measured():
@@ -71,6 +76,29 @@ def test_the_calibrated_range_ends_where_an_invariant_leaves_what_was_measured()
         for end in calibrated_range(data, loading_mode(name)):
             reached = [float(each[0]) for each in invariants(loading_mode(name), [end])]
             assert np.max(np.array(reached) / most) == pytest.approx(1, abs=1e-6)
+
+
+def test_where_stability_is_lost_is_where_the_stress_of_the_closed_form_stops_rising():
+    """A Mooney-Rivlin material with C01 < 0 in equibiaxial tension, to the distance of the stretches looked at."""
+    posterior = fitted("mooney-rivlin", {"C10": 0.5, "C01": -0.15})
+    found = posterior.stable_ranges["equibiaxial"]
+    stretch = np.linspace(1, found.high, 2000)
+    rising = np.diff(2 * (stretch - stretch**-5) * (0.5 - 0.15 * stretch**2)) > 0
+    lost, step = stretch[np.argmin(rising)], (found.high - 1) / 30
+    least = np.linalg.eigvalsh(np.moveaxis(hessian([stretch, stretch, stretch**-2.0], 0.5, -0.15), 2, 0))[:, 0]
+    # Drucker and Baker-Ericksen (C10 + C01 l^2 > 0) fail later.
+    assert 1 < lost < stretch[np.argmax(least <= 0)] < found.high < (0.5 / 0.15) ** 0.5
+    assert found.above.probability == 1
+    assert found.above.low == found.above.high == pytest.approx(lost, abs=step)
+    assert lost - step < found.surely_high <= lost
+    assert found.probability == 0
+
+
+def test_a_discrepancy_that_is_no_energy_has_no_part():
+    posterior = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="linear")
+    assert posterior.marginals["C10"].quantile(1e-6) > 0
+    assert posterior.marginals["m1"].quantile(1 - 1e-6) < 0
+    assert {found.probability for found in posterior.stable_ranges.values()} == {1.0}
 
 
 def test_an_energy_discrepancy_takes_part_and_its_share_is_that_of_its_draws():
@@ -112,4 +140,4 @@ def test_a_material_in_jax_is_assessed_without_its_stability():
     posterior = tq.fit(data, material=InJax(), discrepancy="none", noise_sd=0.03)
     with pytest.raises(ModelError, match="plain arithmetic"):
         posterior.stability()
-    assert posterior.assess().stable == {}
+    assert posterior.stable_ranges == posterior.assess().stable == {}

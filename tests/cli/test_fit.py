@@ -44,7 +44,7 @@ def test_a_run_leaves_the_promised_files_and_a_copy_of_the_users(fit_run):
     figures = {f"figures/{name}.{kind}" for name in ("marginals", "with_discrepancy", "model_alone")
                for kind in ("svg", "png")}  # fmt: skip
     posteriors = {f"posterior/{name}.nc" for name in ("none", "constant", "gp")}
-    tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv"}
+    tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv", "stability.csv"}
     assert found == figures | posteriors | tables | {
         "report.html", "run.toml", "contents.txt", "assessment.json", "input/specimen.csv"
     }  # fmt: skip

@@ -8,7 +8,8 @@ from scipy.stats import halfcauchy
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.importance import Proposal, adapted, even_points
+from tissuq.inference.importance import Proposal, adapted
+from tissuq.inference.kronecker import even_points
 from tissuq.inference.linear import times_gaussians
 from tissuq.inference.outer import relative_error
 from tissuq.noise import stress_level

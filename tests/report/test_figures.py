@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+import tissuq as tq
 from tissuq.experiments.units import StressUnit
 from tissuq.report.figures import marginal_figure, predictive_figure, save_figure
 
@@ -77,3 +78,21 @@ def test_drawing_leaves_the_users_matplotlib_settings_alone(specimen_study):
     before = dict(mpl.rcParams)
     predictive_figure(first(specimen_study.posteriors, 1), discrepancy=True, unit=KPA)
     assert dict(mpl.rcParams) == before
+
+
+def test_stretches_beyond_which_stability_is_lost_are_shaded():
+    data = tq.datasets.load("rubber-treloar-uniaxial")
+    for material, shaded in (("mooney-rivlin", [(1.0, 7.512)]), ("neo-hookean", [])):
+        posteriors = {"none": tq.fit(data, material=material, discrepancy="none")}
+        (axis,) = predictive_figure(posteriors, discrepancy=False, unit=KPA).axes
+        spans = [patch for patch in axis.patches if "stability" in patch.get_label()]
+        assert [(span.get_x(), span.get_x() + span.get_width()) for span in spans] == shaded
+
+
+def test_no_legend_is_wider_than_its_figure():
+    data = tq.datasets.load("rubber-treloar-uniaxial")
+    posteriors = {"none": tq.fit(data, material="mooney-rivlin", discrepancy="none")}
+    figure = predictive_figure(posteriors, discrepancy=True, unit=KPA)
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    assert legend.get_window_extent().width <= figure.bbox.width

@@ -4,7 +4,7 @@ from math import nan
 import pytest
 
 from tissuq.experiments.units import StressUnit
-from tissuq.report.rows import interval, readable_summary, significant
+from tissuq.report.rows import interval, readable_stability, readable_summary, significant
 from tissuq.report.tables import write_csv, write_json
 
 ROW = {
@@ -60,3 +60,11 @@ def test_tables_hold_every_digit_and_nothing_where_there_is_no_number(tmp_path):
     assert (tmp_path / "table.csv").read_bytes() == b"a,b,c\n0.30000000000000004,,True\n"
     write_json(tmp_path / "table.json", [{"a": 0.1 + 0.2, "b": None, "c": nan}])
     assert json.loads((tmp_path / "table.json").read_text()) == [{"a": 0.1 + 0.2, "b": None, "c": None}]
+
+
+def test_where_stability_is_lost_is_told_from_a_probability_of_5_percent():
+    row = {"formulation": "auto", "mode": "uniaxial", "stretch_low": 0.9, "stretch_high": 1.1, "stable": 0.85}
+    row |= {"lost_below_probability": 0.12, "lost_below_median": 0.925}
+    row |= {"lost_below_low": 0.9071, "lost_below_high": 0.932}
+    row |= {"lost_above_probability": 0.05, "lost_above_median": 1.0, "lost_above_low": 1.0, "lost_above_high": 1.0}
+    assert readable_stability([row]) == [["auto", "uniaxial", "0.9 to 1.1", "85%", "0.925 [0.907, 0.932]", ""]]

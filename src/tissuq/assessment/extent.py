@@ -19,7 +19,7 @@ from tissuq.assessment.sensitivity import (
     rescaled,
     scale_symbols,
 )
-from tissuq.assessment.stability import probability_of_stability
+from tissuq.assessment.stability import StableRange
 from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.experiments.units import stress_unit
@@ -29,7 +29,7 @@ from tissuq.inference.solution import Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["Assessment", "assess"]
+__all__ = ["Assessment", "assess", "has_energy"]
 
 FloatArray = NDArray[np.float64]
 Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
@@ -85,6 +85,8 @@ class Assessment:
     evidence_changes : dict of str to float
         Change of the log evidence when these scales are a quarter or fourfold, and when the uniform boxes of the linear
         parameters are four times as wide (boxes); without what is not known.
+    has_energy : bool
+        Whether the discrepancy has an energy, which takes part in the stability.
     stable : dict of str to float
         For every loading mode, the probability that material and energy discrepancy are stable over the measured range;
         empty where the material's energy does not tell.
@@ -109,6 +111,7 @@ class Assessment:
     scales: tuple[str, ...]
     shifts: Mapping[float, float]
     evidence_changes: Mapping[str, float]
+    has_energy: bool
     stable: Mapping[str, float]
     power_scaling: PowerScaling | None
     warnings: tuple[str, ...]
@@ -167,7 +170,7 @@ class Assessment:
     def _stability(self) -> str:
         """Return how probable stability is over the measured range, in words."""
         worst = min(self.stable, key=lambda mode: self.stable[mode])
-        what = "material and discrepancy together are" if self.amplitudes else "the material is"
+        what = "material and discrepancy together are" if self.has_energy else "the material is"
         text = f"over the measured range of the invariants {what} stable with a probability of"
         return (
             f"{text} {_percent(self.stable[worst])} (Baker-Ericksen, Drucker, rising stress; least in {worst} loading)"
@@ -187,7 +190,7 @@ class Assessment:
         return text
 
 
-def assess(solution: Solution, solve: Solve) -> Assessment:
+def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) -> Assessment:
     """Return what the discrepancy does in a posterior.
 
     Parameters
@@ -196,14 +199,13 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
     solve : callable
         Returns the solutions of models by the method that gave this one: for the same model without discrepancy, and
         with other prior scales of what sets the discrepancy's size.
+    ranges : mapping of str to StableRange
+        Where it is stable, by loading mode.
     """
     model, marginal = solution.model, solution.marginals[solution.model.headline]
     none = _without(model, solve)
     share, initial_share = _shares(solution)
     stiffness = modulus(solution)
-    stable: Mapping[str, float] = {}
-    with suppress(ModelError):
-        stable = probability_of_stability(solution)
     scales = scale_symbols(model)
     others = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
     return Assessment(
@@ -227,10 +229,16 @@ def assess(solution: Solution, solve: Solve) -> Assessment:
             for name, each in others.items()
         },
         evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, others),
-        stable=stable,
+        has_energy=has_energy(model),
+        stable={mode: found.probability for mode, found in ranges.items()},
         power_scaling=power_scaling(solution),
         warnings=tuple(design_warnings(model.experiment)),
     )
+
+
+def has_energy(model: StatisticalModel) -> bool:
+    """Return whether there is a discrepancy with an energy of its own."""
+    return model.discrepancy.is_energy and bool(model.discrepancy.parameters)
 
 
 def _without(model: StatisticalModel, solve: Solve) -> Solution | None:

@@ -30,11 +30,11 @@ def modulus(solution: Solution) -> Marginal:
     model, parts = solution.model, solution.components
     symbols = modulus_symbols(model)
     bent = parts.settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]]
-    if len(symbols) == 1 and not np.ptp(moduli := _moduli(model, bent), axis=0).any():
+    moduli = _moduli(model, bent)
+    if len(symbols) == 1 and not np.ptp(moduli, axis=0).any():
         factor = float(moduli[0, model.column_symbols.index(symbols[0])])
         return _scaled(solution.marginals[symbols[0]], factor)
     mean, root = coefficients(model, parts)
-    moduli = _moduli(model, bent)
     means, sds = (moduli * mean).sum(axis=1), np.linalg.norm(np.einsum("mk,mkp->mp", moduli, root), axis=1)
     is_wide = sds > 0
     found = []

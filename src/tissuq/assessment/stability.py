@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +14,18 @@ from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
-from tissuq.mechanics.path import invariants
+from tissuq.mechanics.path import farthest_stretch, invariants
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["Stability", "calibrated_range", "probability_of_stability", "stability"]
+__all__ = ["LOST", "Loss", "Stability", "StableRange", "calibrated_range", "stability", "stable_ranges"]
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-DRAWS, POINTS = 500, 21
+DRAWS, POINTS = 500, 31
+"""Draws, and stretches on either side of the reference, to whose distance it is known where stability is lost."""
+LOST = 0.05
+"""Probability from which a loss of stability is worth a mark."""
 STEP = 1e-4
 """Of the logarithmic strains, for the tangent."""
 NEUTRAL = 1e-9
@@ -49,8 +51,6 @@ class Stability:
         The engineering stress rises with the stretch.
     stable : (g,) array
         All three hold everywhere from the reference to this stretch.
-    everywhere : float
-        All three hold at all stretches.
     """
 
     mode: str
@@ -59,7 +59,47 @@ class Stability:
     drucker: FloatArray
     rising: FloatArray
     stable: FloatArray
-    everywhere: float
+
+
+class Loss(NamedTuple):
+    """With what probability stability is lost, and where: median and 95 % interval of the draws that lose it."""
+
+    probability: float
+    median: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class StableRange:
+    """How far from the reference a material is stable in one loading mode, over the range that was measured.
+
+    Attributes
+    ----------
+    mode : str
+    low, high : float
+        Stretches between which it was looked at.
+    probability : float
+        Of stability at all of them.
+    surely_low, surely_high : float
+        Stretches between which stability is lost with a probability of at most 5 %; both one where there are none.
+    below, above : Loss
+        At stretches below one, and above; of probability zero and without place where no draw loses it there.
+    """
+
+    mode: str
+    low: float
+    high: float
+    probability: float
+    surely_low: float
+    surely_high: float
+    below: Loss
+    above: Loss
+
+    @property
+    def loss(self) -> Loss:
+        """The likelier loss, below or above."""
+        return max(self.below, self.above, key=lambda loss: loss.probability)
 
 
 def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Stability:
@@ -72,6 +112,30 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     ModelError
         When the material's energy cannot be differentiated at many states at once.
     """
+    found = _criteria(solution, mode, stretch)
+    shares = (each.mean(axis=0) for each in (*found, _from_reference(stretch, np.logical_and.reduce(found))))
+    return Stability(mode.name, stretch, *shares)
+
+
+def stable_ranges(solution: Solution) -> dict[str, StableRange]:
+    """Return for every loading mode how far the draws are stable; nothing where the material's energy does not tell."""
+    found = {}
+    for name in loading_modes():
+        mode = loading_mode(name)
+        low, high = calibrated_range(solution.model.experiment, mode)
+        sides = np.linspace(1.0, low, POINTS), np.linspace(1.0, high, POINTS)
+        stretch = np.unique(np.concatenate(sides))
+        try:
+            stable = _from_reference(stretch, np.logical_and.reduce(_criteria(solution, mode, stretch)))
+        except ModelError:
+            return {}
+        sure, below, above = _surely(stretch, stable), _loss(stretch, stable, -1), _loss(stretch, stable, 1)
+        found[name] = StableRange(name, low, high, float(stable.all(axis=1).mean()), *sure, below, above)
+    return found
+
+
+def _criteria(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> tuple[Flags, Flags, Flags]:
+    """Return for draws (M, g) whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode."""
     model, parts = solution.model, solution.components
     parts = parts[systematic(parts.weights[None], DRAWS)[0]]
     count = MOST_VALUES // (10 * len(stretch) * len(model.column_symbols)) if model.bent_symbols else DRAWS
@@ -101,49 +165,47 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
     near = np.concatenate([stretch - STEP, stretch + STEP])
     rising = np.diff(drawn(near, mode).reshape(DRAWS, 2, -1), axis=1)[:, 0] > 0
-    stable = _from_reference(stretch, baker & drucker & rising)
-    first, second, third, all_three = (each.mean(axis=0) for each in (baker, drucker, rising, stable))
-    return Stability(mode.name, stretch, first, second, third, all_three, float(stable.all(axis=1).mean()))
+    return baker, drucker, rising
 
 
 def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]:
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
-    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     own = [part.mode.abscissa(part.stretch) for part in data.parts if part.mode == mode]
     if own:
         return min(1.0, *(float(each.min()) for each in own)), max(1.0, *(float(each.max()) for each in own))
-    return _end(mode, most, -1), _end(mode, most, 1)
-
-
-def probability_of_stability(solution: Solution) -> dict[str, float]:
-    """Return for every loading mode the share of draws that are stable over the whole range that was measured."""
-    found = {}
-    for name in loading_modes():
-        mode = loading_mode(name)
-        ends = calibrated_range(solution.model.experiment, mode)
-        result = stability(solution, mode, np.linspace(*ends, POINTS))
-        found[name] = float(result.everywhere)
-    return found
-
-
-def _end(mode: LoadingMode, most: Sequence[float], sign: int) -> float:
-    low, high = 0.0, np.log(10.0)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        is_inside = all(
-            each[0] <= limit for each, limit in zip(invariants(mode, [np.exp(sign * middle)]), most, strict=True)
-        )
-        low, high = (middle, high) if is_inside else (low, middle)
-    return float(np.exp(sign * low))
+    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
+    return farthest_stretch(mode, most, -1), farthest_stretch(mode, most, 1)
 
 
 def _from_reference(stretch: FloatArray, is_stable: Flags) -> Flags:
     """Return whether all is stable (M, g) from the reference to each stretch."""
     found = np.empty_like(is_stable)
-    for side in (np.flatnonzero(stretch >= 1), np.flatnonzero(stretch < 1)):
-        outward = side[np.argsort(np.abs(stretch[side] - 1))]
+    for outward in (_outward(stretch, -1), _outward(stretch, 1)):
         found[:, outward] = np.logical_and.accumulate(is_stable[:, outward], axis=1)
     return found
+
+
+def _outward(stretch: FloatArray, side: int) -> NDArray[np.intp]:
+    """Return the places of the stretches on one side of the reference, and of the reference, from there outward."""
+    own = np.flatnonzero(side * (stretch - 1) >= 0)
+    return own[np.argsort(np.abs(stretch[own] - 1))]
+
+
+def _surely(stretch: FloatArray, stable: Flags) -> tuple[float, float]:
+    """Return the stretches between which hardly any draw has lost its stability."""
+    sure = stretch[stable.mean(axis=0) >= 1 - LOST]
+    return float(sure.min(initial=1.0)), float(sure.max(initial=1.0))
+
+
+def _loss(stretch: FloatArray, stable: Flags, side: int) -> Loss:
+    """Return where the draws (M, g), stable from the reference to some stretch, lose stability on one side of it."""
+    outward = _outward(stretch, side)
+    first = np.argmin(stable[:, outward], axis=1)[~stable[:, outward[-1]]]
+    if len(outward) == 1 or not len(first):
+        return Loss(0.0, np.nan, np.nan, np.nan)
+    path = stretch[outward]
+    places = 0.5 * (path[first] + path[np.maximum(first - 1, 0)])
+    return Loss(len(first) / len(stable), *map(float, np.quantile(places, [0.5, 0.025, 0.975])))
 
 
 class _Path(LoadingMode):

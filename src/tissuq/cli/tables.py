@@ -50,17 +50,24 @@ def print_summary(folder: Path) -> None:
     known = [row["contains_truth"] is not None for row in rows]
     sampled = any(row["rhat"] is not None for row in rows)
     headers = ["formulation", f"{headline_of(rows[0])}, {unit}", "sd", "HPD low", "high", "log ev.", "in band", "alone"]
+    is_told = any(row["stable"] for row in readable)
+    headers += ["stable", "lost at stretch"] * is_told
     headers += ["truth"] * any(known) + ["R-hat", "ESS"] * sampled
     table = []
     for row in readable:
         cells = [row["formulation"], row["mean"], row["sd"], row["low"], row["high"], row["log_evidence"]]
-        cells += [row["coverage"], row["coverage_model_only"]]
+        cells += [row["coverage"], row["coverage_model_only"]] + [row["stable"], row["lost_at"]] * is_told
         cells += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * any(known)
         table.append(cells + [row["rhat"], row["ess"]] * sampled)
     print_rows(title, headers, table)
     print(
         "HPD: 95 %. In band, alone: measurements inside the 95 % band with the discrepancy, and of the material alone."
     )
+    if is_told:
+        print(
+            "Stable: probability over the measured stretches; of the draws that lose it, where: median [95 %]. "
+            "All loading modes: stability.csv."
+        )
     print(f"A good predictive check does not mean that {headline_of(rows[0])} is right.")
     _print_assessment(folder / ASSESSMENT)
     print(f"Report: {folder / 'report.html'}")

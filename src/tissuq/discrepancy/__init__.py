@@ -2,7 +2,7 @@
 
 from tissuq.discrepancy.conditioned import ConditionedProcess
 from tissuq.discrepancy.discrepancy import Discrepancy, discrepancies, discrepancy_named
-from tissuq.discrepancy.energy import Auto, EnergyDiscrepancy, EnergySum, Member
+from tissuq.discrepancy.energy import Auto, EnergyDiscrepancy, EnergySum, Member, side_by_side
 from tissuq.discrepancy.gaussian_process import GaussianProcess
 from tissuq.discrepancy.hyperelastic import MooneyRivlinTerm, YeohTerms
 from tissuq.discrepancy.none import NoDiscrepancy
@@ -32,4 +32,5 @@ __all__ = [
     "discrepancies",
     "discrepancy_named",
     "separated",
+    "side_by_side",
 ]

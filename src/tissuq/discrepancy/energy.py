@@ -25,7 +25,16 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.parameters import Parameter
 from tissuq.priors import HalfCauchy
 
-__all__ = ["Auto", "AutoBalanced", "AutoSharp", "EnergyDiscrepancy", "EnergySum", "Member", "energy_sum"]
+__all__ = [
+    "Auto",
+    "AutoBalanced",
+    "AutoSharp",
+    "EnergyDiscrepancy",
+    "EnergySum",
+    "Member",
+    "energy_sum",
+    "side_by_side",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -70,6 +79,11 @@ class Member:
         """Return the variance (n,) of the stress of each block at unit amplitude."""
         parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
         return [block.stress_variance(mode, stretch, reach, length) for block, reach, length in parts]
+
+
+def side_by_side(features: list[FloatArray], count: int) -> FloatArray:
+    """Return the terms of all blocks of a member in one array (n, q) for n = ``count`` stretches; it may have none."""
+    return np.hstack([np.zeros((count, 0)), *features])
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.inference.lattice import Lattice
 from tissuq.inference.linear import LinearPriors
+from tissuq.inference.quadrature import gauss_rule
 from tissuq.model import StatisticalModel
 from tissuq.priors import Prior
 
@@ -29,8 +30,9 @@ IRRELEVANT = 18.0
 """Log density below the largest, at the best noise, at which a point of a lattice is left out at once."""
 LIGHT = 1e-6
 """Share of the posterior that may be left out."""
-TRIED = 8
-"""Values of the noise among which the best is sought where priors pull at linear parameters."""
+TRIED, HARDLY_PULLED = 8, 0.1
+"""Values of the noise among which the best is sought where priors pull at linear parameters, and the rise of its
+logarithm up to which they hardly do."""
 MOST_WIDER = 8.0
 """Multiple of `CUT_NODES`, at most."""
 HARDLY_CUT = 0.5
@@ -91,7 +93,7 @@ class Weighing:
         ratios: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._model, self._lattices, self._index, self._ratios = model, lattices, index, ratios
-        self._priors = LinearPriors(model)
+        self._ends, self._priors = _ends(model, ratios), LinearPriors(model)
         self._is_pulled = self._priors.is_gaussian
 
     def points(self) -> tuple[Points, float]:
@@ -100,8 +102,7 @@ class Weighing:
         Infinite where the largest amplitudes of the lattice hold a part. No points where the noise's priors exclude
         each other.
         """
-        ends = _ends(self._model, self._ratios) if self._model.noise.parameters else None
-        if ends is not None and ends[0] >= ends[1]:
+        if self._ends[0] >= self._ends[1]:
             return self._weighed(0, *np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), 0.0
         every = self._roughly()
         if not self._is_pulled and self._are_cut(every):
@@ -110,7 +111,7 @@ class Weighing:
         if self._model.noise.parameters:
             every = [self._all_noise(each) for each in every if len(each.lattice)]
         points = Points.joined(every)
-        mass = _masses([points])
+        mass = _masses([points])[0]
         coarse, last = 0.0, 0.0
         for place, lattice in enumerate(self._lattices):
             own = at_even = points.lattice == place
@@ -124,23 +125,20 @@ class Weighing:
     def _roughly(self) -> list[Points]:
         """Return the points that matter of every lattice, each at one noise."""
         every = [self._best_noise(place) for place in range(len(self._lattices))]
-        mass = _masses(every)
-        least = max(_least_that_matters(mass), np.exp(-IRRELEVANT))
-        edges = np.cumsum([len(points.lattice) for points in every])[:-1]
-        return [points[own >= least] for points, own in zip(every, np.split(mass, edges), strict=True)]
+        masses = _masses(every)
+        least = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT))
+        return [points[own >= least] for points, own in zip(every, masses, strict=True)]
 
     def _are_cut(self, every: Sequence[Points]) -> bool:
         """Return whether the bounds of linear parameters take away much."""
-        inside = 0.0
-        weights = _masses(every)
-        for points in every:
+        inside, total = 0.0, 0.0
+        for points, mass in zip(every, _masses(every), strict=True):
             if len(points.lattice):
                 lattice = self._lattices[int(points.lattice[0])]
                 mean, root = lattice.linear(self._index, points.second, points.first)
                 ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
-                own, weights = weights[: len(mean)], weights[len(mean) :]
-                inside += float(own @ np.exp(ceiling))
-        return inside < HARDLY_CUT * float(_masses(every).sum())
+                inside, total = inside + float(mass @ np.exp(ceiling)), total + float(mass.sum())
+        return inside < HARDLY_CUT * total
 
     def _best_noise(self, place: int) -> Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
@@ -149,23 +147,16 @@ class Weighing:
         misfit = lattice.misfit[second, first, self._index]
         if not noise.parameters:
             return self._weighed(place, second, first, misfit, np.full(len(second), float(noise.sd({}, 0.0))))
-        likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY), *np.exp(_ends(self._model, self._ratios)))
-        strain = self._strain(place, second, first)
-        rise = 0.5 * np.log1p(strain / np.maximum(misfit, TINY))
-        count = 1 if rise.max() < 0.1 else TRIED
-        found = []
-        for share in np.linspace(0, 1, count):
-            noise_sd = np.clip(np.sqrt(misfit / lattice.freedom) * np.exp(share * rise), *likely)
+        likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY), *np.exp(self._ends))
+        least = np.sqrt(misfit / lattice.freedom)
+        found = [self._weighed(place, second, first, misfit, np.clip(least, *likely))]
+        rise = _rise(found[0])
+        for share in np.linspace(0, 1, TRIED)[1:] if rise.max() > HARDLY_PULLED else ():
+            noise_sd = np.clip(least * np.exp(share * rise), *likely)
             found.append(self._weighed(place, second, first, misfit, noise_sd))
         best = np.argmax([points.log_weight + points.log_inside for points in found], axis=0)
         arrays = zip(*(vars(points).values() for points in found), strict=True)
         return Points(*(np.stack(each)[best, np.arange(len(best))] for each in arrays))
-
-    def _strain(self, place: int, second: Places, first: Places) -> FloatArray:
-        """Return what is added to the misfit (M,) where linear parameters are held at their priors."""
-        if not self._is_pulled:
-            return np.zeros(len(second))
-        return self._priors.strain(*self._lattices[place].linear(self._index, second, first))
 
     def _all_noise(self, points: Points) -> Points:
         """Return the points of a lattice with several values of the noise for each, row by row.
@@ -174,11 +165,10 @@ class Weighing:
         those of a Gauss-Legendre rule on what it leaves.
         """
         place = int(points.lattice[0])
-        freedom, ends = self._lattices[place].freedom, _ends(self._model, self._ratios)
+        freedom, ends = self._lattices[place].freedom, self._ends
         mode = 0.5 * np.log(np.maximum(points.misfit / freedom, TINY))[:, None]
         below, above = _reach(freedom)
-        rise = 0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY))[:, None]
-        low, high = mode - below, mode + rise + above
+        low, high = mode - below, mode + _rise(points)[:, None] + above
         if not self._is_pulled and (low >= ends[0]).all() and (high <= ends[1]).all():
             nodes, cells = _noise_rule(freedom)
             logs = mode + nodes
@@ -187,8 +177,8 @@ class Weighing:
             keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
             low, high = (np.where(keeps, own, end) for own, end in zip(cut, ends, strict=True))
             wider = float((high - low).max()) / (below + above)
-            nodes, cells = np.polynomial.legendre.leggauss(int(CUT_NODES * np.clip(wider, 1, MOST_WIDER)))
-            logs, cells = low + (high - low) * 0.5 * (1 + nodes), (high - low) * 0.5 * cells
+            nodes, cells = gauss_rule(int(CUT_NODES * np.clip(wider, 1, MOST_WIDER)))
+            logs, cells = low + (high - low) * nodes, (high - low) * cells
         noise_sd = np.exp(logs).ravel()
         rows = np.repeat(np.arange(len(points.misfit)), len(nodes))
         found = self._weighed(place, points.second[rows], points.first[rows], points.misfit[rows], noise_sd)
@@ -242,7 +232,9 @@ def noise_grid(model: StatisticalModel, points: Points, freedom: int, count: int
 
 
 def _ends(model: StatisticalModel, ratios: Mapping[str, float]) -> FloatArray:
-    """Return the logarithms of the noise between which its priors leave it."""
+    """Return the logarithms of the noise between which its priors leave it; of a known one, all."""
+    if not model.noise.parameters:
+        return np.array([-np.inf, np.inf])
     low, high = model.priors["noise_sd"].quantile(POSSIBLE)
     for symbol, ratio in ratios.items():
         own = model.priors[symbol].quantile(POSSIBLE) / ratio
@@ -256,10 +248,16 @@ def _reach(freedom: int) -> tuple[float, float]:
     return NOISE_BELOW * unit, (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
 
 
-def _masses(every: Sequence[Points]) -> FloatArray:
-    """Return the masses of all points of several sets, within bounds at most, over the largest."""
-    logs = np.concatenate([points.log_weight + points.log_inside for points in every])
-    return np.asarray(np.exp(logs - logs.max(initial=-np.inf))) if len(logs) else logs
+def _rise(points: Points) -> FloatArray:
+    """Return by how much (M,) the logarithm of the noise may rise where priors pull at the linear parameters."""
+    return np.asarray(0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY)))
+
+
+def _masses(every: Sequence[Points]) -> list[FloatArray]:
+    """Return the masses of the points of several sets, within bounds at most, over the largest of all."""
+    logs = [points.log_weight + points.log_inside for points in every]
+    top = max(own.max(initial=-np.inf) for own in logs)
+    return [np.exp(own - top) for own in logs]
 
 
 def _least_that_matters(mass: FloatArray) -> float:

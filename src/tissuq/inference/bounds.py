@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes, lower_triangle, quasi_random
+from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes, lower_triangle
+from tissuq.inference.kronecker import quasi_random
 from tissuq.inference.marginal import (
     Marginal,
     blended,

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.gaussian import interval_quantile, log_interval
+from tissuq.inference.kronecker import SHIFTS, quasi_random
 from tissuq.inference.nested import MOST_NESTED, nested_draws, nested_log_mass
 
-__all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes", "lower_triangle", "quasi_random"]
+__all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes", "lower_triangle"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -34,8 +34,6 @@ AT_ONCE = 500_000
 MOST_POINTS = 30_000
 SWEEPS = 100
 """Gibbs sweeps that take draws to their distribution."""
-SHIFTS = 8
-"""Shifted copies of the quasi-random points, whose spread tells the error (more, where few points count)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,18 +217,3 @@ def lower_triangle(root: FloatArray) -> FloatArray:
     least = 1e-12 * np.sqrt((root**2).sum(axis=2))
     np.einsum("mii->mi", lower)[:] = np.maximum(np.abs(diagonal), least)
     return lower
-
-
-@lru_cache
-def quasi_random(dimension: int, number: int) -> FloatArray:
-    """Return a Kronecker sequence of the generalised golden ratio in the unit cube, shifted copy by shifted copy.
-
-    The tent map makes any integrand periodic, which lets the error fall faster than one over the number of points.
-    """
-    ratio = 2.0
-    for _ in range(64):
-        ratio = (1 + ratio) ** (1 / (dimension + 1))
-    steps = ratio ** -np.arange(1.0, dimension + 1)
-    shifts = np.random.default_rng(0).random((SHIFTS, 1, dimension))
-    lattice = shifts + np.arange(1, -(-number // SHIFTS) + 1)[:, None] * steps
-    return np.asarray(np.abs(2 * (lattice % 1.0) - 1)).reshape(-1, dimension)[:number]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy import side_by_side
 from tissuq.errors import ModelError
 from tissuq.inference.amplitudes import (
     LIGHT,
@@ -126,6 +127,7 @@ class EnergySolution(Solution):
         self, model: StatisticalModel, nodes: Sequence[Node], log_weights: FloatArray, error: float, seed: int
     ) -> None:
         self.model, self._nodes, self._seed = model, nodes, seed
+        self._outer = Outer(model)
         self._step = STEP if len(nodes) == 1 else OUTER_STEP
         points = Points.joined([node.points for node in nodes])
         self._node = np.repeat(np.arange(len(nodes)), [len(node.points.lattice) for node in nodes])
@@ -152,7 +154,7 @@ class EnergySolution(Solution):
     @property
     def reason(self) -> str:  # type: ignore[override]  # computed, where others store it
         """What was done."""
-        model, outer = self.model, Outer(self.model).symbols
+        model, outer = self.model, self._outer.symbols
         inner = ", ".join(symbol for symbol in model.nonlinear if symbol not in outer)
         done = (
             f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
@@ -196,7 +198,7 @@ class EnergySolution(Solution):
         width = len(self.model.linear) + max(sum(f.shape[1] for f in each) for each in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
         for number in np.unique(node):
-            rows = Outer(self.model).rows(self._nodes[number].outer)
+            rows = self._outer.rows(self._nodes[number].outer)
             for place in np.unique(points.lattice[node == number]):
                 own = np.flatnonzero((node == number) & (points.lattice == place))
                 amplitudes = points.amplitudes[own][:, list(self.model.energy_members[place].places)]
@@ -226,7 +228,7 @@ class EnergySolution(Solution):
         member, start = self.components.member[chosen], len(self.model.linear)
         values = np.zeros((*chosen.shape, len(self.model.experiment)))
         for place in np.unique(member):
-            features = np.hstack([np.zeros((values.shape[2], 0)), *self.model.energy_features(place)])
+            features = side_by_side(self.model.energy_features(place), values.shape[2])
             own = member == place
             values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
         return values
@@ -281,7 +283,7 @@ class EnergySolution(Solution):
     def _settings(self, points: Points, node: Places) -> FloatArray:
         """Return the nonlinear parameters (M, d)."""
         columns = dict(zip(self.model.energy_symbols, points.amplitudes.T, strict=True)) | {"noise_sd": points.noise_sd}
-        for place, symbol in enumerate(Outer(self.model).symbols):
+        for place, symbol in enumerate(self._outer.symbols):
             values = np.array([each.outer[place] for each in self._nodes])[node]
             columns[symbol] = values * (points.noise_sd if symbol in self._nodes[0].ratios else 1.0)
         return np.column_stack([columns[symbol] for symbol in self.model.nonlinear])

@@ -9,7 +9,9 @@ from math import lgamma, log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Proposal", "adapted", "effective", "even_points", "log_normal"]
+from tissuq.inference.kronecker import even_points
+
+__all__ = ["Proposal", "adapted", "effective", "log_normal"]
 
 FloatArray = NDArray[np.float64]
 
@@ -45,16 +47,6 @@ class Proposal:
         heavy = (one - 0.5 * (FREEDOM + 1) * np.log1p(score**2 / FREEDOM)).sum(axis=0)
         heavy = heavy - np.log(np.abs(np.diag(self.root))).sum()
         return np.asarray(np.logaddexp(log(1 - WIDE) + heavy, log(WIDE) + log_normal(points)))
-
-
-def even_points(dimension: int, count: int) -> FloatArray:
-    """Return evenly spread points (count, d) of the unit cube; every k-th of them are, too."""
-    if dimension == 1:
-        return (np.arange(count)[:, None] + 0.5) / count
-    ratio = 2.0
-    for _ in range(64):
-        ratio = (1 + ratio) ** (1 / (dimension + 1))
-    return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * ratio ** -np.arange(1.0, dimension + 1)) % 1.0)
 
 
 def log_normal(points: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.discrepancy import Member
+from tissuq.discrepancy import Member, side_by_side
 
 __all__ = ["STEP", "Directions", "Lattice", "Reduced", "Rows"]
 
@@ -124,7 +124,7 @@ class Directions:
         pairs = zip(sizes, unlikely, strict=True)
         grids = [*(_grid(size, low, step, shift) for size, low in pairs), *[np.zeros(1)] * 2]
         self.ratios = grids[0], grids[1]
-        self.basis, triangle = np.linalg.qr(np.hstack([np.zeros((len(scale), 0)), *features]))
+        self.basis, triangle = np.linalg.qr(side_by_side(features, len(scale)))
         first, second = np.split(triangle, [features[0].shape[1] if features else 0], axis=1)
         # White in the second block, for all of its ratios, and then in the first.
         values, vectors = np.linalg.eigh(second @ second.T)

@@ -57,7 +57,8 @@ class Node:
 def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     """Return the posteriors of models on the same stretches that have no outer parameters."""
     rows = plain_rows(models)
-    lattices = [Lattice(_directions(models, rows.scale, place), rows) for place in range(len(models[0].energy_members))]
+    terms = _Terms(models)
+    lattices = [Lattice(terms.directions(place, rows.scale), rows) for place in range(len(models[0].energy_members))]
     found = []
     for index, model in enumerate(models):
         points, error = Weighing(model, lattices, index).points()
@@ -80,11 +81,29 @@ def weighted_nodes(model: StatisticalModel) -> tuple[list[Node], FloatArray, flo
     return nodes, log_weights, relative_error(outer, masses)
 
 
+class _Terms:
+    """The stresses of the members of an energy discrepancy on one design, the same for all models on it."""
+
+    def __init__(self, models: Sequence[StatisticalModel]) -> None:
+        self._models, self._members = models, models[0].energy_members
+        self._features = [models[0].energy_features(place) for place in range(len(self._members))]
+        unit, _ = invariant_rates(models[0].experiment.mode, models[0].experiment.stretch)
+        self._least = float(np.sqrt((models[0].white(unit) ** 2).mean()))
+
+    def directions(self, place: int, scale: FloatArray, step: float = STEP, shift: float = 0.0) -> Directions:
+        """Return the directions of one member for the noise (n,) of every measurement over noise_sd."""
+        member, features = self._members[place], self._features[place]
+        symbols = [self._models[0].energy_symbols[block] for block in member.places]
+        unlikely = [min(float(m.priors[s].quantile(UNLIKELY)) / _most_noise(m) for m in self._models) for s in symbols]
+        return Directions(member, scale, features, self._least, unlikely, step, shift)
+
+
 class _Sums:
     """The posterior of one model at any value of its outer parameters."""
 
     def __init__(self, model: StatisticalModel, outer: Outer) -> None:
         self._model, self._outer, self._calls = model, outer, 0
+        self._terms = _Terms([model])
         self._known: dict[tuple[int, int], Directions] = {}
 
     def points(self, settings: FloatArray, members: Places) -> Points:
@@ -109,7 +128,7 @@ class _Sums:
         found = self._known.get((place, turn))
         if found is None or self._outer.of_noise.any():
             shift = OUTER_STEP * (turn + 0.5) / BEGINNINGS
-            found = self._known[place, turn] = _directions([self._model], scale, place, OUTER_STEP, shift)
+            found = self._known[place, turn] = self._terms.directions(place, scale, OUTER_STEP, shift)
         return found
 
 
@@ -120,18 +139,6 @@ def _thinned(points: Points, count: int, offset: float) -> Points:
     total = np.logaddexp.reduce(points.log_weight)
     chosen = points[systematic(np.exp(points.log_weight - total)[None], count, offset)[0]]
     return replace(chosen, log_weight=np.full(count, total - np.log(count)))
-
-
-def _directions(
-    models: Sequence[StatisticalModel], scale: FloatArray, place: int, step: float = STEP, shift: float = 0.0
-) -> Directions:
-    """Return the directions of one member, the same for all models."""
-    member = models[0].energy_members[place]
-    symbols = [models[0].energy_symbols[block] for block in member.places]
-    unlikely = [min(float(m.priors[s].quantile(UNLIKELY)) / _most_noise(m) for m in models) for s in symbols]
-    unit, _ = invariant_rates(models[0].experiment.mode, models[0].experiment.stretch)
-    least = float(np.sqrt((models[0].white(unit) ** 2).mean()))
-    return Directions(member, scale, models[0].energy_features(place), least, unlikely, step, shift)
 
 
 def _most_noise(model: StatisticalModel) -> float:

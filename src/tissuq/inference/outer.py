@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
-from tissuq.inference.importance import adapted, effective, even_points, log_normal
+from tissuq.inference.importance import adapted, effective, log_normal
+from tissuq.inference.kronecker import even_points
 from tissuq.inference.lattice import Rows
 from tissuq.model import StatisticalModel
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 
-__all__ = ["MAX_DIMENSION", "Lines", "Quadrature", "integrate"]
+__all__ = ["MAX_DIMENSION", "Lines", "Quadrature", "gauss_rule", "integrate"]
 
 FloatArray = NDArray[np.float64]
 LogFunction = Callable[[FloatArray], FloatArray]
@@ -181,7 +181,7 @@ def _evaluated(log_function: LogFunction, lower: FloatArray, width: FloatArray) 
 
 def _cell_points(lower: FloatArray, width: FloatArray, order: int) -> FloatArray:
     """Return the Gauss points (C, order^d, d) of C cells; the last side varies fastest."""
-    nodes, dimension = _gauss(order)[0], lower.shape[1]
+    nodes, dimension = gauss_rule(order)[0], lower.shape[1]
     grid = nodes[np.indices([order] * dimension).reshape(dimension, order**dimension).T]
     return np.asarray(lower[:, None, :] + width[:, None, :] * grid)
 
@@ -240,7 +240,7 @@ def _row_values(series: FloatArray, t: FloatArray) -> FloatArray:
 
 
 @lru_cache
-def _gauss(order: int) -> tuple[FloatArray, FloatArray]:
+def gauss_rule(order: int) -> tuple[FloatArray, FloatArray]:
     """Return Gauss-Legendre nodes and weights on [0, 1]."""
     nodes, weights = legendre.leggauss(order)
     return 0.5 * (nodes + 1), 0.5 * weights
@@ -257,4 +257,4 @@ def _to_legendre(order: int) -> FloatArray:
 @lru_cache
 def _rule(order: int, dimension: int) -> FloatArray:
     """Return the weights of the tensor Gauss rule on the unit cube, flattened."""
-    return np.asarray(reduce(np.multiply.outer, [_gauss(order)[1]] * dimension, np.array(1.0)).ravel())
+    return np.asarray(reduce(np.multiply.outer, [gauss_rule(order)[1]] * dimension, np.array(1.0)).ravel())

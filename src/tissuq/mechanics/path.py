@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.experiments.modes import Path
 
-__all__ = ["STEP", "invariant_rates", "invariants", "log_stretches"]
+__all__ = ["STEP", "farthest_stretch", "invariant_rates", "invariants", "log_stretches"]
 
 FloatArray = NDArray[np.float64]
 
 STEP = 1e-30
 """Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
+LARGEST = 10.0
+"""Stretch, or one over it, beyond which no range is followed."""
 
 
 def log_stretches(mode: Path, stretch: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -37,3 +41,14 @@ def invariant_rates(mode: Path, stretch: ArrayLike) -> tuple[FloatArray, FloatAr
     """Return the engineering stresses (n,) of the energies I1 and I2."""
     logs, rates = log_stretches(mode, stretch)
     return (2 * np.exp(2 * logs) * rates).sum(axis=1), (-2 * np.exp(-2 * logs) * rates).sum(axis=1)
+
+
+def farthest_stretch(mode: Path, most: Sequence[float], sign: int) -> float:
+    """Return the stretch of a mode, above (sign 1) or below (-1) one, where I1 - 3 or I2 - 3 reaches its ``most``."""
+    low, high = 0.0, np.log(LARGEST)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        reached = invariants(mode, [np.exp(sign * middle)])
+        is_inside = all(each[0] <= limit for each, limit in zip(reached, most, strict=True))
+        low, high = (middle, high) if is_inside else (low, middle)
+    return float(np.exp(sign * low))

@@ -8,6 +8,7 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy import side_by_side
 from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import basis_of, coefficients, correlated_parts, mean_stress
@@ -100,7 +101,8 @@ def _left_out(model: StatisticalModel, components: Components) -> FloatArray:
     root = basis @ root_b
     if components.member is not None:
         for place in np.unique(components.member):
-            own, features = np.flatnonzero(components.member == place), _features(model, int(place))
+            own = np.flatnonzero(components.member == place)
+            features = side_by_side(model.energy_features(place), len(model.experiment))
             weights = slice(len(model.linear), len(model.linear) + features.shape[1])
             residual[own] -= components.mean[own, weights] @ features.T
             root[own] += features @ components.root[own, weights]
@@ -168,10 +170,11 @@ def _with_energies(
     model: StatisticalModel, place: int, residual: FloatArray, settings: FloatArray, white: FloatArray
 ) -> FloatArray:
     """Return what an energy discrepancy adds to the squared residual and the log determinant (Woodbury)."""
-    member, features = model.energy_members[place], _features(model, place)
-    amplitudes = settings[:, [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]]
-    sizes = [each.shape[1] for each in model.energy_features(place)]
-    scale = np.repeat(amplitudes, sizes, axis=1)
+    blocks = model.energy_features(place)
+    features = side_by_side(blocks, len(model.experiment))
+    symbols = [model.energy_symbols[k] for k in model.energy_members[place].places]
+    amplitudes = settings[:, [model.nonlinear.index(symbol) for symbol in symbols]]
+    scale = np.repeat(amplitudes, [each.shape[1] for each in blocks], axis=1)
     if model.noise.depends_on_level:
         products = np.stack([features.T @ (features / own[:, None]) for own in white])
     else:
@@ -180,11 +183,6 @@ def _with_energies(
     along = scale * ((residual / white) @ features)
     whitened = np.linalg.solve(triangle, along[:, :, None])[:, :, 0]
     return np.asarray(2 * np.log(np.einsum("mii->mi", triangle)).sum(axis=1) - (whitened**2).sum(axis=1))
-
-
-def _features(model: StatisticalModel, place: int) -> FloatArray:
-    """Return the stresses (n, q) of all terms of one member of an energy discrepancy at the measurements."""
-    return np.hstack([np.zeros((len(model.experiment), 0)), *model.energy_features(place)])
 
 
 def _white_variance(model: StatisticalModel, settings: FloatArray) -> FloatArray:

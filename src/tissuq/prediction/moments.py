@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.discrepancy import side_by_side
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
@@ -215,8 +216,8 @@ def drawn_curves(
 ) -> tuple[FloatArray, FloatArray]:
     """Return stresses (M, g) of the material alone and of the discrepancy, one joint draw for every component.
 
-    Scatter that is independent from point to point is no curve, and left out. In another loading mode than that of the
-    data, so is a discrepancy that is no energy.
+    Scatter that is independent from point to point is no curve, and left out. Where a loading mode is given, so is a
+    discrepancy that is no energy.
     """
     generator, settings = np.random.default_rng([seed, 11]), components.settings
     score = generator.standard_normal(components.mean.shape)
@@ -225,10 +226,12 @@ def drawn_curves(
     terms = basis_of(model, stretch, settings, mode) * drawn[:, None, :]
     own = np.isin(model.column_symbols, model.material_symbols)
     alone, other = terms[..., own].sum(axis=2), terms[..., ~own].sum(axis=2)
+    if mode is not None and not model.discrepancy.is_energy:
+        return alone, np.zeros_like(alone)
     if components.member is not None:
         for shift, _, _, chosen in _energies(model, replace(components, mean=linear), stretch, mode):
             other[chosen] += shift
-    if model.is_correlated and mode is None:
+    if model.is_correlated:
         for part in correlated_parts(model, settings):
             shift, covariance = _condition_jointly(model, part, stretch, drawn[part.chosen])
             values, vectors = np.linalg.eigh(covariance)
@@ -267,7 +270,7 @@ def _energies(
             for whole, each in zip(member.stress_variances(mode, stretch), features, strict=True)
         ]
         symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]
-        every = np.hstack([np.zeros((len(stretch), 0)), *features])
+        every = side_by_side(features, len(stretch))
         chosen = slice(start, start + every.shape[1])
         variance = components.settings[own][:, symbols] ** 2 @ np.reshape(left, (-1, len(stretch)))
         yield components.mean[own, chosen] @ every.T, every @ components.root[own, chosen], variance, own

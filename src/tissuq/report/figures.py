@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.extent import has_energy
+from tissuq.assessment.stability import LOST
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band, share_inside
@@ -22,7 +24,7 @@ __all__ = ["BAND", "BASE", "INK", "STYLE", "marginal_figure", "predictive_figure
 
 FloatArray = NDArray[np.float64]
 
-INK, BAND, BASE, TRUTH = "#222222", "#0072B2", "#8a8a8a", "#D55E00"
+INK, BAND, BASE, TRUTH, UNSTABLE = "#222222", "#0072B2", "#8a8a8a", "#D55E00", "#E69F00"
 STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.spines.top": False,
@@ -45,6 +47,9 @@ def predictive_figure(
     true_curve: tuple[FloatArray, FloatArray] | None = None,
 ) -> Figure:
     """Return one panel a formulation: data, 95 % predictive band and mean, the band of "none" for comparison.
+
+    Stretches at which what is drawn has lost its stability with more than 5 % are shaded; a discrepancy that is no
+    energy has none to lose, so that its panels are shaded for the model alone only.
 
     Parameters
     ----------
@@ -72,6 +77,8 @@ def predictive_figure(
             inside = f"{round(share * len(experiment))} of {len(experiment)} inside"
             axis.set_title(f"{name}:  {inside}")
             _draw_band(axis, bands[name], unit)
+            if discrepancy == has_energy(posterior.model) or name == "none":
+                _shade_instability(axis, posterior, stretch)
             if name != "none" and "none" in bands:
                 axis.plot(
                     stretch,
@@ -147,6 +154,18 @@ def _draw_band(axis: Axes, band: Band, unit: StressUnit) -> None:
     axis.plot(band.stretch, mean, color=BAND, lw=1.6, label="predicted mean")
 
 
+def _shade_instability(axis: Axes, posterior: Posterior, stretch: FloatArray) -> None:
+    found = posterior.stable_ranges.get(posterior.model.experiment.mode.name)
+    if found is None:
+        return
+    label = f"stability lost with more than {100 * LOST:.0f} %"
+    for sure, end in ((found.surely_low, found.low), (found.surely_high, found.high)):
+        sure, end = np.clip([sure, end], stretch[0], stretch[-1])
+        if sure != end:
+            axis.axvspan(sure, end, facecolor=UNSTABLE, alpha=0.16, lw=0, zorder=0, label=label)
+            axis.axvline(sure, color=UNSTABLE, lw=1.2, ls="-.", zorder=0.5)
+
+
 def _draw_marginal(
     axis: Axes, row: int, posterior: Posterior, symbol: str, unit: StressUnit, truth: float | None
 ) -> None:
@@ -179,4 +198,5 @@ def _label(figure: Figure, axes: list[Axes], count: int, unit: StressUnit) -> No
     for axis in axes[:count]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(list(handles.values()), list(handles), loc="outside upper center", ncols=len(handles), fontsize=9.5)
+    shown = 2 if count == 1 else len(handles)
+    figure.legend(list(handles.values()), list(handles), loc="outside upper center", ncols=shown, fontsize=9.5)

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from math import floor, isnan, log10
 from typing import Any
 
+from tissuq.assessment.stability import LOST
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
 from tissuq.report.tables import headline_of
 
-__all__ = ["readable_methods", "readable_parameters", "readable_summary", "significant"]
+__all__ = ["readable_methods", "readable_parameters", "readable_stability", "readable_summary", "significant"]
 
 Row = dict[str, Any]
 
@@ -50,12 +51,42 @@ def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
                 "log_evidence": "" if row["log_evidence"] is None else f"{row['log_evidence']:.2f}",
                 "coverage": f"{row['predictive_coverage']:.0%}",
                 "coverage_model_only": f"{row['predictive_coverage_model_only']:.0%}",
+                "stable": _percent(row.get("stable")),
+                "lost_at": _place(*(row.get(name) for name in ("lost_at", "lost_at_low", "lost_at_high"))),
                 "rhat": "" if row["rhat"] is None else f"{row['rhat']:.3f}",
                 "ess": "" if row["ess"] is None else f"{row['ess']:.0f}",
                 "seconds": f"{row['seconds']:.2f}",
             }
         )
     return readable
+
+
+def readable_stability(rows: list[Row]) -> list[list[str]]:
+    """Return the rows of how far it is stable as text; no place where it is hardly ever lost."""
+    return [
+        [
+            row["formulation"],
+            row["mode"],
+            f"{row['stretch_low']:.3g} to {row['stretch_high']:.3g}",
+            _percent(row["stable"]),
+            *(
+                _place(*(row[f"lost_{side}_{name}"] for name in ("median", "low", "high")))
+                if row[f"lost_{side}_probability"] > LOST
+                else ""
+                for side in ("below", "above")
+            ),
+        ]
+        for row in rows
+    ]
+
+
+def _percent(probability: float | None) -> str:
+    return "" if probability is None else f"{probability:.0%}"
+
+
+def _place(median: float | None, low: float | None, high: float | None) -> str:
+    """Return a stretch with its interval."""
+    return "" if median is None else f"{median:.3g} [{low:.3g}, {high:.3g}]"
 
 
 def readable_methods(posteriors: Mapping[str, Posterior]) -> dict[str, str]:

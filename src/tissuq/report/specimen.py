@@ -11,9 +11,15 @@ from tissuq.assessment import Assessment
 from tissuq.mechanics.user_law import LAW
 from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import readable_methods, readable_parameters, readable_summary, significant
+from tissuq.report.rows import (
+    readable_methods,
+    readable_parameters,
+    readable_stability,
+    readable_summary,
+    significant,
+)
 from tissuq.report.run_folder import ASSESSMENT, RECIPE
-from tissuq.report.tables import Row, summary_row, write_json
+from tissuq.report.tables import Row, stability_cells, stability_rows, summary_row, write_csv, write_json
 from tissuq.studies.specimen import SpecimenStudy
 
 if TYPE_CHECKING:
@@ -47,6 +53,9 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
     write_data(folder, study.experiment)
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
+    stability = stability_rows(study.posteriors)
+    if stability:
+        write_csv(folder / "stability.csv", stability)
     write_posteriors(folder, study.posteriors)
     write_json(folder / ASSESSMENT, [_assessment_row(*each) for each in study.assessments.items()])
     if figures:
@@ -72,7 +81,12 @@ def _assessment_row(name: str, assessment: Assessment) -> Row:
 
 def specimen_summary(study: SpecimenStudy) -> list[Row]:
     """Return one row a discrepancy."""
-    return [summary_row(name, each, study.seconds[name]) for name, each in study.posteriors.items()]
+    rows = []
+    for name, posterior in study.posteriors.items():
+        row = summary_row(name, posterior, study.seconds[name])
+        seconds = row.pop("seconds")
+        rows.append(row | stability_cells(posterior) | {"seconds": seconds})
+    return rows
 
 
 def _figures(study: SpecimenStudy) -> dict[str, Figure]:
@@ -105,6 +119,7 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         },
         "parameters": readable_parameters(study.posteriors, study.unit),
         "assessments": {name: each.sentences for name, each in study.assessments.items()},
+        "stability": readable_stability(stability_rows(study.posteriors)),
         "methods": readable_methods(study.posteriors),
         "noise": known or noise.description,
         "skipped": study.skipped,

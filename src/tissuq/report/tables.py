@@ -8,11 +8,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tissuq.assessment.stability import LOST
 from tissuq.posterior import Posterior
 
-__all__ = ["headline_of", "parameter_rows", "summary_row", "write_csv", "write_json"]
+__all__ = [
+    "headline_of",
+    "parameter_rows",
+    "stability_cells",
+    "stability_rows",
+    "summary_row",
+    "write_csv",
+    "write_json",
+]
 
 Row = dict[str, Any]
+
+STABILITY = ("stable", "lost_at", "lost_at_low", "lost_at_high")
 
 
 def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: float | None = None) -> Row:
@@ -63,6 +74,31 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
                 }
             )
     return rows
+
+
+def stability_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
+    """Return how far every formulation is stable in every loading mode, where its energy tells."""
+    rows = []
+    for formulation, posterior in posteriors.items():
+        for mode, found in posterior.stable_ranges.items():
+            row: Row = {"formulation": formulation, "mode": mode, "stretch_low": found.low, "stretch_high": found.high}
+            row |= {"stable": found.probability, "surely_low": found.surely_low, "surely_high": found.surely_high}
+            for side, loss in (("below", found.below), ("above", found.above)):
+                row |= {f"lost_{side}_{name}": _known(value) for name, value in loss._asdict().items()}
+            rows.append(row)
+    return rows
+
+
+def stability_cells(posterior: Posterior) -> Row:
+    """Return how probable stability is over the measured stretches, and where it is lost, likelier below or above one.
+
+    None where it is hardly ever lost.
+    """
+    found = posterior.stable_ranges.get(posterior.model.experiment.mode.name)
+    if found is None:
+        return dict.fromkeys(STABILITY)
+    places = found.loss[1:] if found.loss.probability > LOST else (None, None, None)
+    return dict(zip(STABILITY, (found.probability, *places), strict=True))
 
 
 def _known(number: float) -> float | None:

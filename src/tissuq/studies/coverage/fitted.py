@@ -21,7 +21,7 @@ from tissuq.posterior import Posterior
 from tissuq.priors import Prior
 from tissuq.studies.paper.settings import FORMULATIONS
 
-__all__ = ["AVERAGES", "fit_all", "model_of", "parts_of"]
+__all__ = ["fit_all", "model_of", "parts_of"]
 
 AVERAGES = {"average-of-seven": FORMULATIONS}
 """Averages of fits by their evidence: the paper's seven formulations."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tissuq.assessment import Average
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.mechanics.path import invariants
+from tissuq.mechanics.path import farthest_stretch, invariants
 from tissuq.posterior import Posterior
 from tissuq.studies.coverage.truths import Truth
 
@@ -47,10 +47,5 @@ def stress_unseen(
 
 def unseen_stretches(measured: LoadingMode, stretch: FloatArray, mode: LoadingMode) -> FloatArray:
     """Return stretches above one in a mode, up to where I1 or I2 leaves the range that was measured in another."""
-    most = [each.max() for each in invariants(measured, stretch)]
-    low, high = 1.0, 10.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        is_inside = all(each[0] <= limit for each, limit in zip(invariants(mode, [middle]), most, strict=True))
-        low, high = (middle, high) if is_inside else (low, middle)
-    return np.linspace(1.0, low, POINTS + 1)[1:]
+    most = [float(each.max()) for each in invariants(measured, stretch)]
+    return np.linspace(1.0, farthest_stretch(mode, most, 1), POINTS + 1)[1:]

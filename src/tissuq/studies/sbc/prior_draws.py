@@ -40,12 +40,12 @@ def draw_from_prior(model: StatisticalModel, generator: np.random.Generator) -> 
 def _energy_stress(model: StatisticalModel, values: dict[str, float], generator: np.random.Generator) -> FloatArray:
     """Draw a member and its weights; set the amplitudes that it has not to zero."""
     members = model.energy_members
-    member = members[generator.choice(len(members), p=[each.probability for each in members])]
+    chosen = int(generator.choice(len(members), p=[each.probability for each in members]))
+    member = members[chosen]
     for place, symbol in enumerate(model.energy_symbols):
         if place not in member.places:
             values[symbol] = 0.0
     stress = np.zeros(len(model.experiment))
-    features = member.stress_features(model.experiment.mode, model.experiment.stretch)
-    for place, terms in zip(member.places, features, strict=True):
+    for place, terms in zip(member.places, model.energy_features(chosen), strict=True):
         stress += values[model.energy_symbols[place]] * terms @ generator.standard_normal(terms.shape[1])
     return stress
