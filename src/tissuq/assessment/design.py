@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes.mode import SHEAR
 
 __all__ = ["design_warnings"]
 
@@ -17,9 +18,11 @@ NEAR = 0.15
 
 def design_warnings(experiment: Experiment) -> Iterator[str]:
     """Yield what the design of a test leaves open, each with what to measure next."""
-    strain = experiment.stretch - 1
+    control = experiment.mode.controls[0]
+    strain = experiment.stretch - control.reference
     reach = float(np.abs(strain).max())
-    if not (strain > 1e-9).any() or not (strain < -1e-9).any():
+    has_directions = control != SHEAR
+    if has_directions and not ((strain > 1e-9).any() and (strain < -1e-9).any()):
         done, other = ("tension", "compression") if (strain > 0).any() else ("compression", "tension")
         yield (
             f"there is {done} only, which leaves the initial modulus about twice as uncertain as both directions: "
@@ -27,10 +30,10 @@ def design_warnings(experiment: Experiment) -> Iterator[str]:
         )
     near = (np.abs(strain) <= NEAR * reach) & (strain != 0)
     if not near.any():
-        nearest = 1 + strain[np.abs(strain) > 0][np.abs(strain[np.abs(strain) > 0]).argmin()]
+        nearest = control.reference + strain[np.abs(strain) > 0][np.abs(strain[np.abs(strain) > 0]).argmin()]
         yield (
-            f"nothing is measured near the reference (the nearest stretch is {nearest:.4g}), so the initial modulus is "
-            f"extrapolated: measure within {NEAR * reach:.2g} of stretch 1."
+            f"nothing is measured near the reference (the nearest {control.name} is {nearest:.4g}), so the initial "
+            f"modulus is extrapolated: measure within {NEAR * reach:.2g} of {control.name} {control.reference:g}."
         )
     if len(experiment) < FEW:
         yield (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
+from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
@@ -26,6 +26,8 @@ Flags = NDArray[np.bool_]
 DRAWS, POINTS = 500, 21
 STEP = 1e-4
 """Of the logarithmic strains, for the tangent."""
+LARGEST_CHANGE = 9.0
+"""Of a stretch or an amount of shear, where the invariants that were measured do not end before."""
 NEUTRAL = 1e-9
 """Of the initial modulus: differences of stress that count as none."""
 DIRECTIONS = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
@@ -93,7 +95,8 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
             "arithmetic of arrays: write it without jax.numpy and branches."
         ) from error
     own, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * STEP)
-    size = np.abs(np.trace(tangent[..., np.abs(stretch - 1).argmin()], axis1=1, axis2=2))[:, None]
+    change = stretch - mode.reference
+    size = np.abs(np.trace(tangent[..., np.abs(change).argmin()], axis1=1, axis2=2))[:, None]
     differences = np.stack([own[:, 0], own[:, 1], own[:, 0] - own[:, 1]])
     apart = np.stack([base[0] - base[2], base[1] - base[2], base[0] - base[1]])
     baker = ((differences * np.sign(apart)[:, None] > -NEUTRAL * size) | (np.abs(apart)[:, None] < 1e-9)).all(axis=0)
@@ -101,7 +104,7 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
     near = np.concatenate([stretch - STEP, stretch + STEP])
     rising = np.diff(drawn(near, mode).reshape(DRAWS, 2, -1), axis=1)[:, 0] > 0
-    stable = _from_reference(stretch, baker & drucker & rising)
+    stable = _from_reference(change, baker & drucker & rising)
     first, second, third, all_three = (each.mean(axis=0) for each in (baker, drucker, rising, stable))
     return Stability(mode.name, stretch, first, second, third, all_three, float(stable.all(axis=1).mean()))
 
@@ -110,37 +113,44 @@ def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     if mode == data.mode:
-        return min(1.0, float(data.stretch.min())), max(1.0, float(data.stretch.max()))
+        at_rest = float(mode.reference)
+        return min(at_rest, float(data.stretch.min())), max(at_rest, float(data.stretch.max()))
     return _end(mode, most, -1), _end(mode, most, 1)
 
 
 def probability_of_stability(solution: Solution) -> dict[str, float]:
-    """Return for every loading mode the share of draws that are stable over the whole range that was measured."""
+    """Return for every mode of one stretch and one stress the share of draws stable over the range that was measured.
+
+    In the other modes the material passes through the same states, or through states between theirs.
+    """
     found = {}
-    for name in loading_modes():
-        mode = loading_mode(name)
+    for mode in (kind() for kind in loading_modes().values()):
+        if not mode.is_curve:
+            continue
         ends = calibrated_range(solution.model.experiment, mode)
         result = stability(solution, mode, np.linspace(*ends, POINTS))
-        found[name] = float(result.everywhere)
+        found[mode.name] = float(result.everywhere)
     return found
 
 
 def _end(mode: LoadingMode, most: Sequence[float], sign: int) -> float:
-    low, high = 0.0, np.log(10.0)
+    (control,) = mode.controls
+    low, high = 0.0, LARGEST_CHANGE if sign > 0 else min(LARGEST_CHANGE, control.reference - control.above)
     for _ in range(50):
         middle = 0.5 * (low + high)
         is_inside = all(
-            each[0] <= limit for each, limit in zip(invariants(mode, [np.exp(sign * middle)]), most, strict=True)
+            each[0] <= limit
+            for each, limit in zip(invariants(mode, mode.excursion([sign * middle])), most, strict=True)
         )
         low, high = (middle, high) if is_inside else (low, middle)
-    return float(np.exp(sign * low))
+    return float(mode.excursion(sign * low))
 
 
-def _from_reference(stretch: FloatArray, is_stable: Flags) -> Flags:
-    """Return whether all is stable (M, g) from the reference to each stretch."""
+def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:
+    """Return whether all is stable (M, g) from the reference to each change (g,) of the stretch."""
     found = np.empty_like(is_stable)
-    for side in (np.flatnonzero(stretch >= 1), np.flatnonzero(stretch < 1)):
-        outward = side[np.argsort(np.abs(stretch[side] - 1))]
+    for side in (np.flatnonzero(change >= 0), np.flatnonzero(change < 0)):
+        outward = side[np.argsort(np.abs(change[side]))]
         found[:, outward] = np.logical_and.accumulate(is_stable[:, outward], axis=1)
     return found
 

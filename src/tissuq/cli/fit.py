@@ -45,7 +45,7 @@ def fit(
     mode: Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")] = None,
     column: Annotated[
         list[str] | None,
-        typer.Option(help="ROLE=COLUMN for stretch, strain or stress, such as stretch=Strain; repeat."),
+        typer.Option(help="ROLE=COLUMN for stretch, strain, shear or stress, such as stretch=Strain; repeat."),
     ] = None,
     stress_unit: Annotated[str | None, typer.Option(help="Unit of the stress column [the file's, or MPa].")] = None,
     stress_type: Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")] = None,

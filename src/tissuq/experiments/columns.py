@@ -15,11 +15,12 @@ __all__ = ["ColumnChoice", "Heading", "choose_columns", "declared_unit", "headin
 
 STRETCH_NAMES = frozenset(["stretch", "stretch ratio", "lambda", "λ"])
 STRAIN_NAMES = frozenset(["strain", "engineering strain", "nominal strain"])
+SHEAR_NAMES = frozenset(["shear", "amount of shear", "shear strain", "gamma", "γ"])
 STRESS_NAMES = {
-    "engineering": frozenset(["stress", "engineering stress", "nominal stress"]),
-    "cauchy": frozenset(["stress", "cauchy stress", "true stress"]),
+    "engineering": frozenset(["stress", "engineering stress", "nominal stress", "shear stress"]),
+    "cauchy": frozenset(["stress", "cauchy stress", "true stress", "shear stress"]),
 }
-ROLES = ("stretch", "strain", "stress")
+ROLES = ("stretch", "strain", "shear", "stress")
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]"),
     re.compile(r"(?P<quantity>.+?)\s*/\s*(?P<unit>.+)"),
@@ -74,7 +75,9 @@ def declared_unit(table: Table, column: int) -> str:
     return beneath or in_heading
 
 
-def choose_columns(table: Table, mapping: Mapping[str, str | int] | None, stress_type: str) -> ColumnChoice:
+def choose_columns(
+    table: Table, mapping: Mapping[str, str | int] | None, stress_type: str, is_shear: bool = False
+) -> ColumnChoice:
     """Return the columns to read: those of the mapping, the others by their names.
 
     Parameters
@@ -82,9 +85,11 @@ def choose_columns(table: Table, mapping: Mapping[str, str | int] | None, stress
     table : Table
         The table to choose from.
     mapping : mapping or None
-        From a role (stretch or strain, stress) to the name or the number, from 1, of a column.
+        From a role (stretch, strain or shear; stress) to the name or the number, from 1, of a column.
     stress_type : str
         ``engineering`` or ``cauchy``: what a stress column may be called.
+    is_shear : bool
+        Whether the deformation is an amount of shear.
 
     Raises
     ------
@@ -92,15 +97,17 @@ def choose_columns(table: Table, mapping: Mapping[str, str | int] | None, stress
         When a role or column does not exist, several columns fit, or none does.
     """
     mapping = dict(mapping or {})
-    _check_roles(table, mapping)
+    _check_roles(table, mapping, is_shear)
     if "stress" in mapping:
         stress = _find(table, "stress", mapping["stress"])
     else:
         stress = _recognise(table, "stress", STRESS_NAMES[stress_type], _stress_hint(table, stress_type))
-    role = next((role for role in ("stretch", "strain") if role in mapping), None)
+    role = next((role for role in ("stretch", "strain", "shear") if role in mapping), None)
     if role:
         deformation = _find(table, role, mapping[role])
         is_strain = role == "strain"
+    elif is_shear:
+        deformation, is_strain = _recognise(table, "shear", SHEAR_NAMES), False
     else:
         deformation = _recognise(table, "stretch", STRETCH_NAMES | STRAIN_NAMES)
         is_strain = heading(table.names[deformation]).quantity in STRAIN_NAMES
@@ -117,7 +124,7 @@ def _plain(name: str) -> str:
     return re.sub(r"[\s_-]+", " ", name).strip().lower()
 
 
-def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
+def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:
     unknown = [role for role in mapping if role not in ROLES]
     if unknown:
         raise InputError(
@@ -126,6 +133,12 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
         )
     if "stretch" in mapping and "strain" in mapping:
         raise InputError(f"{table.file}: columns are given for both stretch and strain; give only one of them.")
+    other = {"stretch", "strain"} if is_shear else {"shear"}
+    if other & set(mapping):
+        deformation = "an amount of shear" if is_shear else "a stretch or strain"
+        raise InputError(
+            f"{table.file}: a column is given as {min(other & set(mapping))}, but this loading mode has {deformation}."
+        )
 
 
 def _find(table: Table, role: str, wanted: str | int) -> int:

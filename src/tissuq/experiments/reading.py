@@ -14,7 +14,8 @@ from tissuq.experiments import units
 from tissuq.experiments.columns import ColumnChoice, choose_columns, declared_unit
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.plausibility import check_signs, check_strain, check_stretch
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.plausibility import check_shear_signs, check_signs, check_strain, check_stretch
 from tissuq.experiments.table import Table, read_table
 
 __all__ = ["STRESS_TYPES", "read_experiment"]
@@ -48,12 +49,13 @@ def read_experiment(
     mode : str or LoadingMode
         How the specimen was loaded.
     columns : mapping, optional
-        From ``stretch`` or ``strain``, and ``stress``, to the name of a column or its number from 1.
-        Columns named stretch, lambda, strain or stress (with a unit or not) need none.
+        From ``stretch``, ``strain`` or ``shear`` (the amount of shear), and ``stress``, to the name of a column or
+        its number from 1. Columns named stretch, lambda, strain, shear, gamma or stress (with a unit or not) need none.
     stress_unit : str, optional
         Unit of the stresses; without it the file's own, and MPa when the file states none.
     stress_type : str
-        ``engineering`` (force over undeformed area) or ``cauchy``, which is divided by the stretch.
+        ``engineering`` (force over undeformed area) or ``cauchy``, which is divided by the stretch; a shear
+        stress is the same in both.
     strain_unit : str, optional
         ``%`` or ``1``, for a column of strains; without it the file's own, and 1 when it states none.
     compression_positive : bool
@@ -84,16 +86,24 @@ def read_experiment(
     mode = loading_mode(mode)
     if stress_type not in STRESS_TYPES:
         raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
+    if len(mode.channels) > 1 or len(mode.controls) > 1:
+        raise InputError(
+            f"a file is read in loading modes with one stress, and '{mode.name}' has {', '.join(mode.stresses)}: give "
+            "its values to Experiment."
+        )
+    is_shear = mode.controls == (SHEAR,)
     table = read_table(path, skip_rows)
-    choice = choose_columns(table, columns, stress_type)
+    choice = choose_columns(table, columns, stress_type, is_shear)
     deformation, stress = table.numbers([choice.deformation, choice.stress])
-    stretch, stretch_source = _stretch(table, choice, deformation, stress, strain_unit)
+    stretch, stretch_source = _stretch(table, choice, deformation, stress, strain_unit, is_shear)
     unit, unit_source = _stress_unit(table, choice, stress_unit)
     stress = stress * unit.to_mpa
     stress_source = f"{stress_type} stress from column {table.label(choice.stress)} in {unit_source}"
-    if stress_type == "cauchy":
-        stress = stress / stretch
+    if stress_type == "cauchy" and not is_shear:
+        stress = stress / mode.cauchy_ratio(stretch)
         stress_source += ", divided by stretch to engineering stress"
+    if compression_positive and is_shear:
+        raise InputError("compression_positive=True (--compression-positive) has no meaning for a shear stress.")
     if compression_positive and (stretch >= 1).all():
         raise InputError(
             f"{table.place(choice.deformation)}: compression_positive=True (--compression-positive) is given, but no "
@@ -103,7 +113,10 @@ def read_experiment(
     if compression_positive:
         stress = np.where(stretch < 1, -stress, stress)
         stress_source += ", sign changed at stretch < 1"
-    check_signs(table, choice, stretch, stress, compression_positive)
+    if is_shear:
+        check_shear_signs(table, choice, stretch, stress)
+    else:
+        check_signs(table, choice, stretch, stress, compression_positive)
     rows = f"{len(stretch)} rows (lines {table.lines[0]} to {table.lines[-1]})"
     return Experiment(
         mode=mode,
@@ -116,9 +129,9 @@ def read_experiment(
 
 
 def _stretch(
-    table: Table, choice: ColumnChoice, values: Column, stress: Column, strain_unit: str | None
+    table: Table, choice: ColumnChoice, values: Column, stress: Column, strain_unit: str | None, is_shear: bool
 ) -> tuple[Column, str]:
-    """Return the stretches and how they were obtained."""
+    """Return the stretches, or amounts of shear, and how they were obtained."""
     if strain_unit is not None and not choice.is_strain:
         raise InputError(
             f"{table.place(choice.deformation)} is read as stretch, but strain_unit='{strain_unit}' is "
@@ -130,6 +143,8 @@ def _stretch(
     factor = _strain_factor(table, choice, declared, strain_unit)
     label = table.label(choice.deformation)
     scaled = "" if factor == 1 else f" x {factor:g}"
+    if is_shear:
+        return values * factor, f"amount of shear = column {label}{scaled}"
     if choice.is_strain:
         check_strain(table, choice, values * factor, stress, has_unit=bool(declared or strain_unit))
         stretch, source = 1 + values * factor, f"stretch = 1 + column {label}{scaled}"

@@ -22,9 +22,7 @@ AGREEMENT = 1e-6
 """Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""
 
 
-def complex_step_stress(
-    material: Material, mode: Path, stretch: FloatArray, values: FloatArray
-) -> FloatArray | None:
+def complex_step_stress(material: Material, mode: Path, stretch: FloatArray, values: FloatArray) -> FloatArray | None:
     """Return engineering stresses (m, n) at stretches (n,) for parameter values (m, k), or None.
 
     None where there are many, or where the energy is not analytic arithmetic of NumPy arrays: written with jax.numpy,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.experiment import checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import stress_moments
@@ -80,12 +81,10 @@ def predict_average(
 
     All else is as for `predict_band`.
     """
-    points = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
-    if points.ndim != 1 or not (np.isfinite(points) & (points > 0)).all():
-        raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
+    asked = loading_mode(mode) if mode is not None else parts[0][1].model.experiment.mode
+    points = checked_points(asked, np.atleast_1d(stretch))
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    asked = loading_mode(mode) if mode is not None else parts[0][1].model.experiment.mode
     for _, solution in parts if discrepancy else ():
         _check_mode(solution, asked)
     count = FEW if len(points) > BLOCK else MANY
