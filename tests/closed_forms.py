@@ -9,17 +9,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import special_ortho_group
 
-from tissuq.experiments.modes import loading_modes
+from loading import LARGEST
 from tissuq.mechanics import material_named
 from tissuq.mechanics.material import materials
 
 RELATIVE = 1e-10
+TURN = special_ortho_group.rvs(3, random_state=7)
 OTHER_NAMES = "rivlin:C10,C01,C11,C22", "ogden-5", "gent+mooney-rivlin", "demiray+veronda-westmann", "ogden-1+hencky"
 EVERY = [kind() for kind in materials().values()] + [material_named(name) for name in OTHER_NAMES]
-MODES = [kind() for kind in loading_modes().values()]
-STRETCH = np.concatenate([np.linspace(0.5, 0.95, 7), np.linspace(1.05, 3.0, 11)])
-LARGEST = 15.02
-"""Of I1 - 3, at a stretch of 0.5 or 3 in any of the modes."""
 
 
 def values_of(material, seed=0, largest=LARGEST):
@@ -112,11 +109,10 @@ def of_stretches(name, stretch, values):
     return OF_STRETCHES[name](stretch, *values) if name in OF_STRETCHES else 0.0 * stretch
 
 
-def tensor_stress(name, values, mode, stretch):
-    """Return the engineering stress at one stretch from F and the Cauchy stress, in axes that are turned at random."""
-    turn = special_ortho_group.rvs(3, random_state=7)
-    F = turn @ np.diag(mode.principal_stretches(stretch)) @ turn.T
-    loaded, free = turn[:, 0], turn[:, 2]
+def tensor_stress(name, values, F, turn=TURN):
+    """Return the nominal stress (3, 3) from F and the Cauchy stress, computed in axes that are turned."""
+    F = turn @ F @ turn.T
+    free = turn[:, 2]
     B, C = F @ F.T, F.T @ F
     I1, I2 = np.trace(C), (np.trace(C) ** 2 - np.trace(C @ C)) / 2
     squares, axes = np.linalg.eigh(B)
@@ -130,4 +126,4 @@ def tensor_stress(name, values, mode, stretch):
         cauchy += 2 * W1 * B - 2 * W2 * np.linalg.inv(B)
         cauchy += (axes * of_stretches(part, np.sqrt(squares), own)) @ axes.T
     cauchy -= (free @ cauchy @ free) * np.eye(3)
-    return loaded @ cauchy @ np.linalg.inv(F).T @ loaded
+    return turn.T @ cauchy @ np.linalg.inv(F).T @ turn

@@ -19,6 +19,12 @@ def model(discrepancy="quadratic", material=None, noise_sd=0.1, **options):
     return StatisticalModel(DATA, material or NeoHookean(), discrepancy_named(discrepancy), noise_sd, **options)
 
 
+def test_an_experiment_with_several_stresses_is_refused_in_words():
+    data = tq.simulate("neo-hookean", {"C10": 1.0}, [[1.1, 1.0], [1.2, 1.1], [1.3, 1.0]], mode="biaxial")
+    with pytest.raises(tq.ModelError, match=r"stress of axis 1 and .* of axis 2 \(biaxial\): a fit takes one stress"):
+        StatisticalModel(data, NeoHookean(), discrepancy_named("none"))
+
+
 def test_linear_and_nonlinear_parameters_are_told_apart_without_names():
     assert model().linear == ("C10", "m0", "m1", "m2")
     assert model().nonlinear == ("S",)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tissuq import Experiment, InputError, Tolerances
+from tissuq.experiments.modes import Uniaxial
 from tissuq.mechanics.joint import joined
 from tissuq.whitening import whitening
 
@@ -75,7 +76,7 @@ def test_one_specimen_has_all_its_error_of_stress_in_common():
 
 
 def test_the_variance_of_a_new_test_is_that_of_its_errors():
-    found = Tolerances(stress=0.1, length=0.02, slack=0.03, zero=0.5).variance(np.array([1.5]), 2.0, 4.0)
+    found = Tolerances(stress=0.1, length=0.02, slack=0.03, zero=0.5).variance(Uniaxial(), np.array([1.5]), 2.0, 4.0)
     assert found == pytest.approx(0.2**2 + 0.5**2 + (0.02 * 0.5 * 4) ** 2 + (0.03 * 1.5 * 4) ** 2)
 
 

@@ -78,6 +78,7 @@ class StatisticalModel:
     known_statistics: Statistics | None = None
 
     def __post_init__(self) -> None:
+        self._check_mode()
         object.__setattr__(self, "noise", noise_named(self.noise))
         object.__setattr__(self, "discrepancy", separated(self.discrepancy, self.material, self.experiment))
         self._check_parameters()
@@ -366,6 +367,14 @@ class StatisticalModel:
             low, high = parameter.support
             boxes[parameter.symbol] = Uniform(max(low, -reach), min(high, reach))
         return boxes
+
+    def _check_mode(self) -> None:
+        mode = self.experiment.mode
+        if len(mode.channels) > 1:
+            raise ModelError(
+                f"experiment '{self.experiment.name}' measures {' and '.join(mode.stresses)} ({mode.name}): a fit "
+                "takes one stress of one control."
+            )
 
     def _check_parameters(self) -> None:
         shared = [p.symbol for p in self.discrepancy.parameters if p.symbol in self.material_symbols]

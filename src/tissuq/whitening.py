@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
 from tissuq.smoothing import smoothed
 
 __all__ = ["BETWEEN_SPECIMENS", "Tolerances", "Whitening", "specimens_of", "whitening"]
@@ -67,9 +68,12 @@ class Tolerances:
         """Whether any of them moves the curve along the stretch."""
         return bool(self.length or self.slack)
 
-    def variance(self, stretch: FloatArray, stress: FloatArray, slope: FloatArray | float) -> FloatArray:
+    def variance(
+        self, mode: LoadingMode, stretch: FloatArray, stress: FloatArray, slope: FloatArray | float
+    ) -> FloatArray:
         """Return the variance (..., n) of the stress of a test at stretches (n,), where it would be ``stress``."""
-        moved = (self.length * (stretch - 1) * slope) ** 2 + (self.slack * stretch * slope) ** 2
+        strain, whole = _strains(mode, stretch)
+        moved = (self.length * strain * slope) ** 2 + (self.slack * whole * slope) ** 2
         return np.asarray((self.stress * stress) ** 2 + self.zero**2 + moved)
 
     def columns(self, test: Experiment, curve: FloatArray) -> FloatArray:
@@ -96,8 +100,15 @@ class Tolerances:
                 "tests with one of each."
             )
         slope = smoothed(test.stretch, curve).slope
-        moved = self.length * (test.stretch - 1) * slope, self.slack * test.stretch * slope
+        strain, whole = _strains(test.mode, test.stretch)
+        moved = self.length * strain * slope, self.slack * whole * slope
         return np.column_stack([self.stress * curve, *moved, np.full(len(curve), self.zero)])
+
+
+def _strains(mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return by what relative errors of the gauge length, and of the stretch free of stress, change the stretch."""
+    strain = stretch - mode.reference
+    return strain, stretch if mode.reference else np.ones_like(stretch)
 
 
 BETWEEN_SPECIMENS = Tolerances(stress=0.2)

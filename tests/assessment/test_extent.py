@@ -99,6 +99,17 @@ def test_the_design_is_judged(stretch, words):
     assert all(word in text and "measure" in text for word, text in zip(words, found, strict=True))
 
 
+def test_the_design_of_a_shear_test_is_judged_by_its_amounts_of_shear():
+    near, far = (
+        tq.simulate("neo-hookean", {"C10": 1.0}, np.linspace(*ends, 20), mode="simple-shear")
+        for ends in ((0.02, 0.4), (0.2, 0.4))
+    )
+    assert list(design_warnings(near)) == []
+    (found,) = design_warnings(far)
+    assert "the nearest amount of shear is 0.2" in found
+    assert "of amount of shear 0." in found
+
+
 def test_a_parameter_that_is_not_linear_is_assessed_too(data):
     posterior = tq.fit(data, discrepancy="yeoh", noise_sd=0.02, priors={"C10": tq.LogNormal(1.0, 1.0)})
     assert posterior.assess().between == 0

@@ -101,6 +101,16 @@ def test_a_discrepancy_that_is_no_energy_has_no_part():
     assert {found.probability for found in posterior.stable_ranges.values()} == {1.0}
 
 
+def test_a_shear_test_tells_stability_in_shear_and_in_the_modes_of_one_stretch():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, np.linspace(-0.5, 0.8, 20), 1e-6, mode="simple-shear")
+    assert calibrated_range(data, data.mode) == (-0.5, 0.8)
+    posterior = tq.fit(data, discrepancy="none", noise_sd=1e-6)
+    assert posterior.stability()["stable"].min() == 1.0
+    assert set(posterior.assess().stable) == {"uniaxial", "equibiaxial", "planar"}
+    low, high = calibrated_range(tq.simulate("neo-hookean", {"C10": 1.0}, STRETCH), data.mode)
+    assert -low == pytest.approx(high)
+
+
 def test_an_energy_discrepancy_takes_part_and_its_share_is_that_of_its_draws():
     data = tq.simulate("neo-hookean", {"C10": 0.5}, np.linspace(0.8, 1.3, 12), noise_sd=0.05, seed=3)
     posterior = tq.fit(data, discrepancy="auto", noise_sd=0.05)

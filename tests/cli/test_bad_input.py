@@ -148,13 +148,6 @@ def test_an_error_is_one_line_on_standard_error(cli, arguments):
     assert said.err.count("\n") == 1
 
 
-def test_a_built_in_test_that_cannot_be_fitted_says_so(cli, here):
-    said = cli("fit", "brain-cortex-shear", "--discrepancy", "none")
-    assert said.status == 2
-    assert "cannot be fitted yet" in said.err
-    assert not list(here.iterdir())
-
-
 def test_a_column_called_stretch_is_not_taken_for_a_strain(cli, here):
     (here / "a.csv").write_text("stretch,stress\n0.8,-1\n1.2,1\n1.3,1.4\n", encoding="utf-8")
     said = cli("fit", "a.csv", "--column", "strain=stretch")

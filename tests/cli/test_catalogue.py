@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from tissuq import datasets, discrepancies, materials
+from tissuq import datasets, discrepancies, loading_modes, materials
 from tissuq.mechanics.named import FORMS
 
 
@@ -29,6 +29,14 @@ def test_the_page_of_materials_is_up_to_date(cli):
 
 def test_no_line_of_the_list_of_materials_is_too_long_to_read(cli):
     assert max(map(len, cli("materials").out.splitlines())) <= 130
+
+
+def test_the_loading_modes_are_listed_with_what_they_set_and_measure(cli):
+    said = cli("modes")
+    assert said.status == 0
+    for kind in loading_modes().values():
+        assert f"{kind.name}\n    {kind.description}\n    sets {kind.controls[0].name}" in said.out
+        assert all(stress in said.out for stress in kind.stresses)
 
 
 def test_the_data_sets_are_listed_with_their_citations(cli):

@@ -5,60 +5,61 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from loading import MEASURED
 from tissuq.discrepancy.blocks import EnergyBlock
-from tissuq.experiments.modes import loading_mode, loading_modes
+from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics import MooneyRivlin, stress_basis
 from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 from tissuq.registry import variants
 
 BLOCKS = variants(EnergyBlock)
-MODES = sorted(loading_modes())
 STRETCH = np.linspace(0.6, 2.5, 40)
+EVERY_STRESS = pytest.mark.parametrize("measured", MEASURED, ids=str)
 
 
 def of(name):
     return BLOCKS[name]()
 
 
-def settings(block, mode):
-    reach = block.reach(mode, STRETCH)
+def settings(block, path, points=STRETCH):
+    reach = block.reach(path, points)
     return [(reach, length) for length in block.lengths]
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_rates_are_the_stresses_of_the_invariants(mode):
-    mode = loading_mode(mode)
-    basis = stress_basis(MooneyRivlin(), mode, STRETCH)
-    assert np.allclose(np.column_stack(invariant_rates(mode, STRETCH)), basis, rtol=1e-12, atol=1e-12)
-    one, three = mode.principal_stretches(STRETCH)[0], np.stack(np.broadcast_arrays(*mode.principal_stretches(STRETCH)))
-    assert np.allclose(invariants(mode, STRETCH)[0], (three**2).sum(axis=0) - 3, atol=1e-12)
-    assert np.allclose(invariants(mode, STRETCH)[1], (three**-2.0).sum(axis=0) - 3, atol=1e-12)
-    assert np.allclose(log_stretches(mode, STRETCH)[0][:, 0], np.log(one), atol=1e-14)
+@EVERY_STRESS
+def test_rates_are_the_stresses_of_the_invariants(measured):
+    path, points = measured.path, measured.points
+    basis = stress_basis(MooneyRivlin(), path, points)
+    assert np.allclose(np.column_stack(invariant_rates(path, points)), basis, rtol=1e-12, atol=1e-12)
+    C = np.array([measured.gradient(point).T @ measured.gradient(point) for point in points])
+    assert np.allclose(invariants(path, points)[0], np.trace(C, axis1=1, axis2=2) - 3, atol=1e-12)
+    assert np.allclose(invariants(path, points)[1], np.trace(np.linalg.inv(C), axis1=1, axis2=2) - 3, atol=1e-12)
+    assert np.allclose(np.sort(2 * log_stretches(path, points)[0]), np.log(np.linalg.eigvalsh(C)), atol=1e-12)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@EVERY_STRESS
 @pytest.mark.parametrize("name", BLOCKS)
-def test_stress_and_modulus_vanish_at_the_reference_for_random_draws(name, mode):
-    block, mode = of(name), loading_mode(mode)
+def test_stress_and_modulus_vanish_at_the_reference_for_random_draws(name, measured):
+    block, path = of(name), measured.path
     step = 1e-3
-    near = np.array([1 - step, 1.0, 1 + step])
-    for reach, length in settings(block, mode):
-        features = block.stress_features(mode, near, reach, length)
+    near = measured.mode.excursion([-step, 0.0, step])
+    for reach, length in settings(block, path, measured.points):
+        features = block.stress_features(path, near, reach, length)
         u = np.random.default_rng(0).standard_normal((features.shape[1], 20))
         stress = features @ u
-        size = np.abs(block.stress_features(mode, STRETCH, reach, length) @ u).max(axis=0)
+        size = np.abs(block.stress_features(path, measured.points, reach, length) @ u).max(axis=0)
         assert np.abs(stress[1]).max() < 1e-12 * size.max() + 1e-14
         slope = (stress[2] - stress[0]) / (2 * step)
         assert (np.abs(slope) < 1e-2 * size + 1e-9).all()  # two blocks have no stress in some modes
 
 
-@pytest.mark.parametrize("mode", MODES)
+@EVERY_STRESS
 @pytest.mark.parametrize("name", BLOCKS)
-def test_features_make_up_the_variance_within_the_reach(name, mode):
-    block, mode = of(name), loading_mode(mode)
-    for reach, length in settings(block, mode):
-        features = block.stress_features(mode, STRETCH, reach, length)
-        variance = block.stress_variance(mode, STRETCH, reach, length)
+def test_features_make_up_the_variance_within_the_reach(name, measured):
+    block, path, points = of(name), measured.path, measured.points
+    for reach, length in settings(block, path, points):
+        features = block.stress_features(path, points, reach, length)
+        variance = block.stress_variance(path, points, reach, length)
         tolerance = 1e-8 if name != "spline" else 1e-5
         assert np.allclose((features**2).sum(axis=1), variance, atol=tolerance * variance.max())
 

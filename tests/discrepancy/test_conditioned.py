@@ -75,6 +75,12 @@ def test_a_pinned_process_has_no_stress_and_no_stiffness_at_the_reference(psi):
     np.testing.assert_allclose(slope, 0, atol=10 * step**2 / psi**3)
 
 
+def test_a_process_of_a_shear_stress_is_pinned_where_there_is_no_shear():
+    stretch, psi = np.linspace(-0.4, 0.6, 11), 0.3
+    found = adapted("gp-pinned", mode="simple-shear", stretch=stretch).correlation(stretch, stretch, {"psi": psi})
+    np.testing.assert_allclose(found, oracle.pinned(1 + stretch, psi), atol=1e-12)
+
+
 @pytest.mark.parametrize("psi", LENGTHS)
 @pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "planar"])
 @pytest.mark.parametrize("material", [NeoHookean(), Yeoh()], ids=lambda material: material.name)

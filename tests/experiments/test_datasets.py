@@ -4,7 +4,7 @@ import sys
 import numpy as np
 import pytest
 
-from tissuq.errors import InputError, ModelError
+from tissuq.errors import InputError
 from tissuq.experiments import datasets
 
 
@@ -45,12 +45,13 @@ def test_a_table_has_the_columns_of_the_file():
     assert brain["test"].value_counts().to_dict() == {"tension": 17, "compression": 17}
 
 
-def test_simple_shear_is_refused_for_fitting_but_its_values_are_there():
-    with pytest.raises(ModelError, match=r"simple shear, which cannot be fitted yet.*table\('brain-cortex-shear'\)"):
-        datasets.load("brain-cortex-shear")
-    shear = datasets.table("brain-cortex-shear")
-    assert shear.shape == (17, 2)
-    assert shear.iloc[-1].to_dict() == {"shear": 0.2, "stress_kPa": 0.5435}
+def test_brain_tissue_in_simple_shear_is_loaded_in_mpa():
+    shear = datasets.load("brain-cortex-shear")
+    assert (shear.mode.name, shear.stress_unit, len(shear)) == ("simple-shear", "kPa", 17)
+    assert (shear.stretch[0], shear.stretch[-1]) == (0.0, 0.2)
+    assert shear.stress[-1] == pytest.approx(0.5435e-3)
+    assert "amount of shear = column 'shear'" in shear.source
+    assert datasets.table("brain-cortex-shear").iloc[-1].to_dict() == {"shear": 0.2, "stress_kPa": 0.5435}
 
 
 @pytest.mark.parametrize("function", [datasets.load, datasets.table, datasets.path])

@@ -63,3 +63,34 @@ def test_a_copy_with_another_name_keeps_the_values():
 def test_values_that_are_no_measurement_are_refused_with_their_position(stretch, stress, words):
     with pytest.raises(InputError, match=words):
         Experiment("uniaxial", stretch, stress)
+
+
+def test_several_controls_and_stresses_are_columns():
+    data = Experiment("biaxial", [[1.1, 1.0], [1.2, 0.9]], [[0.2, 0.1], [0.4, 0.0]])
+    assert (data.stretch.shape, data.stress.shape, len(data)) == ((2, 2), (2, 2), 2)
+    assert len(data.joined(data)) == 4
+    held = Experiment("constrained-uniaxial", [1.1, 1.2, 1.3], [[0.2, 0.1], [0.4, 0.2], [0.5, 0.3]])
+    assert (held.stretch.shape, held.stress.shape) == ((3,), (3, 2))
+
+
+def test_an_amount_of_shear_has_either_sign():
+    data = Experiment("simple-shear", [-0.2, 0.0, 0.2], [-0.1, 0.0, 0.1])
+    assert data.stretch.tolist() == [-0.2, 0.0, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("mode", "stretch", "stress", "words"),
+    [
+        ("biaxial", [1.1, 1.2], [[0.1, 0.2]], r"2 columns \(stretch of axis 1, stretch of axis 2\).*of shape \(2,\)"),
+        ("biaxial", [[1.1, 1.2]], [0.1], r"stress must be an array with 2 columns.*of shape \(1,\)"),
+        ("biaxial", [[1.1, -1.2]], [[0.1, 0.1]], "stretch of axis 2 -1.2 at position 0 is not positive"),
+        ("thin-tube", [[1.1, 1.2]], [[0.1, np.nan]], "axial engineering stress is nan at position 0"),
+        ("thin-tube", np.ones((2, 3)), np.ones((2, 2)), r"2 columns \(hoop stretch, axial stretch\)"),
+        ("constrained-uniaxial", [1.1, 1.2], [0.1, 0.2], "stress must be an array with 2 columns"),
+        ("biaxial", [[1.1, 1.2]], [[0.1, 0.1], [0.1, 0.1]], "1 stretches but 2 stresses"),
+        ("simple-shear", [0.1, np.nan], [0.1, 0.1], "amount of shear is nan at position 1"),
+    ],
+)
+def test_what_a_mode_does_not_measure_is_refused_in_its_words(mode, stretch, stress, words):
+    with pytest.raises(InputError, match=words):
+        Experiment(mode, stretch, stress)

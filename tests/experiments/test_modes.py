@@ -3,8 +3,9 @@ import gc
 import numpy as np
 import pytest
 
+from loading import MEASURED, PAIRS, SHEAR
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
+from tissuq.experiments.modes import LoadingMode, SimpleShear, ThinTube, loading_mode, loading_modes
 
 
 @pytest.fixture(params=list(loading_modes()))
@@ -12,22 +13,85 @@ def mode(request):
     return loading_mode(request.param)
 
 
-def test_the_modes_are_uniaxial_equibiaxial_and_planar():
-    assert {"uniaxial", "equibiaxial", "planar"} <= set(loading_modes())
+EVERY_STRESS = pytest.mark.parametrize("measured", MEASURED, ids=str)
 
 
-def test_every_mode_is_undeformed_at_stretch_one(mode):
-    assert mode.principal_stretches(1.0) == (1.0, 1.0, 1.0)
+def test_the_modes_are_those_of_the_documentation():
+    assert list(loading_modes()) == [
+        "uniaxial", "equibiaxial", "planar", "biaxial", "constrained-uniaxial", "simple-shear", "simple-shear-normal",
+        "thin-tube",
+    ]  # fmt: skip
 
 
-@pytest.mark.parametrize("stretch", [0.3, 0.9, 1.1, 4.0])
-def test_every_mode_keeps_the_volume(mode, stretch):
-    assert np.prod(mode.principal_stretches(stretch)) == pytest.approx(1.0, rel=1e-14)
+def test_every_mode_is_undeformed_at_its_reference(mode):
+    assert mode.principal_stretches(mode.reference) == (1.0, 1.0, 1.0)
+    assert mode.reference.shape == (() if len(mode.controls) == 1 else (len(mode.controls),))
 
 
-@pytest.mark.parametrize("stretch", [0.3, 0.9, 1.1, 4.0])
-def test_every_mode_has_its_stretch_along_the_loaded_axes(mode, stretch):
-    assert mode.principal_stretches(stretch)[: mode.loaded_axes] == (stretch,) * mode.loaded_axes
+def test_every_mode_has_a_path_for_each_stress_at_its_own_states(mode):
+    assert len(mode.channels) == len(mode.stresses)
+    points = mode.excursion([-0.3, 0.2, 0.6])
+    for path in mode.channels:
+        np.testing.assert_array_equal(path.abscissa(points).shape, (3,))
+        states = path.moved(points, 0.0).stretches, mode.principal_stretches(points)
+        found, own = (np.sort(np.broadcast_arrays(*state), axis=0) for state in states)
+        np.testing.assert_allclose(found, own, rtol=1e-14)
+
+
+@EVERY_STRESS
+def test_the_deformation_is_that_of_the_textbook(measured):
+    for point in measured.points:
+        F = measured.gradient(point)
+        found, C = measured.path.moved(point, 0.0), F.T @ F
+        np.testing.assert_allclose(np.linalg.det(F), 1.0, rtol=1e-14)
+        np.testing.assert_allclose(sorted(found.stretches), sorted(np.linalg.svd(F)[1]), rtol=1e-13)
+        np.testing.assert_allclose(found.stretches[2], F[2, 2], rtol=1e-14)
+        np.testing.assert_allclose(found.plane, (C[0, 0], C[1, 1], C[0, 1]), rtol=1e-14, atol=1e-16)
+
+
+@EVERY_STRESS
+def test_a_step_moves_what_the_stress_works_on(measured):
+    row, column = measured.component
+    point, step = measured.points[2], 1e-3
+    F = measured.gradient(point)
+    F[row, column] += step
+    if measured.mode.name in ("uniaxial", "equibiaxial"):
+        F = measured.gradient(point + step)
+    F[2, 2] = 1 / np.linalg.det(F[:2, :2])
+    found, C = measured.path.moved(point, step), F.T @ F
+    np.testing.assert_allclose(sorted(found.stretches), sorted(np.linalg.svd(F)[1]), rtol=1e-13)
+    np.testing.assert_allclose(found.plane, (C[0, 0], C[1, 1], C[0, 1]), rtol=1e-14, atol=1e-16)
+
+
+@EVERY_STRESS
+def test_the_cauchy_ratio_is_that_of_the_tensors(measured):
+    # Cauchy stress = P F', with no other component of P in the row of a measured one.
+    row, column = measured.component
+    expected = [measured.gradient(point)[column, column] for point in measured.points]
+    assert measured.gradient(measured.points[0])[column, row] == 0.0 or row == column
+    np.testing.assert_allclose(measured.path.cauchy_ratio(measured.points), expected, rtol=1e-15)
+
+
+def test_shear_of_either_sign_is_a_mirror_image():
+    there, back = (SimpleShear().principal_stretches(sign * SHEAR) for sign in (1, -1))
+    np.testing.assert_allclose(there[0], back[1], rtol=1e-15)
+    np.testing.assert_allclose(there[0] - there[1], SHEAR, rtol=1e-12)
+
+
+def test_the_stresses_of_a_tube_are_in_equilibrium_with_pressure_and_force():
+    # Laplace: hoop Cauchy stress = p r/h; a cut across: axial Cauchy stress 2 pi r h = force + p pi r^2.
+    radius, thickness, pressure, force = 4.0, 0.25, 0.016, np.linspace(-0.1, 0.5, len(PAIRS))
+    hoop, axial = PAIRS.T
+    r, h = radius * hoop, thickness / (hoop * axial)
+    expected = pressure * r / h, (force + pressure * np.pi * r**2) / (2 * np.pi * r * h)
+    stress = ThinTube.engineering_stresses(PAIRS, pressure, force, radius, thickness)
+    for path, own, cauchy in zip(ThinTube().channels, stress.T, expected, strict=True):
+        np.testing.assert_allclose(own * path.cauchy_ratio(PAIRS), cauchy, rtol=1e-14)
+
+
+def test_a_mode_with_several_stresses_has_no_single_path():
+    with pytest.raises(ModelError, match=r"'biaxial' measures engineering stress of axis 1 and .* one of its channels"):
+        loading_mode("biaxial").moved(PAIRS, 0.0)
 
 
 def test_every_mode_says_what_it_is(mode):

@@ -441,3 +441,42 @@ def test_a_million_rows_are_read_in_seconds(tmp_path):
     data = read_experiment(path)
     assert len(data) == 1_000_000
     assert perf_counter() - start < 15
+
+
+def shear_file(folder, header="gamma,shear stress [kPa]", rows=((-0.1, -1.5), (0.0, 0.0), (0.2, 3.0))):
+    (folder / "shear.csv").write_text("\n".join([header, *(f"{a},{b}" for a, b in rows)]) + "\n", encoding="utf-8")
+    return folder / "shear.csv"
+
+
+@pytest.mark.parametrize("header", ["gamma,shear stress [kPa]", "amount of shear,stress_kPa", "Shear [-],Stress [kPa]"])
+@pytest.mark.parametrize("stress_type", ["engineering", "cauchy"])
+def test_an_amount_of_shear_and_its_stress_are_read(tmp_path, header, stress_type):
+    data = read_experiment(shear_file(tmp_path, header), mode="simple-shear", stress_type=stress_type)
+    np.testing.assert_allclose(data.stretch, [-0.1, 0.0, 0.2])
+    np.testing.assert_allclose(data.stress, [-1.5e-3, 0.0, 3e-3])  # the Cauchy shear stress is the nominal one
+
+
+def test_a_column_is_given_as_shear_by_name(tmp_path):
+    data = read_experiment(shear_file(tmp_path, "k,stress"), mode="simple-shear", columns={"shear": "k"})
+    assert data.stretch.tolist() == [-0.1, 0.0, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"mode": "uniaxial"}, "no column is recognised as stretch, strain"),
+        ({"mode": "uniaxial", "columns": {"shear": "gamma"}}, "given as shear, but this loading mode has a stretch"),
+        ({"mode": "simple-shear", "columns": {"strain": "gamma"}}, "given as strain, but .* has an amount of shear"),
+        ({"mode": "simple-shear", "compression_positive": True}, "no meaning for a shear stress"),
+        ({"mode": "biaxial"}, "modes with one stress, and 'biaxial' has .* axis 2: give its values to Experiment"),
+    ],
+)
+def test_what_does_not_go_with_a_mode_is_refused(tmp_path, options, words):
+    with pytest.raises(InputError, match=words):
+        read_experiment(shear_file(tmp_path), **options)
+
+
+def test_a_shear_stress_against_the_shear_is_refused(tmp_path):
+    file = shear_file(tmp_path, rows=((-0.1, 1.5), (0.0, 0.0), (0.2, -3.0)))
+    with pytest.raises(InputError, match=r"at an amount of shear of 0\.2 the shear stress is -0\.003 MPa"):
+        read_experiment(file, mode="simple-shear")

@@ -1,12 +1,17 @@
+"""Excel workbooks of testing machines."""
+
+from __future__ import annotations
+
 import sys
 
 import numpy as np
-import openpyxl
 import pytest
 
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading import read_experiment, read_file
+
+openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
 
 
 def specimen_sheet(sheet, length=20.0):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial, loading_modes
+from loading import MEASURED
+from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3, StretchMaterial, stress_basis, traced_stress_basis
 from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.stress import differentiator
@@ -15,7 +16,7 @@ jax = differentiator()
 
 STRETCH = np.linspace(0.6, 2.0, 15)
 MANY = np.linspace(0.6, 2.0, 20_000)
-EVERY_MODE = pytest.mark.parametrize("mode", [kind() for kind in loading_modes().values()], ids=str)
+EVERY_STRESS = pytest.mark.parametrize("measured", MEASURED, ids=str)
 
 
 def test_several_settings_give_several_bases():
@@ -31,12 +32,12 @@ def test_a_material_without_nonlinear_parameters_needs_no_setting():
     assert stress_basis(NeoHookean(), Planar(), STRETCH, np.empty((4, 0))).shape == (4, 15, 1)
 
 
-@EVERY_MODE
-def test_the_derivative_in_the_exponents_is_the_finite_difference(mode):
+@EVERY_STRESS
+def test_the_derivative_in_the_exponents_is_the_finite_difference(measured):
     alpha, step = np.array([1.3, 5.0, -2.0]), 1e-5
-    found = jax.jacobian(lambda h: traced_stress_basis(Ogden3(), mode, STRETCH, h))(alpha)
+    found = jax.jacobian(lambda h: traced_stress_basis(Ogden3(), measured.path, measured.points, h))(alpha)
     moved = alpha + step * np.stack([np.eye(3), -np.eye(3)])
-    above, below = (stress_basis(Ogden3(), mode, STRETCH, settings) for settings in moved)
+    above, below = (stress_basis(Ogden3(), measured.path, measured.points, settings) for settings in moved)
     expected = np.moveaxis((above - below) / (2 * step), 0, -1)
     np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-8)
 
@@ -69,11 +70,13 @@ def test_new_values_compile_nothing_new():
 
 
 @pytest.mark.parametrize(("material", "nonlinear"), [(NeoHookean(), []), (Ogden1(), [3.3])])
-@EVERY_MODE
-def test_few_points_and_many_give_the_same_stress(material, nonlinear, mode):
+@EVERY_STRESS
+def test_few_points_and_many_give_the_same_stress(material, nonlinear, measured):
     # Few are differentiated by an imaginary step, many by JAX.
-    few, many = (stress_basis(material, mode, points, nonlinear) for points in (MANY[::500], MANY))
-    np.testing.assert_allclose(few, many[::500], rtol=1e-12, atol=1e-12)
+    points = measured.points
+    repeated = np.concatenate([points] * (1 + MANY.size // len(points)))
+    few, many = (stress_basis(material, measured.path, each, nonlinear) for each in (points, repeated))
+    np.testing.assert_allclose(few, many[: len(points)], rtol=1e-12, atol=1e-12)
 
 
 def test_what_an_imaginary_step_cannot_differentiate_is_left_to_jax():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
+from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
@@ -113,24 +113,30 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
         When the material's energy cannot be differentiated at many states at once.
     """
     found = _criteria(solution, mode, stretch)
-    shares = (each.mean(axis=0) for each in (*found, _from_reference(stretch, np.logical_and.reduce(found))))
+    stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(found))
+    shares = (each.mean(axis=0) for each in (*found, stable))
     return Stability(mode.name, stretch, *shares)
 
 
 def stable_ranges(solution: Solution) -> dict[str, StableRange]:
-    """Return for every loading mode how far the draws are stable; nothing where the material's energy does not tell."""
+    """Return for every mode of one stretch and one stress how far the draws are stable.
+
+    Nothing where the material's energy does not tell. In the other modes the material passes through the same states,
+    or through states between theirs.
+    """
     found = {}
-    for name in loading_modes():
-        mode = loading_mode(name)
+    for mode in (kind() for kind in loading_modes().values()):
+        if not mode.is_curve:
+            continue
         low, high = calibrated_range(solution.model.experiment, mode)
         sides = np.linspace(1.0, low, POINTS), np.linspace(1.0, high, POINTS)
         stretch = np.unique(np.concatenate(sides))
         try:
-            stable = _from_reference(stretch, np.logical_and.reduce(_criteria(solution, mode, stretch)))
+            stable = _from_reference(stretch - 1, np.logical_and.reduce(_criteria(solution, mode, stretch)))
         except ModelError:
             return {}
         sure, below, above = _surely(stretch, stable), _loss(stretch, stable, -1), _loss(stretch, stable, 1)
-        found[name] = StableRange(name, low, high, float(stable.all(axis=1).mean()), *sure, below, above)
+        found[mode.name] = StableRange(mode.name, low, high, float(stable.all(axis=1).mean()), *sure, below, above)
     return found
 
 
@@ -157,7 +163,8 @@ def _criteria(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> tup
             "arithmetic of arrays: write it without jax.numpy and branches."
         ) from error
     own, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * STEP)
-    size = np.abs(np.trace(tangent[..., np.abs(stretch - 1).argmin()], axis1=1, axis2=2))[:, None]
+    change = stretch - mode.reference
+    size = np.abs(np.trace(tangent[..., np.abs(change).argmin()], axis1=1, axis2=2))[:, None]
     differences = np.stack([own[:, 0], own[:, 1], own[:, 0] - own[:, 1]])
     apart = np.stack([base[0] - base[2], base[1] - base[2], base[0] - base[1]])
     baker = ((differences * np.sign(apart)[:, None] > -NEUTRAL * size) | (np.abs(apart)[:, None] < 1e-9)).all(axis=0)
@@ -172,23 +179,24 @@ def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
     own = [part.mode.abscissa(part.stretch) for part in data.parts if part.mode == mode]
     if own:
-        return min(1.0, *(float(each.min()) for each in own)), max(1.0, *(float(each.max()) for each in own))
+        at_rest = float(mode.reference)
+        return min(at_rest, *(float(each.min()) for each in own)), max(at_rest, *(float(each.max()) for each in own))
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     return farthest_stretch(mode, most, -1), farthest_stretch(mode, most, 1)
 
 
-def _from_reference(stretch: FloatArray, is_stable: Flags) -> Flags:
-    """Return whether all is stable (M, g) from the reference to each stretch."""
+def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:
+    """Return whether all is stable (M, g) from the reference to each change (g,) of the stretch."""
     found = np.empty_like(is_stable)
-    for outward in (_outward(stretch, -1), _outward(stretch, 1)):
+    for outward in (_outward(change, -1), _outward(change, 1)):
         found[:, outward] = np.logical_and.accumulate(is_stable[:, outward], axis=1)
     return found
 
 
-def _outward(stretch: FloatArray, side: int) -> NDArray[np.intp]:
-    """Return the places of the stretches on one side of the reference, and of the reference, from there outward."""
-    own = np.flatnonzero(side * (stretch - 1) >= 0)
-    return own[np.argsort(np.abs(stretch[own] - 1))]
+def _outward(change: FloatArray, side: int) -> NDArray[np.intp]:
+    """Return the places of the changes on one side of the reference, and of the reference, from there outward."""
+    own = np.flatnonzero(side * change >= 0)
+    return own[np.argsort(np.abs(change[own]))]
 
 
 def _surely(stretch: FloatArray, stable: Flags) -> tuple[float, float]:
@@ -199,7 +207,7 @@ def _surely(stretch: FloatArray, stable: Flags) -> tuple[float, float]:
 
 def _loss(stretch: FloatArray, stable: Flags, side: int) -> Loss:
     """Return where the draws (M, g), stable from the reference to some stretch, lose stability on one side of it."""
-    outward = _outward(stretch, side)
+    outward = _outward(stretch - 1, side)
     first = np.argmin(stable[:, outward], axis=1)[~stable[:, outward[-1]]]
     if len(outward) == 1 or not len(first):
         return Loss(0.0, np.nan, np.nan, np.nan)

@@ -1,4 +1,4 @@
-"""``tissuq materials``, ``tissuq discrepancies`` and ``tissuq datasets``: what there is."""
+"""``tissuq materials``, ``modes``, ``discrepancies`` and ``datasets``: what there is."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tissuq.discrepancy import Discrepancy
     from tissuq.mechanics import Material
 
-__all__ = ["datasets", "discrepancies", "materials"]
+__all__ = ["datasets", "discrepancies", "materials", "modes"]
 
 LONG = 70
 """Characters of a formula from which its source stands on a line of its own."""
@@ -37,6 +37,16 @@ def materials(
     print("Other names:")
     for form in FORMS:
         print(f"    {form}")
+
+
+def modes() -> None:
+    """List the loading modes: what is set, and the stresses that are measured."""
+    from tissuq.experiments.modes import loading_modes
+
+    print("Loading modes: every stress is the derivative of W by what it does work on\n")
+    for kind in loading_modes().values():
+        controls = ", ".join(control.name for control in kind.controls)
+        print(f"{kind.name}\n    {kind.description}\n    sets {controls}; measures {', '.join(kind.stresses)}\n")
 
 
 def discrepancies() -> None:

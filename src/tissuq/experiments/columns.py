@@ -14,7 +14,7 @@ from tissuq.experiments.vocabulary import STRESS_NAMES, on_axis, plain, role_nam
 
 __all__ = ["ColumnChoice", "Heading", "choose_columns", "declared_unit", "heading"]
 
-DEFORMATIONS = ("stretch", "strain", "displacement")
+DEFORMATIONS = ("stretch", "strain", "displacement", "shear")
 LOADS = ("stress", "force")
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]"),
@@ -41,7 +41,7 @@ class ColumnChoice:
     deformation, stress : int
         The columns.
     measure : str
-        What the deformation is: stretch, strain or displacement.
+        What the deformation is: stretch, strain, displacement or (amount of) shear.
     load : str
         What the other column holds: stress or force.
     """
@@ -87,7 +87,11 @@ def declared_unit(table: Table, column: int) -> str:
 
 
 def choose_columns(
-    table: Table, mapping: Mapping[str, str | int] | None, stress_type: str, axis: str | None = None
+    table: Table,
+    mapping: Mapping[str, str | int] | None,
+    stress_type: str,
+    axis: str | None = None,
+    is_shear: bool = False,
 ) -> ColumnChoice:
     """Return the columns to read: those of the mapping, the others by their names.
 
@@ -98,11 +102,14 @@ def choose_columns(
     table : Table
         The table to choose from.
     mapping : mapping or None
-        From a role (stretch, strain or displacement; stress or force) to the name or the number, from 1, of a column.
+        From a role (stretch, strain, displacement or shear; stress or force) to the name or the number, from 1, of a
+        column.
     stress_type : str
         ``engineering`` or ``cauchy``: what a stress column may be called.
     axis : str, optional
         ``x`` or ``y``: whose columns are read from the file of a biaxial machine.
+    is_shear : bool
+        Whether the deformation is an amount of shear.
 
     Raises
     ------
@@ -110,7 +117,7 @@ def choose_columns(
         When a role or column does not exist, several columns fit, or none does.
     """
     mapping = dict(mapping or {})
-    _check_roles(table, mapping)
+    _check_roles(table, mapping, is_shear)
     quantities = _quantities(table, axis, mapping)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
@@ -123,9 +130,10 @@ def choose_columns(
     if measure:
         deformation = _find(table, measure, mapping[measure])
     else:
-        known = DEFORMATIONS[:2] if _fitting(quantities, DEFORMATIONS[:2]) else DEFORMATIONS[2:]
-        what = "stretch, strain or displacement"
-        deformation = _recognise(table, quantities, "stretch", known, stress_type, what)
+        first, second = (("shear",), ()) if is_shear else (("stretch", "strain"), ("displacement",))
+        known = first if not second or _fitting(quantities, first) else second
+        what = "amount of shear" if is_shear else "stretch, strain or displacement"
+        deformation = _recognise(table, quantities, first[0], known, stress_type, what)
         measure = next(role for role in known if quantities[deformation] in role_names(role))
     if deformation == stress:
         raise InputError(
@@ -154,7 +162,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
     return [name if each in ("", wanted) else "" for each, name in found]
 
 
-def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
+def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:
     unknown = [role for role in mapping if role not in DEFORMATIONS + LOADS]
     if unknown:
         raise InputError(
@@ -165,6 +173,12 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
         both = [role for role in roles if role in mapping]
         if len(both) > 1:
             raise InputError(f"{table.file}: columns are given for both {' and '.join(both)}; give only one of them.")
+    other = set(DEFORMATIONS) - {"shear"} if is_shear else {"shear"}
+    if other & set(mapping):
+        deformation = "an amount of shear" if is_shear else "a stretch, strain or displacement"
+        raise InputError(
+            f"{table.file}: a column is given as {min(other & set(mapping))}, but this loading mode has {deformation}."
+        )
 
 
 def _find(table: Table, role: str, wanted: str | int) -> int:

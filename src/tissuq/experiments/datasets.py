@@ -10,9 +10,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.errors import InputError, ModelError
+from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import loading_modes
 from tissuq.experiments.reading import read_experiment
 
 if TYPE_CHECKING:
@@ -67,8 +66,6 @@ def load(name: str) -> Experiment:
     ------
     InputError
         When there is no data set of that name.
-    ModelError
-        When it was measured in a loading mode that cannot be fitted; :func:`table` has its values.
 
     Examples
     --------
@@ -78,12 +75,6 @@ def load(name: str) -> Experiment:
     """
     file = path(name)
     about = _comments(file)
-    if about["mode"] not in loading_modes():
-        raise ModelError(
-            f"data set '{name}' was measured in {about['mode']}, which cannot be fitted yet. "
-            f"datasets.table('{name}') has its values. "
-            f"Modes that can be fitted: {', '.join(loading_modes())}."
-        )
     experiment = read_experiment(file, mode=about["mode"], name=name)
     return replace(experiment, source=f"{about['citation']} ({experiment.source})")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,21 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 
-__all__ = ["Experiment"]
+__all__ = ["Experiment", "checked_points"]
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Stress-stretch measurements of one test.
+    """Measurements of one test: what it set, such as stretches, and the stresses.
 
     Parameters
     ----------
     mode : str or LoadingMode
         How the specimen was loaded.
-    stretch : (n,) array, dimensionless
-        Deformed over undeformed length, positive; any order, repetitions allowed.
-    stress : (n,) array, MPa
-        Engineering (nominal) stress, tension positive and compression negative.
+    stretch : (n,) or (n, c) array, dimensionless
+        What the mode controls: deformed over undeformed length, positive, or an amount of shear of either sign; a
+        column for each control where there are several. Any order, repetitions allowed.
+    stress : (n,) or (n, k) array, MPa
+        Engineering (nominal) stress, tension positive and compression negative; a column for each stress of the mode
+        where there are several.
     name : str
         A short name for tables and figures.
     source : str
@@ -39,7 +42,8 @@ class Experiment:
     Raises
     ------
     InputError
-        When the arrays differ in length, are empty, or hold values that are not finite or not stretches.
+        When the arrays differ in length, do not have the columns of the mode, are empty, or hold values that are not
+        finite or not stretches.
 
     Examples
     --------
@@ -47,6 +51,9 @@ class Experiment:
     >>> data = tq.Experiment(mode="uniaxial", stretch=[0.9, 1.0, 1.2], stress=[-0.3, 0.0, 0.5])
     >>> len(data)
     3
+    >>> both = tq.Experiment("biaxial", stretch=[[1.1, 1.0], [1.2, 1.1]], stress=[[0.3, 0.2], [0.5, 0.4]])
+    >>> len(both), both.mode.stresses
+    (2, ('engineering stress of axis 1', 'engineering stress of axis 2'))
     """
 
     mode: LoadingMode
@@ -67,10 +74,11 @@ class Experiment:
         stress_unit: str = "MPa",
         specimen: str = "",
     ) -> None:
+        mode = loading_mode(mode)
         values = {
-            "mode": loading_mode(mode),
-            "stretch": _column("stretch", stretch),
-            "stress": _column("stress", stress),
+            "mode": mode,
+            "stretch": checked_points(mode, stretch),
+            "stress": _checked("stress", stress, mode.stresses),
             "name": name,
             "source": source,
             "stress_unit": stress_unit,
@@ -82,13 +90,6 @@ class Experiment:
             raise InputError(
                 f"experiment '{name}': {len(self.stretch)} stretches but {len(self.stress)} stresses; "
                 "give one stress for every stretch."
-            )
-        not_positive = np.flatnonzero(self.stretch <= 0)
-        if len(not_positive):
-            row = not_positive[0]
-            raise InputError(
-                f"experiment '{name}': stretch {self.stretch[row]:g} at position {row} is not positive. "
-                "A stretch is deformed over undeformed length; if this is a strain, add 1."
             )
 
     def __len__(self) -> int:
@@ -127,15 +128,38 @@ class Experiment:
         return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit, self.specimen)
 
 
-def _column(name: str, values: Any) -> NDArray[np.float64]:
+def checked_points(mode: LoadingMode, points: ArrayLike) -> NDArray[np.float64]:
+    """Return points of a mode as an array (n,), or (n, c) where the mode has c controls.
+
+    Raises
+    ------
+    InputError
+        When it is not of this shape, or holds what is no value of a control.
+    """
+    found = _checked("stretch", points, [control.name for control in mode.controls])
+    for control, column in zip(mode.controls, found.reshape(len(found), -1).T, strict=True):
+        low = np.flatnonzero(column <= control.above)
+        if len(low):
+            raise InputError(
+                f"{control.name} {column[low[0]]:g} at position {low[0]} is not positive. "
+                "A stretch is deformed over undeformed length; if this is a strain, add 1."
+            )
+    return found
+
+
+def _checked(name: str, values: Any, columns: Sequence[str]) -> NDArray[np.float64]:
+    """Return an array of finite numbers, (n,) or with several columns (n, k), that cannot be changed."""
     try:
-        column = np.array(values, dtype=np.float64)
+        found = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be an array of numbers: {error}.") from error
-    if column.ndim != 1 or not len(column):
-        raise InputError(f"{name} must be a one-dimensional array with values, not of shape {column.shape}.")
-    bad = np.flatnonzero(~np.isfinite(column))
-    if len(bad):
-        raise InputError(f"{name} is {column[bad[0]]} at position {bad[0]}; every value must be a finite number.")
-    column.flags.writeable = False
-    return column
+    count = len(columns)
+    if found.ndim != min(count, 2) or not found.size or found.shape[1:] != (count,)[: found.ndim - 1]:
+        form = f"an array with {count} columns ({', '.join(columns)})" if count > 1 else "a one-dimensional array"
+        raise InputError(f"{name} must be {form} with values, not of shape {found.shape}.")
+    for column, own in zip(columns, found.reshape(len(found), -1).T, strict=True):
+        bad = np.flatnonzero(~np.isfinite(own))
+        if len(bad):
+            raise InputError(f"{column} is {own[bad[0]]} at position {bad[0]}; every value must be a finite number.")
+    found.flags.writeable = False
+    return found

@@ -72,7 +72,8 @@ def stretch_of(
     if choice.is_strain:
         check_strain(table, choice, values * factor, load, has_unit=bool(declared or strain_unit))
         return 1 + values * factor, f"stretch = 1 + column {label}{scaled}"
-    return values * factor, f"stretch = column {label}{scaled}"
+    what = "amount of shear" if choice.measure == "shear" else "stretch"
+    return values * factor, f"{what} = column {label}{scaled}"
 
 
 def stress_of(

@@ -9,7 +9,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.columns import ColumnChoice
 from tissuq.experiments.table import Table
 
-__all__ = ["check_signs", "check_strain", "check_stretch"]
+__all__ = ["check_shear_signs", "check_signs", "check_strain", "check_stretch"]
 
 Column = NDArray[np.float64]
 
@@ -85,6 +85,17 @@ def check_signs(
             f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
             f"is negative ({stress[row]:g} MPa); tension must be positive. Change the sign of the stresses "
             "in the file, or of the strains if this is compression, or check which columns are read."
+        )
+
+
+def check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
+    """Refuse shear stresses that do negative work clearly beyond noise."""
+    row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
+    if row is not None:
+        raise InputError(
+            f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
+            f"{stress[row]:g} MPa; it must have the sign of the shear. Change one of the signs in the file, or check "
+            "which columns are read."
         )
 
 

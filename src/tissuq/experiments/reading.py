@@ -18,7 +18,8 @@ from tissuq.experiments.dimensions import dimensions_of
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.measures import stress_of, stretch_of
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.plausibility import check_signs, check_stretch
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.plausibility import check_shear_signs, check_signs, check_stretch
 from tissuq.experiments.signs import with_compression_negative
 from tissuq.experiments.slack import preload_stress, taut
 from tissuq.experiments.table import Table, read_table
@@ -94,13 +95,14 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     mode : str or LoadingMode
         How the specimen was loaded; uniaxial unless given.
     columns : mapping, optional
-        From ``stretch``, ``strain`` or ``displacement``, and ``stress`` or ``force``, to the name of a column or its
-        number from 1. Columns with usual names (with a unit or not) need none.
+        From ``stretch``, ``strain``, ``displacement`` or ``shear`` (the amount of shear), and ``stress`` or ``force``,
+        to the name of a column or its number from 1. Columns with usual names (with a unit or not) need none.
     stress_unit : str, optional
         Unit of the stresses; without it the file's own, and MPa when the file states none. For a file of forces,
         the unit in which people want to read the stresses, kPa unless given.
     stress_type : str
-        ``engineering`` (force over undeformed area) or ``cauchy``, which is divided by the stretch.
+        ``engineering`` (force over undeformed area) or ``cauchy``, which is divided by the stretch; a shear
+        stress is the same in both.
     strain_unit : str, optional
         ``%`` or ``1``, for a column of strains; without it the file's own, and 1 when it states none.
     force_unit, displacement_unit : str, optional
@@ -155,9 +157,10 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
     mode = loading_mode(options.get("mode", "uniaxial"))
     stress_type, axis = options.get("stress_type", "engineering"), options.get("axis")
     every, name = options.get("every", 1), options.get("name")
-    _check_options(stress_type, axis, every)
+    _check_options(mode, stress_type, axis, every)
+    is_shear = mode.controls == (SHEAR,)
     table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
-    choice = choose_columns(table, options.get("columns"), stress_type, axis)
+    choice = choose_columns(table, options.get("columns"), stress_type, axis, is_shear)
     dimensions = dimensions_of(table, options.get("dimensions"))
     deformation, load = table.numbers([choice.deformation, choice.stress])
     stretch, stretch_source = stretch_of(
@@ -173,14 +176,20 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
     if (preload := options.get("preload")) is not None:
         threshold = preload_stress(preload, measured.area)
         curve = taut(curve, preload, threshold, peak=find_cycles(curve.table, curve.stretch)[0].peak)
-    check_stretch(curve.table, choice, curve.stretch)
-    if stress_type == "cauchy":
-        recorded, curve = (replace(each, stress=each.stress / each.stretch) for each in (recorded, curve))
+    if not is_shear:
+        check_stretch(curve.table, choice, curve.stretch)
+    if stress_type == "cauchy" and not is_shear:
+        recorded, curve = (
+            replace(each, stress=each.stress / mode.cauchy_ratio(each.stretch)) for each in (recorded, curve)
+        )
         curve = curve.told("Cauchy stress divided by stretch to engineering stress")
     if every > 1:
         kept = np.arange(0, len(curve), every)
         curve = curve.kept(kept, f"one row in {every} asked for").told(f"one row in {every}")
-    check_signs(curve.table, choice, curve.stretch, curve.stress, options.get("compression_positive", False))
+    if is_shear:
+        check_shear_signs(curve.table, choice, curve.stretch, curve.stress)
+    else:
+        check_signs(curve.table, choice, curve.stretch, curve.stress, options.get("compression_positive", False))
     curve = curve.told(f"{len(curve)} rows (lines {curve.table.lines[0]} to {curve.table.lines[-1]})")
     sheet = table.file.removeprefix(str(path))
     experiment = Experiment(
@@ -194,7 +203,12 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
     return Reading(experiment, table, choice, recorded, curve, tuple(cycles), dimensions.warnings)
 
 
-def _check_options(stress_type: str, axis: str | None, every: int) -> None:
+def _check_options(mode: LoadingMode, stress_type: str, axis: str | None, every: int) -> None:
+    if len(mode.channels) > 1 or len(mode.controls) > 1:
+        raise InputError(
+            f"a file is read in loading modes with one stress, and '{mode.name}' has {', '.join(mode.stresses)}: give "
+            "its values to Experiment."
+        )
     if stress_type not in STRESS_TYPES:
         raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
     if axis is not None and axis not in AXES:

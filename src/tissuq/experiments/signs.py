@@ -28,6 +28,10 @@ def with_compression_negative(curve: Curve, choice: ColumnChoice, compression_po
     InputError
         When it does but the stretches are all above 1, or a column's name says compression and nobody says its sign.
     """
+    if choice.measure == "shear":
+        if compression_positive:
+            raise InputError("compression_positive=True (--compression-positive) has no meaning for a shear stress.")
+        return curve
     strain = curve.stretch - 1
     if not compression_positive:
         _check_names(curve, choice)

@@ -16,6 +16,7 @@ ROLES = {
     "strain": _names(
         "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung"
     ),
+    "shear": _names("shear, amount of shear, shear strain, gamma, γ"),
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg"
@@ -29,9 +30,10 @@ ROLES = {
 
 STRESS_NAMES = {
     "engineering": _names(
-        "stress, engineering stress, nominal stress, tensile stress, compressive stress, spannung, druckspannung"
+        "stress, engineering stress, nominal stress, tensile stress, compressive stress, shear stress, spannung, "
+        "druckspannung, schubspannung"
     ),
-    "cauchy": _names("stress, cauchy stress, true stress"),
+    "cauchy": _names("stress, cauchy stress, true stress, shear stress, schubspannung"),
 }
 CYCLE_NAMES = _names("cycle, cycles, cycle count, cycle number, total cycles, total cycle count, zyklus, zyklen")
 SET_NAMES = _names("setname, set name, set")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.experiments.modes import Path
+from tissuq.experiments.modes import LoadingMode, Path
 
 __all__ = ["STEP", "farthest_stretch", "invariant_rates", "invariants", "log_stretches"]
 
@@ -43,12 +43,13 @@ def invariant_rates(mode: Path, stretch: ArrayLike) -> tuple[FloatArray, FloatAr
     return (2 * np.exp(2 * logs) * rates).sum(axis=1), (-2 * np.exp(-2 * logs) * rates).sum(axis=1)
 
 
-def farthest_stretch(mode: Path, most: Sequence[float], sign: int) -> float:
-    """Return the stretch of a mode, above (sign 1) or below (-1) one, where I1 - 3 or I2 - 3 reaches its ``most``."""
-    low, high = 0.0, np.log(LARGEST)
+def farthest_stretch(mode: LoadingMode, most: Sequence[float], sign: int) -> float:
+    """Return the stretch of a mode, above (sign 1) or below (-1) its rest, where I1 - 3 or I2 - 3 reaches ``most``."""
+    (control,) = mode.controls
+    low, high = 0.0, LARGEST - 1 if sign > 0 else min(LARGEST - 1, control.reference - control.above)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        reached = invariants(mode, [np.exp(sign * middle)])
+        reached = invariants(mode, mode.excursion([sign * middle]))
         is_inside = all(each[0] <= limit for each, limit in zip(reached, most, strict=True))
         low, high = (middle, high) if is_inside else (low, middle)
-    return float(np.exp(sign * low))
+    return float(mode.excursion(sign * low))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.named import material_named
@@ -33,8 +33,8 @@ def simulate(
         The true material.
     parameters : mapping of str to float
         One value for each of its parameters (MPa; exponents have no unit).
-    stretch : (n,) array, dimensionless
-        Where to measure.
+    stretch : (n,) or (n, c) array, dimensionless
+        Where to measure: the controls of the mode.
     noise_sd : float, MPa
         Standard deviation of the noise, zero or more.
     seed : int
@@ -65,12 +65,13 @@ def simulate(
         )
     if not noise_sd >= 0:
         raise InputError(f"noise_sd must be zero or positive, not {noise_sd}.")
-    exact = Experiment(true_mode, stretch, np.zeros(np.size(stretch)))
+    points = checked_points(true_mode, stretch)
     values = [parameters[symbol] for symbol in symbols]
-    stress = engineering_stress(true_material, true_mode, exact.stretch, values)
-    noise = noise_sd * np.random.default_rng(seed).standard_normal(len(exact))
+    stresses = [engineering_stress(true_material, path, points, values) for path in true_mode.channels]
+    stress = stresses[0] if len(stresses) == 1 else np.column_stack(stresses)
+    noise = noise_sd * np.random.default_rng(seed).standard_normal(stress.shape)
     recipe = ", ".join(
         f"{p.symbol} = {value:g} {p.unit}".strip() for p, value in zip(true_material.parameters, values, strict=True)
     )
     source = f"synthetic: {true_material.name} ({recipe}), noise sd {noise_sd:g} MPa, seed {seed}"
-    return Experiment(true_mode, exact.stretch, stress + noise, name=f"synthetic {true_material.name}", source=source)
+    return Experiment(true_mode, points, stress + noise, name=f"synthetic {true_material.name}", source=source)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import Path, Uniaxial
+from tissuq.experiments.modes import Path, SimpleShear
 from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.material import Material
 
@@ -30,10 +30,10 @@ def engineering_stress(material: Material, mode: Path, stretch: ArrayLike, value
     ----------
     material : Material
         The strain energy.
-    mode : LoadingMode
-        The deformation path.
-    stretch : (n,) array, dimensionless
-        Stretches along the path.
+    mode : Path
+        A loading mode with one stress, or one of a mode's channels.
+    stretch : (n,) or (n, c) array, dimensionless
+        Points of the mode.
     values : (k,) or (m, k) array
         Parameter values in the material's order; several rows give several curves.
 
@@ -58,8 +58,9 @@ def engineering_stress(material: Material, mode: Path, stretch: ArrayLike, value
     is_borne = np.isfinite(curves).all(axis=0)
     if not is_borne.all():
         symbols = ", ".join(each.symbol for each in material.parameters)
+        beyond = mode.abscissa(points)[~is_borne][0]
         raise ModelError(
-            f"material '{material.name}' has no finite stress at a stretch of {points[~is_borne][0]:g} with the "
+            f"material '{material.name}' has no finite stress at a stretch of {beyond:g} with the "
             f"values of {symbols} that it was given: it has locked, or its energy is too large for a number."
         )
     return curves if values.ndim == 2 else np.asarray(curves[0])
@@ -72,10 +73,10 @@ def stress_basis(material: Material, mode: Path, stretch: ArrayLike, nonlinear: 
     ----------
     material : Material
         The strain energy, proportional to its k linear parameters.
-    mode : LoadingMode
-        The deformation path.
-    stretch : (n,) array, dimensionless
-        Stretches along the path.
+    mode : Path
+        A loading mode with one stress, or one of a mode's channels.
+    stretch : (n,) or (n, c) array, dimensionless
+        Points of the mode.
     nonlinear : (s,) or (m, s) array
         Values of the other parameters in the material's order; several rows give several bases.
 
@@ -130,9 +131,9 @@ def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:
 
 
 def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
-    """Return the shear modulus at the reference, in MPa: a third of the initial slope in uniaxial tension."""
+    """Return the shear modulus at the reference, in MPa: the initial slope in simple shear."""
     with _explained(material):
-        return float(_initial_slope(material)(np.asarray(values, dtype=np.float64))) / 3
+        return float(_initial_slope(material)(np.asarray(values, dtype=np.float64)))
 
 
 def _stresses(material: Material, mode: Path) -> Any:
@@ -162,7 +163,7 @@ def _bases(material: Material, mode: Path) -> Any:
 def _initial_slope(material: Material) -> Any:
     jax = differentiator()
     slope = jax.grad(jax.grad(path_energy, argnums=2), argnums=2)
-    return jax.jit(lambda values: slope(material, Uniaxial(), 1.0, values))
+    return jax.jit(lambda values: slope(material, SimpleShear(), 0.0, values))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
 STEP = 1e-5
-"""Relative, of the stretch, for the slope of a curve."""
+"""Of the stretch, for the slope of a curve."""
 MANY, FEW = 1500, 200
 """Components that stand for the posterior at a block of stretches, and at more."""
 
@@ -84,12 +84,10 @@ def predict_average(
 
     All else is as for `predict_band`.
     """
-    points = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
-    if points.ndim != 1 or not (np.isfinite(points) & (points > 0)).all():
-        raise InputError("stretches to predict at must be a one-dimensional array of positive numbers.")
+    asked = loading_mode(mode) if mode is not None else _only_mode(parts[0][1].model.experiment)
+    points = checked_points(asked, np.atleast_1d(stretch))
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    asked = loading_mode(mode) if mode is not None else _only_mode(parts[0][1].model.experiment)
     for _, solution in parts if discrepancy else ():
         _check_mode(solution, asked)
     count = FEW if len(points) > BLOCK else MANY
@@ -135,8 +133,8 @@ def _moments(
     mean, variance = at(points, noise)
     variance = variance + (model.common_error * mean) ** 2
     if noise and model.tolerances:
-        slope = (at(points * (1 + STEP), False)[0] - mean) / (STEP * points) if model.tolerances.need_slope else 0.0
-        variance = variance + model.tolerances.variance(points, mean, slope)
+        slope = (at(points + STEP, False)[0] - mean) / STEP if model.tolerances.need_slope else 0.0
+        variance = variance + model.tolerances.variance(mode, points, mean, slope)
     return mean, variance
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import LOST
+from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band, share_inside
@@ -94,7 +95,7 @@ def predictive_figure(
         limits = _common_limits(experiment.stress, [*bands.values()], unit)
         for axis in axes[: len(posteriors)]:
             axis.set_ylim(limits)
-        _label(figure, axes, len(posteriors), unit)
+        _label(figure, axes, len(posteriors), experiment.mode, unit)
     return figure
 
 
@@ -188,12 +189,12 @@ def _common_limits(stress: FloatArray, bands: Sequence[Band], unit: StressUnit) 
     return (low - margin) / unit.to_mpa, (high + margin) / unit.to_mpa
 
 
-def _label(figure: Figure, axes: list[Axes], count: int, unit: StressUnit) -> None:
+def _label(figure: Figure, axes: list[Axes], count: int, mode: LoadingMode, unit: StressUnit) -> None:
     for spare, above in zip(axes[count:], axes[count - _columns(count) :], strict=False):
         spare.set_visible(False)
         above.tick_params(labelbottom=True)
-    figure.supxlabel("stretch", fontsize=10.5)
-    figure.supylabel(f"engineering stress [{unit.name}]", fontsize=10.5)
+    figure.supxlabel(mode.controls[0].name, fontsize=10.5)
+    figure.supylabel(f"{mode.stresses[0]} [{unit.name}]", fontsize=10.5)
     handles: dict[str, Any] = {}
     for axis in axes[:count]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):

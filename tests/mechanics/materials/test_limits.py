@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from closed_forms import MODES, STRETCH
+from loading import MEASURED
 from tissuq.experiments.modes import Uniaxial
 from tissuq.mechanics import engineering_stress, initial_shear_modulus, material_named, stress_basis
 from tissuq.mechanics.stress import path_energy, traced_stress_basis
 
-EVERY_MODE = pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.name)
+STRETCH = np.array([0.5, 0.8, 1.05, 1.6, 2.4, 3.0])
+EVERY_STRESS = pytest.mark.parametrize("measured", MEASURED, ids=str)
 LOCKING = {"gent": [0.7], "gent-gent": [0.7, 0.2], "arruda-boyce": [0.7], "van-der-waals": [0.7, 0.1]}
 EVERY_LOCKING = pytest.mark.parametrize("name", [*LOCKING, "extended-tube"])
 
@@ -22,7 +23,7 @@ def with_limit(name, limit):
     return [0.7, 0.2, limit, 0.5] if name == "extended-tube" else [*LOCKING[name], limit]
 
 
-@EVERY_MODE
+@EVERY_STRESS
 @pytest.mark.parametrize(
     ("name", "values", "limit", "of_limit"),
     [
@@ -45,9 +46,9 @@ def with_limit(name, limit):
         ("neo-hookean+rivlin:C01", [0.7, 0.2], "mooney-rivlin", [0.7, 0.2]),
     ],
 )
-def test_a_law_becomes_another_one(mode, name, values, limit, of_limit):
-    found = engineering_stress(material_named(name), mode, STRETCH, values)
-    expected = engineering_stress(material_named(limit), mode, STRETCH, of_limit)
+def test_a_law_becomes_another_one(measured, name, values, limit, of_limit):
+    found = engineering_stress(material_named(name), measured.path, measured.points, values)
+    expected = engineering_stress(material_named(limit), measured.path, measured.points, of_limit)
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-8)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.discrepancy import discrepancy_named
-from tissuq.errors import InputError, TissuqError
+from tissuq.errors import InputError, ModelError, TissuqError
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.path import invariants
 from tissuq.priors import Prior, prior_from
@@ -51,7 +51,7 @@ class Design(BaseModel):
     @field_validator("mode")
     @classmethod
     def _known_mode(cls, name: str) -> str:
-        _known(loading_mode, name)
+        _known(_curve, name)
         return name
 
     @property
@@ -124,7 +124,7 @@ class CoverageSettings(BaseModel):
     @classmethod
     def _known_modes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            _known(loading_mode, name)
+            _known(_curve, name)
         return names
 
     @field_validator("scale")
@@ -201,6 +201,11 @@ def preset(name: str) -> dict[str, object]:
     if name not in PRESETS:
         raise InputError(f"there is no preset '{name}'. Choose one of: {', '.join(PRESETS)}.")
     return tomllib.loads((files("tissuq.studies.coverage") / "presets" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def _curve(name: str) -> None:
+    if not loading_mode(name).is_curve:
+        raise ModelError(f"a campaign measures one stress against one stretch, which '{name}' does not")
 
 
 def _known(find: Callable[[Any], Found], given: Any) -> Found:

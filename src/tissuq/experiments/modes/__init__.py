@@ -1,0 +1,23 @@
+"""Loading modes: how a specimen is deformed, as a path of deformations along what each measured stress works on."""
+
+from tissuq.experiments.modes.biaxial import Biaxial, ConstrainedUniaxial, ThinTube
+from tissuq.experiments.modes.mode import Control, Deformation, LoadingMode, Path, loading_mode, loading_modes
+from tissuq.experiments.modes.one_stretch import Equibiaxial, Planar, Uniaxial
+from tissuq.experiments.modes.shear import SimpleShear, SimpleShearNormal
+
+__all__ = [
+    "Biaxial",
+    "ConstrainedUniaxial",
+    "Control",
+    "Deformation",
+    "Equibiaxial",
+    "LoadingMode",
+    "Path",
+    "Planar",
+    "SimpleShear",
+    "SimpleShearNormal",
+    "ThinTube",
+    "Uniaxial",
+    "loading_mode",
+    "loading_modes",
+]

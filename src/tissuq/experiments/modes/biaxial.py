@@ -1,0 +1,120 @@
+"""Modes with two stresses in the plane of a sheet whose faces are free: biaxial, a thin tube, one axis held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.experiments.modes.mode import Control, Deformation, LoadingMode, Path
+from tissuq.experiments.modes.one_stretch import Planar
+
+__all__ = ["Biaxial", "ConstrainedUniaxial", "ThinTube"]
+
+
+def _sheet(first: Any, second: Any) -> Deformation:
+    return Deformation.along_axes((first, second, 1 / (first * second)))
+
+
+@dataclass(frozen=True)
+class _Pulled(Path):
+    """A step of one of two stretches, the other one as it is."""
+
+    axis: int
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        first, second = point[..., 0], point[..., 1]
+        return _sheet(first, second + step) if self.axis else _sheet(first + step, second)
+
+    def abscissa(self, points: Any) -> Any:
+        return points[..., self.axis]
+
+
+@dataclass(frozen=True)
+class _Held(Path):
+    """A step of the stretch that is held at one; its stress is drawn against the other one."""
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        return _sheet(point, 1 + step)
+
+    def cauchy_ratio(self, points: Any) -> Any:
+        return np.ones_like(points)
+
+
+class Biaxial(LoadingMode):
+    """Any two stretches: F = diag(l1, l2, 1/(l1 l2)); stresses dW/dl1 and dW/dl2."""
+
+    name = "biaxial"
+    description = "any two stretches of a sheet, with the stresses of both axes"
+    controls = (Control("stretch of axis 1"), Control("stretch of axis 2"))
+    stresses = ("engineering stress of axis 1", "engineering stress of axis 2")
+
+    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+        return _sheet(stretch[..., 0], stretch[..., 1]).stretches
+
+    @property
+    def channels(self) -> tuple[Path, ...]:
+        return _Pulled(0), _Pulled(1)
+
+
+class ThinTube(Biaxial):
+    """Extension and inflation of a thin tube that does not twist: hoop and axial stretch, as `Biaxial`.
+
+    `engineering_stresses` tells what a pressure and an axial force are in these stresses.
+    """
+
+    name = "thin-tube"
+    description = "extension and inflation of a thin tube: hoop and axial stretch, with both stresses"
+    controls = (Control("hoop stretch"), Control("axial stretch"))
+    stresses = ("hoop engineering stress", "axial engineering stress")
+
+    @staticmethod
+    def engineering_stresses(
+        stretch: ArrayLike, pressure: ArrayLike, reduced_force: ArrayLike, radius: float, thickness: float
+    ) -> NDArray[np.float64]:
+        """Return hoop and axial engineering stress (n, 2) in MPa.
+
+        Virtual work: the energy 2 pi R H L dW of a wall of radius R, thickness H and length L is p dv + f dl with the
+        volume v = pi R^2 L l_hoop^2 l_axial inside and the length l = L l_axial. So
+
+            dW/dl_hoop = p (R/H) l_hoop l_axial,   dW/dl_axial = f/(2 pi R H) + p R/(2 H) l_hoop^2.
+
+        Parameters
+        ----------
+        stretch : (n, 2) array, dimensionless
+            Hoop and axial stretch, of the middle of the wall.
+        pressure : (n,) array, MPa
+            Inside, above that outside.
+        reduced_force : (n,) array, N
+            What the machine pulls with in addition to the pressure on the closed ends.
+        radius, thickness : float, mm
+            Of the middle of the wall and of the wall, undeformed.
+
+        Examples
+        --------
+        >>> ThinTube.engineering_stresses([[1.2, 1.5]], [0.016], [0.3], radius=5.0, thickness=0.5).round(4).tolist()
+        [[0.288, 0.1343]]
+        """
+        hoop, axial = np.moveaxis(np.asarray(stretch, dtype=np.float64), -1, 0)
+        pressure, reduced_force = np.asarray(pressure), np.asarray(reduced_force)
+        of_hoop = pressure * radius / thickness * hoop * axial
+        of_axis = reduced_force / (2 * pi * radius * thickness) + pressure * radius / (2 * thickness) * hoop**2
+        return np.stack([of_hoop, of_axis], axis=-1)
+
+
+class ConstrainedUniaxial(LoadingMode):
+    """Tension with one lateral axis held, F = diag(l, 1, 1/l), with the stress dW/dl2 of the held axis, too."""
+
+    name = "constrained-uniaxial"
+    description = "tension with one lateral axis held, with the stresses of both axes"
+    stresses = ("engineering stress of the pulled axis", "engineering stress of the held axis")
+
+    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+        return Planar().principal_stretches(stretch)
+
+    @property
+    def channels(self) -> tuple[Path, ...]:
+        return Planar(), _Held()

@@ -1,0 +1,76 @@
+"""Simple shear, with or without the normal stress on the sheared planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tissuq.experiments.modes.mode import SHEAR, Deformation, LoadingMode, Path
+
+__all__ = ["SimpleShear", "SimpleShearNormal"]
+
+TINY = 1e-300
+"""Gives a root a derivative at zero, where it is that of nothing."""
+
+
+def _sheared(shear: Any, height: Any, difference: Any) -> Deformation:
+    """Return F = [[1, shear], [0, height]] in the plane, where its principal stretches have that difference."""
+    total = ((1 + height) ** 2 + shear**2) ** 0.5
+    stretches = 0.5 * (total + difference), 0.5 * (total - difference), 1 / height
+    return Deformation(stretches, (1.0, height**2 + shear**2, shear))
+
+
+class SimpleShear(LoadingMode):
+    """Simple shear F = I + g e1 e2', of either sign; the stress dW/dg is P12, engineering and Cauchy stress alike.
+
+    The principal stretches are sqrt(1 + g^2/4) + g/2, sqrt(1 + g^2/4) - g/2 and 1.
+    """
+
+    name = "simple-shear"
+    description = "simple shear along axis 1 of planes normal to axis 2, with the shear stress"
+    controls = (SHEAR,)
+    stresses = ("shear stress",)
+
+    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+        return self.moved(stretch, 0.0).stretches
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        shear = point + step
+        return _sheared(shear, 1.0, shear)
+
+    def cauchy_ratio(self, points: Any) -> Any:
+        return np.ones_like(points)
+
+
+@dataclass(frozen=True)
+class _Normal(Path):
+    """A step of the height of the sheared planes, whose stress is P22 where the thickness is free."""
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        # The principal stretches differ by sqrt(g^2 + step^2). An energy is symmetric in them, so that the corner of
+        # this root at g = 0 leaves no trace in its first derivative.
+        return _sheared(point, 1 + step, (point**2 + step**2 + TINY) ** 0.5)
+
+    def cauchy_ratio(self, points: Any) -> Any:
+        return np.ones_like(points)
+
+
+class SimpleShearNormal(LoadingMode):
+    """Simple shear with the normal stress P22 on the sheared planes (Poynting's effect); the thickness is free.
+
+    P22 is the derivative of W along l2 at l2 = 1, where F = [[1, g], [0, l2]] in the plane and 1/l2 in the thickness.
+    """
+
+    name = "simple-shear-normal"
+    description = "simple shear, with the shear stress and the normal stress on the sheared planes"
+    controls = (SHEAR,)
+    stresses = ("shear stress", "normal stress")
+
+    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+        return SimpleShear().principal_stretches(stretch)
+
+    @property
+    def channels(self) -> tuple[Path, ...]:
+        return SimpleShear(), _Normal()
