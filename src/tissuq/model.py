@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.discrepancy import Discrepancy, EnergyDiscrepancy, Member, separated
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, Path
+from tissuq.experiments.modes import Path
 from tissuq.mechanics import Material, engineering_stress, stress_basis
-from tissuq.mechanics.joint import TEST
+from tissuq.mechanics.joint import CURVE
 from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
 from tissuq.priors import Flat, Prior, Uniform
@@ -149,7 +149,7 @@ class StatisticalModel:
         is_energy = isinstance(self.discrepancy, EnergyDiscrepancy)
         return tuple(p.symbol for p in self.discrepancy.parameters) if is_energy else ()
 
-    def basis(self, stretch: FloatArray, bent: ArrayLike = (), mode: LoadingMode | None = None) -> FloatArray:
+    def basis(self, stretch: FloatArray, bent: ArrayLike = (), mode: Path | None = None) -> FloatArray:
         """Return the (n, k) mean stresses of unit parameters `column_symbols` at stretches (n,).
 
         Where the material has parameters in which its stress is not linear, ``bent`` holds their values: (s,), or
@@ -205,8 +205,8 @@ class StatisticalModel:
         """Return the noise over noise_sd at points (g,) or rows (g, 14): that of the test; one where there is none."""
         if self.whitening is None or len(self.experiment.parts) == 1:
             return 1.0
-        first = np.cumsum([0, *(part.stress.size for part in self.experiment.parts[:-1])])
-        return np.append(self.whitening.size[first], 1.0)[points[:, TEST].astype(int)]
+        first = np.cumsum([0, *(len(stress) for _, _, stress in self.experiment.curves[:-1])])
+        return np.append(self.whitening.size[first], 1.0)[points[:, CURVE].astype(int)]
 
     @property
     def log_whitening(self) -> float:
@@ -447,13 +447,13 @@ def _off_zero(prior: Prior, probability: float) -> float:
 
 @lru_cache(maxsize=256)
 def _remembered_basis(
-    material: Material, discrepancy: Discrepancy, mode: LoadingMode, stretch: bytes, bent: tuple[float, ...]
+    material: Material, discrepancy: Discrepancy, mode: Path, stretch: bytes, bent: tuple[float, ...]
 ) -> FloatArray:
     return _basis(material, discrepancy, mode, np.frombuffer(stretch), bent)
 
 
 def _basis(
-    material: Material, discrepancy: Discrepancy, mode: LoadingMode, stretch: FloatArray, bent: ArrayLike
+    material: Material, discrepancy: Discrepancy, mode: Path, stretch: FloatArray, bent: ArrayLike
 ) -> FloatArray:
     own, other = stress_basis(material, mode, stretch, bent), discrepancy.mean_basis(mode, stretch)
     return np.concatenate([own, np.broadcast_to(other, (*own.shape[:-1], other.shape[-1]))], axis=-1)

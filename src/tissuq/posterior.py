@@ -253,12 +253,13 @@ class Posterior:
         noise: bool = True,
         prob: float = 0.95,
         mode: str | LoadingMode | None = None,
+        channel: int = 0,
     ) -> pd.DataFrame:
         """Return the predicted engineering stress at new stretches.
 
         Parameters
         ----------
-        stretch : (g,) array, dimensionless
+        stretch : (g,) array, or (g, c) for a mode with c controls, dimensionless
         discrepancy : bool
             With the discrepancy's share (eq. 27), or the model alone (eq. 28).
         noise : bool
@@ -267,6 +268,8 @@ class Posterior:
             Probability between low and high, equal tails.
         mode : str or LoadingMode, optional
             Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy.
+        channel : int
+            Which of the mode's stresses, from 0, where it has several.
 
         Returns
         -------
@@ -276,6 +279,7 @@ class Posterior:
         import pandas as pd
 
         options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
+        options["channel"] = channel
         return pd.DataFrame(vars(predict_band(self.solution, stretch, **options)))
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:

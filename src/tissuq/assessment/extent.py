@@ -275,7 +275,8 @@ def _shares(solution: Solution) -> tuple[tuple[float, float, float], tuple[float
     experiment, components = solution.model.experiment, solution.components
     data = np.unique(experiment.stretch, axis=0)
     some = data[np.linspace(0, len(data) - 1, min(len(data), POINTS)).astype(int)]
-    _, reference = experiment.along(experiment.parts[0].mode, np.array([1 - STEP, 1 + STEP]))
+    mode = experiment.parts[0].mode
+    _, reference = experiment.along(mode, mode.excursion([-STEP, STEP]))
     at = np.concatenate([some, reference])
     alone, other = drawn_curves(solution.model, components[systematic(components.weights[None], DRAWS)[0]], at)
     size = np.sqrt((other[:, :-2] ** 2).mean(axis=1) / ((alone + other)[:, :-2] ** 2).mean(axis=1))

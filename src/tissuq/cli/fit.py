@@ -1,4 +1,4 @@
-"""``tissuq fit``: the user's own measurements."""
+"""``tissuq fit``: the user's own measurements, of one test or of several."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli import reading
+from tissuq.cli import reading, several
 from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
 from tissuq.errors import InputError
 
@@ -17,7 +17,11 @@ __all__ = ["fit"]
 
 def fit(
     file: Annotated[
-        Path | None, typer.Argument(help="CSV or Excel file, or the name of a built-in data set (tissuq datasets).")
+        list[Path] | None,
+        typer.Argument(
+            help="CSV or Excel file, or the name of a built-in data set (tissuq datasets); several files, or a folder "
+            "of them, are fitted together."
+        ),
     ] = None,
     material: Annotated[
         str | None,
@@ -32,7 +36,8 @@ def fit(
     noise_sd: Annotated[
         str | None,
         typer.Option(
-            help="Sd of the noise of the engineering stress, in the file's stress unit, or unknown [unknown]."
+            help="Sd of the noise of the engineering stress, in the file's stress unit, or unknown [unknown]; for "
+            "several files also one for each, with commas."
         ),
     ] = None,
     noise: Annotated[
@@ -43,7 +48,21 @@ def fit(
         list[str] | None,
         typer.Option(help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more."),
     ] = None,
-    mode: reading.Mode = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="By how much a whole test may be off: stress=10%, length=2%, slack=0.01 (of stretch) or zero=0.1 (in "
+            "the stress unit), or none; repeat [stress=18% for files of different specimens]."
+        ),
+    ] = None,
+    specimen: Annotated[
+        list[str] | None,
+        typer.Option(help="Name of the specimen, once for each of several files [each its own]."),
+    ] = None,
+    mode: Annotated[
+        list[str] | None,
+        typer.Option(help="Loading mode [uniaxial]; once for each of several files [as they or their names say]."),
+    ] = None,
     column: reading.Column = None,
     stress_unit: reading.StressUnit = None,
     stress_type: reading.StressType = None,
@@ -70,7 +89,7 @@ def fit(
     figures: Annotated[bool, typer.Option(help="Draw the figures, too.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
-    """Identify a material's parameters from a file of stretches and stresses."""
+    """Identify a material's parameters from files of stretches and stresses."""
     given = reading.reading_options(locals())
     from tissuq.cli.tables import print_summary, print_warnings
     from tissuq.mechanics import material_named
@@ -78,28 +97,31 @@ def fit(
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
-    options: dict[str, Any] = given | {
-        "file": str(reading.resolve(file)) if file and not config else None, "material": material,
-        "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "noise": noise, "method": method,
-        "seed": seed,
+    files = several.files_of(file or [])
+    options: dict[str, Any] = {
+        "material": material, "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
+        "tolerances": several.tolerances(tolerance),
     }  # fmt: skip
+    options |= several.measured([] if config else files, given, mode, specimen, noise_sd)
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))
     if not file and not config:
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
+    if config and len(files) > 1:
+        raise InputError("give FILES or --config, not both.")
     law = material_named(material, laws=True) if material else None
     settings = load_settings(SpecimenSettings, config, options, rivals=("noise", "noise_sd"))
     beside = config.parent if config else Path()
-    source = beside / settings.file
-    if file and config:
-        _check_same(reading.resolve(file), source, config)
-    target = out or Path("runs") / source.stem
+    sources = [beside / each.file for each in settings.tests or (settings,)]
+    if files and config:
+        _check_same(files[0], sources[0], config)
+    target = out or Path("runs") / several.run_name(file or [], config, sources)
     check_target(target, force=force)
     with progress() as step:
         study = run_specimen(settings, beside, step, law)
         step("writing")
         with run_folder(target, force=force) as folder:
-            write_specimen_run(study, source, folder, figures=figures)
+            write_specimen_run(study, sources, folder, figures=figures)
     print_summary(target)
     print_warnings(study.warnings)
     for name, reason in study.skipped.items():
@@ -118,12 +140,3 @@ def _check_same(file: Path, named: Path, config: Path) -> None:
             f"FILE '{file}' is not the file that '{config}' names, '{named}'. Leave FILE out to repeat that run, or "
             "leave --config out to fit FILE."
         )
-
-
-def _noise(text: str | None) -> float | str | None:
-    if text is None or text == "unknown":
-        return text
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error

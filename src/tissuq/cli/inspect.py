@@ -47,7 +47,7 @@ def inspect(
     if out is not None:
         check_target(out, force=force)
     source = reading.resolve(file)
-    settings = load_settings(MeasuredFile, None, given | {"file": str(source)})
+    settings = load_settings(MeasuredFile, None, given | {"mode": mode, "file": str(source)})
     inspection = inspect_file(source, **settings.reading_options)
     print(inspection)
     if out is not None:

@@ -70,7 +70,7 @@ SkipRows = Annotated[int | None, typer.Option(help="Lines to skip at the top of 
 
 def reading_options(given: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of a file's reading from a command's arguments by name."""
-    names = ["mode", "stress_unit", "stress_type", "strain_unit", "force_unit", "displacement_unit", "cycle"]
+    names = ["stress_unit", "stress_type", "strain_unit", "force_unit", "displacement_unit", "cycle"]
     names += ["compression_positive", "branch", "preload", "every", "axis", "sheet", "skip_rows"]
     options = {name: given[name] for name in names}
     dimensions = {name: given[name] for name in ("length", "area", "width", "thickness", "diameter") if given[name]}

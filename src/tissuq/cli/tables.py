@@ -103,7 +103,7 @@ def _read_run(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]],
         rows = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         if not rows:
             raise ValueError("the summary has no rows")
-        if "file" in recipe:
+        if "file" in recipe or "tests" in recipe:
             settings = SpecimenSettings.model_validate(recipe)
             experiment = settings.experiment(folder)
             unit = stress_unit(experiment.stress_unit)

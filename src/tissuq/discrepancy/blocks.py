@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy.kernels import pinned_squared_exponential
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 
 __all__ = [
@@ -47,22 +47,18 @@ class EnergyBlock(ABC):
     lengths: ClassVar[tuple[float, ...]] = (1.0,)
 
     @abstractmethod
-    def reach(self, mode: LoadingMode, stretch: FloatArray) -> tuple[float, float]:
+    def reach(self, mode: Path, stretch: FloatArray) -> tuple[float, float]:
         """Return the range of the block's coordinate over stretches (n,); the reference, zero, is in it."""
 
     @abstractmethod
-    def stress_features(
-        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
-    ) -> FloatArray:
+    def stress_features(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         """Return the engineering stresses (n, r) of the terms dW_k (c = 1) at stretches (n,).
 
         They are terms enough for stretches within the reach; `stress_variance` is that of all there are.
         """
 
     @abstractmethod
-    def stress_variance(
-        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
-    ) -> FloatArray:
+    def stress_variance(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         """Return the variance (n,) of the stress for c = 1."""
 
 
@@ -72,18 +68,14 @@ class ZeroModulusBlock(EnergyBlock):
     name = "zero-modulus"
     formula = "c u (I2 - I1)"
 
-    def reach(self, mode: LoadingMode, stretch: FloatArray) -> tuple[float, float]:
+    def reach(self, mode: Path, stretch: FloatArray) -> tuple[float, float]:
         return 0.0, 1.0
 
-    def stress_features(
-        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
-    ) -> FloatArray:
+    def stress_features(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         first, second = invariant_rates(mode, stretch)
         return (second - first)[:, None]
 
-    def stress_variance(
-        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
-    ) -> FloatArray:
+    def stress_variance(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         return self.stress_features(mode, stretch, reach, length)[:, 0] ** 2
 
 
@@ -97,29 +89,25 @@ class ProcessBlock(EnergyBlock):
     """Variance, relative to the largest, that may be left out."""
 
     @abstractmethod
-    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coordinates(self, mode: Path, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return z and v, (n, m) each."""
 
     @abstractmethod
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
         """Return cov(q(z), q(z')) for c = 1; arrays broadcast."""
 
-    def reach(self, mode: LoadingMode, stretch: FloatArray) -> tuple[float, float]:
+    def reach(self, mode: Path, stretch: FloatArray) -> tuple[float, float]:
         z, _ = self.coordinates(mode, stretch)
         return min(0.0, float(z.min())), max(0.0, float(z.max()))
 
-    def stress_features(
-        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
-    ) -> FloatArray:
+    def stress_features(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         scale = length * (reach[1] - reach[0])
         pivots, triangle = _pivots(self, reach, scale)
         z, v = self.coordinates(mode, stretch)
         values = np.linalg.solve(triangle, self.covariance(pivots[:, None], z.ravel()[None], scale))
         return np.asarray(np.einsum("rnm,nm->nr", values.reshape(len(pivots), *z.shape), v))
 
-    def stress_variance(
-        self, mode: LoadingMode, stretch: FloatArray, reach: tuple[float, float], length: float
-    ) -> FloatArray:
+    def stress_variance(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         z, v = self.coordinates(mode, stretch)
         with np.errstate(over="ignore"):
             covariance = self.covariance(z[:, :, None], z[:, None, :], length * (reach[1] - reach[0]))
@@ -148,7 +136,7 @@ def _pivots(block: ProcessBlock, reach: tuple[float, float], scale: float) -> tu
 class InvariantBlock(ProcessBlock):
     """dW(I1), with W1 = dW/dI1 a process in a coordinate of x = I1 - 3."""
 
-    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coordinates(self, mode: Path, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
         x, _ = invariants(mode, stretch)
         first, _ = invariant_rates(mode, stretch)
         return self.coordinate(np.maximum(x, 0.0))[:, None], first[:, None]
@@ -212,7 +200,7 @@ class SecondInvariantBlock(ProcessBlock):
     formula = "W2 = c g(y), W1 = -c g(0), cov g = exp(y y' / L^2), y = I2 - 3"
     lengths = (0.7, 1.6, 3.7)
 
-    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coordinates(self, mode: Path, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
         _, y = invariants(mode, stretch)
         first, second = invariant_rates(mode, stretch)
         return np.stack([np.maximum(y, 0.0), np.zeros_like(y)], axis=1), np.stack([second, -first], axis=1)
@@ -224,7 +212,7 @@ class SecondInvariantBlock(ProcessBlock):
 class SeparableBlock(ProcessBlock):
     """dW = sum_k w(l_k) with l w'(l) = c q(ln l), where q(0) = q'(0) = 0."""
 
-    def coordinates(self, mode: LoadingMode, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coordinates(self, mode: Path, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
         return log_stretches(mode, stretch)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.mechanics.material import Material
 from tissuq.parameters import Parameter
 from tissuq.registry import find, variants
@@ -47,7 +47,7 @@ class Discrepancy(ABC):
         """Return the discrepancy for this material and experiment: itself, unless its definition needs to know them."""
         return self
 
-    def mean_basis(self, mode: LoadingMode, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean_basis(self, mode: Path, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the (n, k) mean stresses of unit linear parameters, in their order."""
         return np.zeros((len(stretch), 0))
 

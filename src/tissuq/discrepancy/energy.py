@@ -21,7 +21,7 @@ from tissuq.discrepancy.blocks import (
 )
 from tissuq.discrepancy.discrepancy import Discrepancy
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.parameters import Parameter
 from tissuq.priors import HalfCauchy
 
@@ -70,12 +70,12 @@ class Member:
         """The blocks' names, joined."""
         return "+".join(block.name for block in self.blocks) or "none"
 
-    def stress_features(self, mode: LoadingMode, stretch: FloatArray) -> list[FloatArray]:
+    def stress_features(self, mode: Path, stretch: FloatArray) -> list[FloatArray]:
         """Return the engineering stresses (n, r) of each block's terms."""
         parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
         return [block.stress_features(mode, stretch, reach, length) for block, reach, length in parts]
 
-    def stress_variances(self, mode: LoadingMode, stretch: FloatArray) -> list[FloatArray]:
+    def stress_variances(self, mode: Path, stretch: FloatArray) -> list[FloatArray]:
         """Return the variance (n,) of the stress of each block at unit amplitude."""
         parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
         return [block.stress_variance(mode, stretch, reach, length) for block, reach, length in parts]
@@ -102,7 +102,7 @@ class EnergyDiscrepancy(Discrepancy):
     )
     sums: ClassVar[tuple[Sum, ...]]
 
-    def members(self, mode: LoadingMode, stretch: FloatArray) -> list[Member]:
+    def members(self, mode: Path, stretch: FloatArray) -> list[Member]:
         """Return every sum of blocks at every combination of their length scales, over the range of stretches (n,)."""
         found, total = [], sum(each.odds for each in self.sums)
         for every, odds in self.sums:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy.polynomial import IndependentError, S
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.materials.polynomial import C01, C20, C30, MooneyRivlin, Yeoh
 from tissuq.mechanics.stress import stress_basis
@@ -24,7 +24,7 @@ class HyperelasticTerms(IndependentError):
     terms: ClassVar[tuple[Parameter, ...]]
     is_energy = True
 
-    def mean_basis(self, mode: LoadingMode, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean_basis(self, mode: Path, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         columns = [self.material.parameters.index(term) for term in self.terms]
         return stress_basis(self.material, mode, stretch)[:, columns]
 

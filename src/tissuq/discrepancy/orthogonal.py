@@ -13,7 +13,7 @@ from tissuq.discrepancy.conditioned import RangeProcess, nodes_over
 from tissuq.discrepancy.kernels import squared_exponential
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.stress import stress_basis
 
@@ -39,7 +39,7 @@ class OrthogonalProcess(RangeProcess):
     """
 
     material: Material | None = None
-    mode: LoadingMode | None = None
+    mode: Path | None = None
     ends: tuple[float, float] | None = None
 
     name = "gp-orthogonal"
@@ -72,9 +72,7 @@ class OrthogonalProcess(RangeProcess):
 
 
 @lru_cache(maxsize=64)
-def _weighted_stresses(
-    material: Material, mode: LoadingMode, ends: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
+def _weighted_stresses(material: Material, mode: Path, ends: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
     """Return nodes (m,) over a range, and columns (m, k) whose products with M are its integrals with the stresses.
 
     The stresses of unit parameters are replaced by orthonormal combinations, which the same M are orthogonal to.

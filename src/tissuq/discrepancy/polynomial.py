@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy.discrepancy import Discrepancy
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.parameters import Parameter
 
 __all__ = ["Constant", "IndependentError", "Linear", "Quadratic"]
@@ -31,7 +31,7 @@ class Polynomial(IndependentError):
     degree: ClassVar[int]
     caution = "Its mean takes a share of the initial stiffness, so the material's modulus may be far off."
 
-    def mean_basis(self, mode: LoadingMode, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean_basis(self, mode: Path, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.vander(stretch, self.degree + 1, increasing=True)
 
 

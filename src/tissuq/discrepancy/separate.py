@@ -1,4 +1,4 @@
-"""A discrepancy in stress on several tests: another one in each, of the same size."""
+"""A discrepancy in stress on several measured stresses: another one in each, of the same size."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy.discrepancy import Discrepancy
+from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode
-from tissuq.mechanics.joint import ABSCISSA, TEST
+from tissuq.experiments.modes import Path
+from tissuq.mechanics.joint import ABSCISSA, CURVE
 from tissuq.mechanics.material import Material
 from tissuq.parameters import Parameter
 
@@ -24,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Separate(Discrepancy):
-    """Independent copies of a discrepancy, one for each test: an error of one mode's stress says nothing of another's.
+    """Independent copies of a discrepancy, one for each stress of each test: an error of one says nothing of another.
 
     Means have parameters of their own (m0_1, m0_2, in the order of the tests); S, c and psi are shared. S counts in
     proportion to the noise of each test.
@@ -41,16 +42,16 @@ class Separate(Discrepancy):
         """Those of the means for every test, and the shared ones."""
         own = self.every[0].parameters
         means = [
-            replace(each, symbol=f"{each.symbol}_{number}", description=f"{each.description}, test {number}")
+            replace(each, symbol=f"{each.symbol}_{number}", description=f"{each.description}, curve {number}")
             for number in range(1, len(self.every) + 1)
             for each in own
             if each.is_linear
         ]
         return (*means, *(each for each in own if not each.is_linear))
 
-    def mean_basis(self, mode: LoadingMode, stretch: FloatArray) -> FloatArray:
+    def mean_basis(self, mode: Path, stretch: FloatArray) -> FloatArray:
         blocks = [
-            each.mean_basis(mode, stretch[:, ABSCISSA]) * (stretch[:, TEST] == number)[:, None]
+            each.mean_basis(mode, stretch[:, ABSCISSA]) * (stretch[:, CURVE] == number)[:, None]
             for number, each in enumerate(self.every)
         ]
         return np.hstack(blocks)
@@ -63,22 +64,34 @@ class Separate(Discrepancy):
 
     def correlation(self, first: Any, second: Any, values: Mapping[str, Any]) -> Any:
         return sum(
-            (first[:, TEST] == number)[:, None]
-            * (second[:, TEST] == number)
+            (first[:, CURVE] == number)[:, None]
+            * (second[:, CURVE] == number)
             * each.correlation(first[:, ABSCISSA], second[:, ABSCISSA], values)
             for number, each in enumerate(self.every)
         )
 
     def relative_variance(self, stretch: Any, values: Mapping[str, Any]) -> Any:
         return sum(
-            (stretch[:, TEST] == number) * each.relative_variance(stretch[:, ABSCISSA], values)
+            (stretch[:, CURVE] == number) * each.relative_variance(stretch[:, ABSCISSA], values)
             for number, each in enumerate(self.every)
         )
 
 
 def separated(discrepancy: Discrepancy, material: Material, experiment: Experiment) -> Discrepancy:
-    """Return a discrepancy as adapted to material and experiment; one in stress on several tests, to each of them."""
+    """Return a discrepancy as adapted to material and experiment; one in stress, to each of several measured stresses.
+
+    Raises
+    ------
+    ModelError
+        When it depends on the range of one stretch, and a test has more than one or several stresses.
+    """
     is_one = discrepancy.is_energy or not discrepancy.parameters or isinstance(discrepancy, Separate)
-    if len(experiment.parts) == 1 or is_one:
+    if len(experiment.curves) == 1 or is_one:
         return discrepancy.adapted_to(material, experiment)
-    return Separate(tuple(discrepancy.adapted_to(material, part) for part in experiment.parts))
+    wide = next((part for part in experiment.parts if part.stretch.ndim > 1 or part.stress.ndim > 1), None)
+    if wide is not None and type(discrepancy).adapted_to is not Discrepancy.adapted_to:
+        raise ModelError(
+            f"discrepancy '{discrepancy.name}' is defined over the range of one stretch, and mode '{wide.mode.name}' "
+            f"of experiment '{wide.name}' has several controls or stresses: choose another one, such as 'auto'."
+        )
+    return Separate(tuple(discrepancy.adapted_to(material, part) for part, _, _ in experiment.curves))

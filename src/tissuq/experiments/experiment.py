@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.modes import LoadingMode, Path, loading_mode
 
 __all__ = ["Experiment", "checked_points"]
 
@@ -105,9 +105,23 @@ class Experiment:
         """The different modes of its tests."""
         return tuple(dict.fromkeys(part.mode for part in self.parts))
 
-    def along(self, mode: LoadingMode, points: NDArray[np.float64]) -> tuple[LoadingMode, NDArray[np.float64]]:
-        """Return a path and its points that stand for points of a mode: what models of this experiment speak of."""
-        return mode, points
+    @property
+    def curves(self) -> list[tuple[Experiment, int, NDArray[np.float64]]]:
+        """Every measured stress (n,) of its tests: the test, the number of the stress in its mode, and the values."""
+        return [
+            (part, number, stress)
+            for part in self.parts
+            for number, stress in enumerate(part.stress.reshape(len(part.stress), -1).T)
+        ]
+
+    def along(
+        self, mode: LoadingMode, points: NDArray[np.float64], channel: int = 0
+    ) -> tuple[Path, NDArray[np.float64]]:
+        """Return a path and its points that stand for points of a mode: what models of this experiment speak of.
+
+        ``channel`` is the number of the stress, where the mode has several.
+        """
+        return mode.channels[channel], points
 
     def joined(self, other: Experiment) -> Experiment:
         """Return this experiment with the measurements of another one in the same loading mode added.

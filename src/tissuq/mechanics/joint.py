@@ -13,12 +13,12 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Deformation, LoadingMode, Path
 from tissuq.mechanics.path import STEP
 
-__all__ = ["ABSCISSA", "TEST", "JointExperiment", "Rows", "joined", "rows_along"]
+__all__ = ["ABSCISSA", "CURVE", "JointExperiment", "Rows", "joined", "rows_along"]
 
 FloatArray = NDArray[np.float64]
 
-TEST, ABSCISSA, STRETCHES, RATES, PLANE, PLANE_RATES = 0, 1, slice(2, 5), slice(5, 8), slice(8, 11), slice(11, 14)
-"""Columns of a row: its test, what it is drawn against, and deformation and rate of it along the measured stress."""
+CURVE, ABSCISSA, STRETCHES, RATES, PLANE, PLANE_RATES = 0, 1, slice(2, 5), slice(5, 8), slice(8, 11), slice(11, 14)
+"""Columns of a row: its curve, what that is drawn against, and the deformation and its rate along the stress."""
 
 
 class Rows(LoadingMode):
@@ -44,11 +44,11 @@ class Rows(LoadingMode):
         return points[..., ABSCISSA]
 
 
-def rows_along(path: Path, points: FloatArray, test: int) -> FloatArray:
-    """Return the rows (n, 14) of points on a path, measured in a test of that number (-1: in none)."""
+def rows_along(path: Path, points: FloatArray, curve: int) -> FloatArray:
+    """Return the rows (n, 14) of points on a path, measured in a curve of that number (-1: in none)."""
     moved = path.moved(points, 1j * STEP)
     found = np.empty((len(points), PLANE_RATES.stop))
-    found[:, TEST], found[:, ABSCISSA] = test, path.abscissa(points)
+    found[:, CURVE], found[:, ABSCISSA] = curve, path.abscissa(points)
     for parts, values, rates in ((moved.stretches, STRETCHES, RATES), (moved.plane, PLANE, PLANE_RATES)):
         columns = np.stack([np.broadcast_to(each, len(points)).astype(complex) for each in parts], axis=1)
         found[:, values], found[:, rates] = columns.real, columns.imag / STEP / path.loaded_axes
@@ -70,9 +70,8 @@ class JointExperiment(Experiment):
     _parts: tuple[Experiment, ...]
 
     def __init__(self, parts: Sequence[Experiment]) -> None:
-        rows = [
-            rows_along(path, part.stretch, number) for number, part in enumerate(parts) for path in part.mode.channels
-        ]
+        paths = [(path, part) for part in parts for path in part.mode.channels]
+        rows = [rows_along(path, part.stretch, curve) for curve, (path, part) in enumerate(paths)]
         values = {
             "_parts": tuple(parts),
             "specimen": "",
@@ -91,10 +90,10 @@ class JointExperiment(Experiment):
         """The tests."""
         return self._parts
 
-    def along(self, mode: LoadingMode, points: FloatArray) -> tuple[LoadingMode, FloatArray]:
+    def along(self, mode: LoadingMode, points: FloatArray, channel: int = 0) -> tuple[Path, FloatArray]:
         """Return the path of rows and those of points of a mode, as measured in the first test of that mode."""
-        tests = [number for number, part in enumerate(self.parts) if part.mode == mode]
-        return self.mode, rows_along(mode, points, tests[0] if tests else -1)
+        own = [curve for curve, (part, number, _) in enumerate(self.curves) if (part.mode, number) == (mode, channel)]
+        return self.mode, rows_along(mode.channels[channel], points, own[0] if own else -1)
 
     def __len__(self) -> int:
         return len(self.stress)
@@ -114,6 +113,8 @@ def joined(tests: Experiment | Sequence[Experiment]) -> Experiment:
     InputError
         When there is none.
     """
+    if isinstance(tests, JointExperiment):
+        return tests
     parts = (tests,) if isinstance(tests, Experiment) else tuple(tests)
     if not parts:
         raise InputError("there is no experiment to fit.")

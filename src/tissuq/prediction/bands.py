@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,6 +46,7 @@ def predict_band(
     noise: bool = True,
     prob: float = 0.95,
     mode: str | LoadingMode | None = None,
+    channel: int = 0,
 ) -> Band:
     """Return the mean stress and the interval that holds ``prob`` of it, at each stretch.
 
@@ -62,13 +64,16 @@ def predict_band(
         Probability between the ends, equal tails.
     mode : str or LoadingMode, optional
         Another loading mode than that of the data.
+    channel : int
+        Which of the mode's stresses, from 0, where it has several.
 
     Raises
     ------
     InputError
         When a stretch is not positive, prob is not between 0 and 1, or the discrepancy says nothing about the mode.
     """
-    return predict_average([(1.0, solution)], stretch, discrepancy=discrepancy, noise=noise, prob=prob, mode=mode)
+    options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
+    return predict_average([(1.0, solution)], stretch, **options, channel=channel)
 
 
 def predict_average(
@@ -79,6 +84,7 @@ def predict_average(
     noise: bool = True,
     prob: float = 0.95,
     mode: str | LoadingMode | None = None,
+    channel: int = 0,
 ) -> Band:
     """Return the band of a mixture of posteriors of the same data, with weights that sum to one.
 
@@ -88,6 +94,8 @@ def predict_average(
     points = checked_points(asked, np.atleast_1d(stretch))
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    if not 0 <= channel < len(asked.stresses):
+        raise InputError(f"mode '{asked.name}' has the stresses {', '.join(asked.stresses)}: no number {channel}.")
     for _, solution in parts if discrepancy else ():
         _check_mode(solution, asked)
     count = FEW if len(points) > BLOCK else MANY
@@ -97,21 +105,22 @@ def predict_average(
     curves = []
     for block in np.array_split(points, max(1, len(points) // BLOCK)):
         moments = [
-            _moments(model, components, block, asked, discrepancy=discrepancy, noise=noise)
+            _moments(model, components, block, asked, channel, discrepancy=discrepancy, noise=noise)
             for _, model, components in mixture
         ]
         mean, variance = (np.concatenate(each) for each in zip(*moments, strict=True))
         ends = [_mixture_quantile(tail, weights, mean, variance) for tail in tails]
         curves.append([weights @ mean, *ends])
-    return Band(points, *np.concatenate(curves, axis=1))
+    return Band(asked.channels[channel].abscissa(points), *np.concatenate(curves, axis=1))
 
 
 def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
     """Return the share of the measurements inside the predictive band at their own stretches."""
     inside = []
-    for data in solution.model.experiment.parts:
-        band = predict_band(solution, data.stretch, discrepancy=discrepancy, prob=prob, mode=data.mode)
-        inside.append((band.low <= data.stress) & (data.stress <= band.high))
+    for test, channel, stress in solution.model.experiment.curves:
+        options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": test.mode, "channel": channel}
+        band = predict_band(solution, test.stretch, **options)
+        inside.append((band.low <= stress) & (stress <= band.high))
     return float(np.mean(np.concatenate(inside)))
 
 
@@ -120,14 +129,15 @@ def _moments(
     components: Components,
     points: FloatArray,
     mode: LoadingMode,
+    channel: int,
     *,
     discrepancy: bool,
     noise: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean and variance (M, g) of the stress at points of a mode; those of a new test with its own errors."""
+    """Return mean and variance (M, g) of a stress at points of a mode; those of a new test with its own errors."""
 
     def at(points: FloatArray, noise: bool) -> tuple[FloatArray, FloatArray]:
-        path, rows = model.experiment.along(mode, points)
+        path, rows = model.experiment.along(mode, points, channel)
         return stress_moments(model, components, rows, discrepancy=discrepancy, noise=noise, mode=path)
 
     mean, variance = at(points, noise)

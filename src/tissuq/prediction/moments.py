@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.discrepancy import side_by_side
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes import Path
 from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
@@ -93,7 +93,7 @@ def coefficients(model: StatisticalModel, components: Components) -> tuple[Float
 
 
 def basis_of(
-    model: StatisticalModel, stretch: FloatArray, settings: FloatArray, mode: LoadingMode | None = None
+    model: StatisticalModel, stretch: FloatArray, settings: FloatArray, mode: Path | None = None
 ) -> FloatArray:
     """Return the mean stresses of unit coefficients: (g, k), or (M, g, k) where they depend on settings (M, d)."""
     if not model.bent_symbols:
@@ -164,7 +164,7 @@ def stress_moments(
     *,
     discrepancy: bool,
     noise: bool,
-    mode: LoadingMode | None = None,
+    mode: Path | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean (M, g) and variance (M, g) of the stress at stretches (g,), for every component.
 
@@ -212,7 +212,7 @@ def drawn_curves(
     components: Components,
     stretch: FloatArray,
     seed: int = 0,
-    mode: LoadingMode | None = None,
+    mode: Path | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return stresses (M, g) of the material alone and of the discrepancy, one joint draw for every component.
 
@@ -254,7 +254,7 @@ def _condition_jointly(
 
 
 def _energies(
-    model: StatisticalModel, components: Components, stretch: FloatArray, mode: LoadingMode | None = None
+    model: StatisticalModel, components: Components, stretch: FloatArray, mode: Path | None = None
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
     """Yield means (N, g), roots (N, g, p) and further variances (N, g) of energy discrepancies, and whose they are.
 

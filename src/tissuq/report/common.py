@@ -19,11 +19,17 @@ __all__ = ["write_data", "write_figures", "write_posteriors", "write_recipe", "w
 
 
 def write_data(folder: Path, experiment: Experiment) -> None:
-    """Write the measurements as fitted: stretch and engineering stress in MPa, in full precision."""
-    rows = [
-        {"stretch": float(stretch), "stress": float(stress)}
-        for stretch, stress in zip(experiment.stretch, experiment.stress, strict=True)
-    ]
+    """Write the measurements as fitted: stretch and engineering stress in MPa, in full precision.
+
+    Of several tests with the name of each and its mode.
+    """
+    rows: list[Row] = []
+    for test, number, stresses in experiment.curves:
+        own = {"test": test.name, "mode": test.mode.name, "measured": test.mode.stresses[number]}
+        at = test.mode.channels[number].abscissa(test.stretch)
+        pairs = zip(map(float, at), map(float, stresses), strict=True)
+        several = own if len(experiment.curves) > 1 else {}
+        rows += [several | {"stretch": stretch, "stress": stress} for stretch, stress in pairs]
     write_csv(folder / "data.csv", rows)
 
 
@@ -50,10 +56,10 @@ def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
         save_figure(figure, folder / "figures", name)
 
 
-def write_recipe(folder: Path, command: str, settings: BaseModel) -> None:
-    """Write run.toml, from which ``tissuq COMMAND --config`` repeats the run."""
+def write_recipe(folder: Path, command: str, settings: BaseModel, without: frozenset[str] = frozenset()) -> None:
+    """Write run.toml, from which ``tissuq COMMAND --config`` repeats the run; ``without`` settings of no meaning."""
     import tomli_w
 
-    plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True)
+    plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
     header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")

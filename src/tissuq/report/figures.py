@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import LOST
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
-from tissuq.prediction.bands import Band, predict_band, share_inside
+from tissuq.prediction.bands import Band, predict_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +48,9 @@ def predictive_figure(
     unit: StressUnit,
     true_curve: tuple[FloatArray, FloatArray] | None = None,
 ) -> Figure:
-    """Return one panel a formulation: data, 95 % predictive band and mean, the band of "none" for comparison.
+    """Return one panel a formulation, or one for each measured stress: data, 95 % predictive band and mean.
+
+    With the mean of "none" for comparison.
 
     Stretches at which what is drawn has lost its stability with more than 5 % are shaded; a discrepancy that is no
     energy has none to lose, so that its panels are shaded for the model alone only.
@@ -66,37 +69,55 @@ def predictive_figure(
     from matplotlib import rc_context
 
     with rc_context(STYLE):
-        figure, axes = _panels(len(posteriors))
-        experiment = next(iter(posteriors.values())).model.experiment
-        stretch = np.linspace(experiment.stretch.min(), experiment.stretch.max(), 161)
-        bands = {
-            name: predict_band(posterior.solution, stretch, discrepancy=discrepancy)
-            for name, posterior in posteriors.items()
-        }
-        for axis, (name, posterior) in zip(axes, posteriors.items(), strict=False):
-            share = share_inside(posterior.solution, discrepancy=discrepancy)
-            inside = f"{round(share * len(experiment))} of {len(experiment)} inside"
-            axis.set_title(f"{name}:  {inside}")
-            _draw_band(axis, bands[name], unit)
-            if discrepancy == has_energy(posterior.model) or name == "none":
-                _shade_instability(axis, posterior, stretch)
-            if name != "none" and "none" in bands:
-                axis.plot(
-                    stretch,
-                    bands["none"].mean / unit.to_mpa,
-                    ":",
-                    color=BASE,
-                    lw=1.4,
-                    label="mean of the fit 'none'",
-                )
+        curves = next(iter(posteriors.values())).model.experiment.curves
+        panels = [(name, *curve) for name in posteriors for curve in curves]
+        figure, axes = _panels(len(panels), is_shared=len(curves) == 1)
+        bands = [_band_over(posteriors[name], test, channel, discrepancy) for name, test, channel, _ in panels]
+        base = bands[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
+        for place, (axis, (name, test, channel, stress)) in enumerate(zip(axes, panels, strict=False)):
+            posterior, band = posteriors[name], bands[place]
+            at = test.mode.channels[channel].abscissa(test.stretch)
+            inside = _inside(posterior, test, channel, stress, discrepancy)
+            which = [name] * (len(posteriors) > 1) + [_name_of(test, channel)] * (len(curves) > 1) or [name]
+            axis.set_title(f"{', '.join(which)}:  {inside} of {len(stress)} inside")
+            _draw_band(axis, band, unit)
+            if test.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
+                _shade_instability(axis, posterior, test.mode.name, band.stretch)
+            if name != "none" and base:
+                own = base[place % len(curves)]
+                axis.plot(own.stretch, own.mean / unit.to_mpa, ":", color=BASE, lw=1.4, label="mean of the fit 'none'")
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
-            axis.plot(experiment.stretch, experiment.stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
-        limits = _common_limits(experiment.stress, [*bands.values()], unit)
-        for axis in axes[: len(posteriors)]:
-            axis.set_ylim(limits)
-        _label(figure, axes, len(posteriors), experiment.mode, unit)
+            axis.plot(at, stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
+            if len(curves) > 1:
+                axis.set_xlabel(test.mode.controls[0].name, fontsize=9)
+        if len(curves) == 1:
+            limits = _common_limits(curves[0][2], bands, unit)
+            for axis in axes[: len(panels)]:
+                axis.set_ylim(limits)
+        _label(figure, axes, len(panels), [test.mode for test, _, _ in curves], unit)
     return figure
+
+
+def _name_of(test: Experiment, channel: int) -> str:
+    return f"{test.name}, {test.mode.stresses[channel]}" if len(test.mode.stresses) > 1 else test.name
+
+
+def _band_over(posterior: Posterior, test: Experiment, channel: int, discrepancy: bool) -> Band:
+    """Return the band of a stress over the range of a test, or at its points where it has several controls."""
+    points = test.stretch
+    if points.ndim > 1:
+        points = points[np.argsort(test.mode.channels[channel].abscissa(points), kind="stable")]
+    else:
+        points = np.linspace(points.min(), points.max(), 161)
+    return predict_band(posterior.solution, points, discrepancy=discrepancy, mode=test.mode, channel=channel)
+
+
+def _inside(posterior: Posterior, test: Experiment, channel: int, stress: FloatArray, discrepancy: bool) -> int:
+    """Return how many measurements are inside the band at their own places."""
+    options: dict[str, Any] = {"mode": test.mode, "channel": channel, "discrepancy": discrepancy}
+    band = predict_band(posterior.solution, test.stretch, **options)
+    return int(((band.low <= stress) & (stress <= band.high)).sum())
 
 
 def marginal_figure(
@@ -134,14 +155,14 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
         figure.savefig(folder / f"{name}.png", dpi=150, metadata={"Software": None})
 
 
-def _panels(count: int) -> tuple[Figure, list[Axes]]:
+def _panels(count: int, is_shared: bool) -> tuple[Figure, list[Axes]]:
     from matplotlib.figure import Figure
 
     columns = _columns(count)
     rows = ceil(count / columns)
     width = {1: 6.0, 2: 9.2, 3: 11.5}[columns]
     figure = Figure(figsize=(width, 3.3 * rows + 0.5))
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=is_shared)
     return figure, list(axes.ravel())
 
 
@@ -155,8 +176,8 @@ def _draw_band(axis: Axes, band: Band, unit: StressUnit) -> None:
     axis.plot(band.stretch, mean, color=BAND, lw=1.6, label="predicted mean")
 
 
-def _shade_instability(axis: Axes, posterior: Posterior, stretch: FloatArray) -> None:
-    found = posterior.stable_ranges.get(posterior.model.experiment.mode.name)
+def _shade_instability(axis: Axes, posterior: Posterior, mode: str, stretch: FloatArray) -> None:
+    found = posterior.stable_ranges.get(mode)
     if found is None:
         return
     label = f"stability lost with more than {100 * LOST:.0f} %"
@@ -189,12 +210,14 @@ def _common_limits(stress: FloatArray, bands: Sequence[Band], unit: StressUnit) 
     return (low - margin) / unit.to_mpa, (high + margin) / unit.to_mpa
 
 
-def _label(figure: Figure, axes: list[Axes], count: int, mode: LoadingMode, unit: StressUnit) -> None:
+def _label(figure: Figure, axes: list[Axes], count: int, modes: Sequence[LoadingMode], unit: StressUnit) -> None:
     for spare, above in zip(axes[count:], axes[count - _columns(count) :], strict=False):
         spare.set_visible(False)
         above.tick_params(labelbottom=True)
-    figure.supxlabel(mode.controls[0].name, fontsize=10.5)
-    figure.supylabel(f"{mode.stresses[0]} [{unit.name}]", fontsize=10.5)
+    if len(modes) == 1:
+        figure.supxlabel(modes[0].controls[0].name, fontsize=10.5)
+    measured = {stress for mode in modes for stress in mode.stresses}
+    figure.supylabel(f"{measured.pop() if len(measured) == 1 else 'engineering stress'} [{unit.name}]", fontsize=10.5)
     handles: dict[str, Any] = {}
     for axis in axes[:count]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):

@@ -10,8 +10,16 @@ from tissuq.assessment.stability import LOST
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
 from tissuq.report.tables import headline_of
+from tissuq.whitening import Tolerances
 
-__all__ = ["readable_methods", "readable_parameters", "readable_stability", "readable_summary", "significant"]
+__all__ = [
+    "readable_methods",
+    "readable_parameters",
+    "readable_stability",
+    "readable_summary",
+    "significant",
+    "tolerances_in_words",
+]
 
 Row = dict[str, Any]
 
@@ -120,3 +128,14 @@ def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -
             row = [formulation, parameter.symbol, name, prior, interval(median, median, spread)[0], *moments]
             rows.append([*row, f"[{ends[0]}, {ends[1]}]"])
     return rows
+
+
+def tolerances_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
+    """Return by how much whole tests may be off, in words; nothing where they may not."""
+    parts = {
+        "stress": f"{tolerances.stress:.3g} of the stress, as between specimens",
+        "length": f"{tolerances.length:.3g} of the strain",
+        "slack": f"{tolerances.slack:.3g} of stretch by slack",
+        "zero": f"{tolerances.zero / unit.to_mpa:.3g} {unit.name} at rest",
+    }
+    return ", ".join(text for name, text in parts.items() if getattr(tolerances, name))

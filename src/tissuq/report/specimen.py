@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
+from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics.user_law import LAW
 from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
@@ -17,9 +19,11 @@ from tissuq.report.rows import (
     readable_stability,
     readable_summary,
     significant,
+    tolerances_in_words,
 )
 from tissuq.report.run_folder import ASSESSMENT, RECIPE
 from tissuq.report.tables import Row, stability_cells, stability_rows, summary_row, write_csv, write_json
+from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenStudy
 
 if TYPE_CHECKING:
@@ -31,25 +35,25 @@ INPUT = "input"
 """The folder of a run that holds a copy of the user's file, so that the run can be repeated."""
 
 
-def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figures: bool = True) -> None:
+def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
     """Write everything that a fit leaves behind into an empty folder.
 
     Parameters
     ----------
     study : SpecimenStudy
-    source : Path
-        The file that was read; a copy goes with the run.
+    sources : sequence of Path
+        The files that were read; copies go with the run.
     folder : Path
         Exists and is empty.
     figures : bool
         Draw them, too.
     """
     (folder / INPUT).mkdir()
-    shutil.copyfile(source, folder / INPUT / source.name)
-    kept = {"file": f"{INPUT}/{source.name}", "material": _with_laws(study.settings.material, folder)}
+    kept = _with_files(study, sources, folder) | {"material": _with_laws(study.settings.material, folder)}
     named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
     command = f"fit{'' if figures else ' --no-figures'}{named}"
-    write_recipe(folder, command, study.settings.model_copy(update=kept))
+    of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
+    write_recipe(folder, command, study.settings.model_copy(update=kept), without=of_one_file)
     write_data(folder, study.experiment)
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
@@ -62,6 +66,20 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
         write_figures(folder, _figures(study))
     page = render("specimen.html", **_context(study, summary, folder), command=command)
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _with_files(study: SpecimenStudy, sources: Sequence[Path], folder: Path) -> dict[str, Any]:
+    """Return the settings of what was measured with the names of the files' copies, which go with the run."""
+    names = [source.name for source in sources]
+    copies = [
+        f"{INPUT}/{place}-{name}" if names.count(name) > 1 else f"{INPUT}/{name}" for place, name in enumerate(names, 1)
+    ]
+    for source, copy in zip(sources, copies, strict=True):
+        shutil.copyfile(source, folder / copy)
+    if not study.settings.tests:
+        return {"file": copies[0]}
+    pairs = zip(study.settings.tests, study.experiment.parts, copies, strict=True)
+    return {"tests": tuple(test.model_copy(update={"file": copy, "name": part.name}) for test, part, copy in pairs)}
 
 
 def _with_laws(material: str, folder: Path) -> str:
@@ -101,11 +119,13 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
 
 def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
     noise = next(iter(study.posteriors.values())).model.noise
-    known = f"sd {study.settings.noise_sd:g} {study.unit.name}" if not noise.parameters else ""
+    known = "" if noise.parameters else f"sd {_known_noise(study)} {study.unit.name}"
     return {
         "headline": study.headline,
         "settings": study.settings,
         "experiment": study.experiment,
+        "tests": [_test_line(part) for part in study.experiment.parts],
+        "tolerances": tolerances_in_words(next(iter(study.posteriors.values())).model.tolerances, study.unit),
         "unit": study.unit.name,
         "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
         "lead": _lead(summary, study),
@@ -125,6 +145,18 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         "skipped": study.skipped,
         "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
+
+
+def _known_noise(study: SpecimenStudy) -> str:
+    every = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
+    return ", ".join(f"{each:g}" for each in every) or f"{study.settings.noise_sd:g}"
+
+
+def _test_line(test: Experiment) -> str:
+    """Return a test in a few words: its mode, measurements and range."""
+    control, first = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
+    of = f" of specimen {test.specimen}" if test.specimen else ""
+    return f"{test.mode.name} test{of}, {len(test)} measurements, {control} {first.min():.4g} to {first.max():.4g}"
 
 
 def _lead(summary: list[Row], study: SpecimenStudy) -> str:

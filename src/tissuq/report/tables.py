@@ -94,7 +94,9 @@ def stability_cells(posterior: Posterior) -> Row:
 
     None where it is hardly ever lost.
     """
-    found = posterior.stable_ranges.get(posterior.model.experiment.mode.name)
+    modes = [mode.name for mode in posterior.model.experiment.modes]
+    every = [found for name, found in posterior.stable_ranges.items() if name in modes]
+    found = min(every, key=lambda found: found.probability, default=None)
     if found is None:
         return dict.fromkeys(STABILITY)
     places = found.loss[1:] if found.loss.probability > LOST else (None, None, None)

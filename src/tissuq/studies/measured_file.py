@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -10,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import Reading, ReadingOptions, read_file
 
-__all__ = ["MeasuredFile"]
+__all__ = ["MeasuredFile", "MeasuredTest"]
 
 
 class MeasuredFile(BaseModel):
@@ -48,3 +49,17 @@ class MeasuredFile(BaseModel):
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements; a relative file lies in ``folder``."""
         return self.reading(folder).experiment
+
+
+class MeasuredTest(MeasuredFile):
+    """One of several files that are fitted together."""
+
+    name: str | None = None
+    specimen: str = ""
+    noise_sd: float | None = Field(None, gt=0)
+
+    def reading(self, folder: Path = Path()) -> Reading:
+        """Read the file, and say which specimen it was."""
+        found = super().reading(folder)
+        named = replace(found.experiment, name=self.name or found.experiment.name, specimen=self.specimen)
+        return replace(found, experiment=named)

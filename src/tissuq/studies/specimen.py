@@ -1,8 +1,9 @@
-"""The study of one measured file: a material fitted with each chosen discrepancy."""
+"""The study of one measured file, or of several: a material fitted with each chosen discrepancy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -12,18 +13,21 @@ from typing import Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from tissuq.assessment import Assessment, design_warnings
-from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named
+from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named, separated
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.doubts import doubts
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.reading import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.fitting import Method, fit
 from tissuq.mechanics import Material, material_named
+from tissuq.mechanics.joint import joined
 from tissuq.noise import Noise, noise_named
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
-from tissuq.studies.measured_file import MeasuredFile
+from tissuq.studies.measured_file import MeasuredFile, MeasuredTest
+from tissuq.whitening import Tolerances
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
 
@@ -32,8 +36,14 @@ ALL = "all"
 
 
 class SpecimenSettings(MeasuredFile):
-    """Everything that a fit of a file depends on; stresses (noise, priors) in the file's unit of stress."""
+    """Everything that a fit depends on; stresses (noise, priors) in the unit of stress of the file, or the first one.
 
+    It is of one ``file``, or of several ``tests`` together.
+    """
+
+    file: str = ""
+    tests: tuple[MeasuredTest, ...] = ()
+    tolerances: dict[Literal["stress", "length", "slack", "zero"], float] | None = None
     material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     noise_sd: float | Literal["unknown"] = "unknown"
@@ -66,8 +76,39 @@ class SpecimenSettings(MeasuredFile):
             raise ValueError(f"give noise_sd or noise, not both (noise_sd is {self.noise_sd}, noise is '{self.noise}')")
         return self
 
+    @model_validator(mode="after")
+    def _measured(self) -> Self:
+        if bool(self.file) == bool(self.tests):
+            raise ValueError("give one file, or several tests with a file each")
+        reading = set(MeasuredFile.model_fields) - {"file"}
+        if self.tests and self.model_fields_set & reading:
+            where = ", ".join(sorted(self.model_fields_set & reading))
+            raise ValueError(f"how files are read is said in each of the tests, not beside them ({where})")
+        told = [test.noise_sd is not None for test in self.tests]
+        if any(told) and (not all(told) or self.noise or self.noise_sd != "unknown"):
+            raise ValueError("give noise_sd in each of the tests, or once for all")
+        return self
+
+    def readings(self, folder: Path = Path()) -> list[Reading]:
+        """Read the file, or those of all tests; relative ones lie in ``folder``."""
+        return [test.reading(folder) for test in self.tests] or [self.reading(folder)]
+
+    def experiment(self, folder: Path = Path()) -> Experiment:
+        """Read the measurements, of all tests together."""
+        return joined([reading.experiment for reading in self.readings(folder)])
+
+    def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
+        """Return the tolerances, those of stresses converted from a unit to MPa; None for the usual ones."""
+        if self.tolerances is None:
+            return None
+        scale = {"zero": unit.to_mpa}
+        return Tolerances(**{name: value * scale.get(name, 1.0) for name, value in self.tolerances.items()})
+
     def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise, a known standard deviation converted from a unit to MPa."""
+        """Return the noise, known standard deviations converted from a unit to MPa."""
+        every = [test.noise_sd for test in self.tests if test.noise_sd is not None]
+        if every:
+            return noise_named([each * unit.to_mpa for each in every])
         if self.noise_sd == "unknown":
             return noise_named(self.noise or "unknown")
         return noise_named(self.noise_sd * unit.to_mpa)
@@ -91,7 +132,7 @@ class SpecimenStudy:
 
     @property
     def unit(self) -> StressUnit:
-        """The unit in which the file gives stresses."""
+        """The unit in which the file, or the first of several, gives stresses."""
         return stress_unit(self.experiment.stress_unit)
 
     @property
@@ -125,7 +166,7 @@ def run_specimen(
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
 ) -> SpecimenStudy:
-    """Read the file and fit the material with every chosen discrepancy.
+    """Read the file, or those of several tests, and fit the material with every chosen discrepancy.
 
     Settings may come from a file, so that a law of the user's own which they name is not run; it is given as ``law``.
 
@@ -135,18 +176,19 @@ def run_specimen(
         When file or settings cannot be used. A discrepancy that cannot be fitted is an error when it was named, and
         is skipped with the reason when all were asked for.
     """
-    reading = settings.reading(folder)
-    experiment = reading.experiment
+    readings = settings.readings(folder)
+    experiment = joined([reading.experiment for reading in readings])
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
     is_all = settings.discrepancies == (ALL,)
     names = _every() if is_all else list(dict.fromkeys(settings.discrepancies))
-    priors = _priors(settings, material, names, unit)
+    symbols = {name: _parameters(settings, material, name, experiment) for name in names}
+    priors = _priors(settings, symbols, unit)
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
         start = perf_counter()
-        own = {p.symbol for p in _parameters(settings, material, name)}
+        own = {p.symbol for p in symbols[name]}
         if is_all and len(experiment) < len(own):
             skipped[name] = f"{len(experiment)} measurements are too few for its parameters {', '.join(sorted(own))}."
             continue
@@ -157,6 +199,7 @@ def run_specimen(
                 discrepancy=name,
                 noise=settings.noise_in(unit),
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
+                tolerances=settings.tolerances_in(unit),
                 method=settings.method,
                 seed=settings.seed,
             )
@@ -170,7 +213,13 @@ def run_specimen(
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
     step("assessing")
     assessments = {name: each.assess() for name, each in posteriors.items() if name != "none" and not each.diagnostics}
-    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped, assessments, doubts(reading))
+    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings))
+
+
+def _doubts(readings: Sequence[Reading]) -> tuple[str, ...]:
+    """Return what is strange about the files, each with the name of its test where there are several."""
+    every = [(reading.experiment.name, text) for reading in readings for text in doubts(reading)]
+    return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in every)
 
 
 def _every() -> list[str]:
@@ -178,14 +227,21 @@ def _every() -> list[str]:
     return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, others)]
 
 
-def _parameters(settings: SpecimenSettings, material: Material, discrepancy: str) -> tuple[Parameter, ...]:
+def _parameters(
+    settings: SpecimenSettings, material: Material, discrepancy: str, experiment: Experiment
+) -> tuple[Parameter, ...]:
     noise = settings.noise_in(stress_unit("MPa")).parameters
-    return (*material.parameters, *discrepancy_named(discrepancy).parameters, *noise)
+    own = discrepancy_named(discrepancy)
+    with suppress(ModelError):  # which the fit itself raises
+        own = separated(own, material, experiment)
+    return (*material.parameters, *own.parameters, *noise)
 
 
-def _priors(settings: SpecimenSettings, material: Material, names: list[str], unit: StressUnit) -> Mapping[str, Prior]:
+def _priors(
+    settings: SpecimenSettings, parameters: Mapping[str, tuple[Parameter, ...]], unit: StressUnit
+) -> Mapping[str, Prior]:
     """Return the chosen priors in MPa and stretch."""
-    known = {p.symbol: p for name in names for p in _parameters(settings, material, name)}
+    known = {p.symbol: p for own in parameters.values() for p in own}
     unknown = sorted(set(settings.priors) - set(known))
     if unknown:
         raise InputError(f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(known)}.")
