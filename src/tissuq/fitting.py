@@ -8,6 +8,7 @@ from itertools import groupby
 from numbers import Integral
 from typing import Literal
 
+from tissuq.assessment.stable_posterior import StableSolution, modes_named
 from tissuq.discrepancy import Discrepancy, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
@@ -37,6 +38,7 @@ def fit(
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
     method: Method = "auto",
+    stable_in: str | Sequence[str] = (),
     seed: int = 0,
 ) -> Posterior:
     """Identify the parameters of a material from an experiment, with a model discrepancy and noise.
@@ -64,6 +66,9 @@ def fit(
         ``"joint"``: the no-U-turn sampler over all parameters, nothing integrated, as in the paper.
         ``"auto"``: exact where it applies and reaches its tolerance; else nuts, with the evidence from smc.
         The posterior's ``solution.route`` and ``solution.reason`` say what was done and why.
+    stable_in : str or sequence of str
+        Loading modes, or ``"all"``, in which material and energy discrepancy must be stable over the range that was
+        measured: the prior leaves out what is not, and the posterior is known by those of its draws that are.
     seed : int
         Of the draws.
 
@@ -72,7 +77,8 @@ def fit(
     InputError
         When data, noise or priors cannot be used.
     ModelError
-        When the parts do not fit each other, or the method does not apply.
+        When the parts do not fit each other, or the method does not apply, or hardly any of the posterior is stable
+        where that is asked for.
     ConvergenceError
         When the method was asked for by name and cannot reach its tolerance.
 
@@ -99,6 +105,7 @@ def fit(
         noise=noise,
         priors=priors,
         method=method,
+        stable_in=stable_in,
         seed=seed,
     )[0]
 
@@ -112,6 +119,7 @@ def fit_many(
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
     method: Method = "auto",
+    stable_in: str | Sequence[str] = (),
     seed: int = 0,
 ) -> list[Posterior]:
     """Fit many experiments with the same model, each by itself; the parameters are those of `fit`.
@@ -147,7 +155,7 @@ def fit_many(
         raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
     chosen = noise_named(noise if noise is not None else "unknown" if noise_sd is None else noise_sd)
     parts = discrepancy_named(discrepancy), material_named(material), chosen
-    recipe = _Recipe(*parts, dict(priors or {}), method, seed)
+    recipe = _Recipe(*parts, dict(priors or {}), method, modes_named(stable_in), seed)
     keys = [(data.mode.name, data.stretch.tobytes()) for data in datasets]
     found: dict[int, Posterior] = {}
     for _, group in groupby(sorted(range(len(keys)), key=keys.__getitem__), key=keys.__getitem__):
@@ -165,6 +173,7 @@ class _Recipe:
     noise: Noise
     priors: Mapping[str, Prior]
     method: Method
+    stable_in: tuple[str, ...]
     seed: int
 
     def posteriors(self, datasets: Sequence[Experiment]) -> list[Posterior]:
@@ -175,7 +184,10 @@ class _Recipe:
 
     def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
         """Return the posteriors of models on the same stretches."""
-        return [Posterior(solution, self.seed, self.solved) for solution in self._solve(models)]
+        solutions = self._solve(models)
+        if self.stable_in:
+            solutions = [StableSolution(solution, self.stable_in, self.seed) for solution in solutions]
+        return [Posterior(solution, self.seed, self.solved) for solution in solutions]
 
     def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
         """Solve models on the same stretches: together by the exact route, one by one by the others."""

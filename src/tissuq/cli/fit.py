@@ -55,6 +55,10 @@ def fit(
     ] = None,
     skip_rows: Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")] = None,
     method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
+    stable_in: Annotated[
+        list[str] | None,
+        typer.Option(help="Leave out what is not stable in this loading mode, or in all; repeat for more."),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
     config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
@@ -72,7 +76,8 @@ def fit(
         "file": str(_resolve(file)) if file and not config else None, "material": material, "mode": mode,
         "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "stress_unit": stress_unit,
         "stress_type": stress_type, "strain_unit": strain_unit, "compression_positive": compression_positive,
-        "skip_rows": skip_rows, "noise": noise, "method": method, "seed": seed,
+        "skip_rows": skip_rows, "noise": noise, "method": method, "stable_in": stable_in or None,
+        "seed": seed,
     }  # fmt: skip
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))

@@ -49,6 +49,7 @@ class SpecimenSettings(BaseModel):
     noise: Literal["unknown", "proportional", "repeats"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
     method: Method = "auto"
+    stable_in: tuple[str, ...] = ()
     seed: int = Field(0, ge=0)
 
     @field_validator("discrepancies")
@@ -182,6 +183,7 @@ def run_specimen(
                 noise=settings.noise_in(unit),
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
                 method=settings.method,
+                stable_in=settings.stable_in,
                 seed=settings.seed,
             )
             seconds[name] = perf_counter() - start
