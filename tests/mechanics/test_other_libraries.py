@@ -1,14 +1,13 @@
-"""The same laws in another library, where it is installed: `pip install felupe`."""
+"""The same laws in another library."""
 
 from __future__ import annotations
 
+import felupe
 import numpy as np
 import pytest
 
 from closed_forms import MODES
 from tissuq.mechanics import engineering_stress, material_named
-
-felupe = pytest.importorskip("felupe", reason="FElupe is not installed")
 
 STRETCH = np.linspace(0.7, 2.2, 7)
 LIMIT = 22.0
