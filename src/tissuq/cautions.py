@@ -9,6 +9,7 @@ import numpy as np
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import LOST, StableRange
+from tissuq.assessment.stable_posterior import StableSolution
 from tissuq.inference.solution import Solution
 
 __all__ = ["warnings_about"]
@@ -31,6 +32,11 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Ite
         yield solution.diagnostics.verdict
     if ranges and min(found.probability for found in ranges.values()) < UNSTABLE:
         yield _instability(solution, min(ranges.values(), key=lambda found: found.probability))
+    if isinstance(solution, StableSolution) and solution.share < LOST:
+        yield (
+            "the data contradict what was asked for: without stable_in a share of "
+            f"{solution.share:.1g} of the posterior would be stable. What is left describes them less well."
+        )
     if solution.model.discrepancy.is_best_fit:
         yield solution.model.discrepancy.caution
     if solution.model.confounds_noise:
@@ -72,7 +78,7 @@ def _instability(solution: Solution, found: StableRange) -> str:
     where = " (already at rest: its initial shear modulus is negative)" if found.loss.median == 1 else ""
     return (
         f"over the measured range {what} {how}{where}, so that no simulation with these parameters can be trusted: "
-        "measure in more loading modes, or choose another material."
+        "measure in more loading modes, choose another material, or leave out what is not stable (stable_in)."
     )
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.stable_posterior import StableSolution, modes_named
 from tissuq.discrepancy import Discrepancy, discrepancy_named
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
@@ -47,6 +48,7 @@ def fit(
     priors: Mapping[str, Prior] | None = None,
     tolerances: Tolerances | None = None,
     method: Method = "auto",
+    stable_in: str | Sequence[str] = (),
     seed: int = 0,
 ) -> Posterior:
     """Identify the parameters of a material from an experiment, with a model discrepancy and noise.
@@ -80,6 +82,9 @@ def fit(
         ``"joint"``: the no-U-turn sampler over all parameters, nothing integrated, as in the paper.
         ``"auto"``: exact where it applies and reaches its tolerance; else nuts, with the evidence from smc.
         The posterior's ``solution.route`` and ``solution.reason`` say what was done and why.
+    stable_in : str or sequence of str
+        Loading modes, or ``"all"``, in which material and energy discrepancy must be stable over the range that was
+        measured: the prior leaves out what is not, and the posterior is known by those of its draws that are.
     seed : int
         Of the draws.
 
@@ -88,7 +93,8 @@ def fit(
     InputError
         When data, noise or priors cannot be used.
     ModelError
-        When the parts do not fit each other, or the method does not apply.
+        When the parts do not fit each other, or the method does not apply, or hardly any of the posterior is stable
+        where that is asked for.
     ConvergenceError
         When the method was asked for by name and cannot reach its tolerance.
 
@@ -116,6 +122,7 @@ def fit(
         priors=priors,
         tolerances=tolerances,
         method=method,
+        stable_in=stable_in,
         seed=seed,
     )[0]
 
@@ -130,6 +137,7 @@ def fit_many(
     priors: Mapping[str, Prior] | None = None,
     tolerances: Tolerances | None = None,
     method: Method = "auto",
+    stable_in: str | Sequence[str] = (),
     seed: int = 0,
 ) -> list[Posterior]:
     """Fit many experiments with the same model, each by itself; the parameters are those of `fit`.
@@ -166,7 +174,7 @@ def fit_many(
         raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
     chosen = noise_named(noise if noise is not None else "unknown" if noise_sd is None else noise_sd)
     parts = discrepancy_named(discrepancy), material_named(material), chosen
-    recipe = _Recipe(*parts, dict(priors or {}), tolerances, method, seed)
+    recipe = _Recipe(*parts, dict(priors or {}), tolerances, method, modes_named(stable_in), seed)
     every = [joined(data) for data in datasets]
     is_shared = [len(data.parts) == 1 and not tolerances for data in every]
     keys = [
@@ -190,6 +198,7 @@ class _Recipe:
     priors: Mapping[str, Prior]
     tolerances: Tolerances | None
     method: Method
+    stable_in: tuple[str, ...]
     seed: int
 
     def posteriors(self, datasets: Sequence[Experiment]) -> list[Posterior]:
@@ -204,7 +213,10 @@ class _Recipe:
     def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
         """Return the posteriors of models on the same stretches."""
         ready = [self._with_curve(model) for model in models]
-        return [Posterior(solution, self.seed, self.solved) for solution in self._solve(ready)]
+        solutions = self._solve(ready)
+        if self.stable_in:
+            solutions = [StableSolution(solution, self.stable_in, self.seed) for solution in solutions]
+        return [Posterior(solution, self.seed, self.solved) for solution in solutions]
 
     def _with_curve(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with tolerances along its own mean curve: as if there were none, and then with these."""

@@ -376,6 +376,8 @@ class Posterior:
         labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
         labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
         labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
+        if solution.stable_in:
+            labels["stable_in"] = ", ".join(solution.stable_in)
         if solution.diagnostics is not None:
             found = solution.diagnostics
             labels |= {"converged": str(found.converged), "verdict": found.verdict}

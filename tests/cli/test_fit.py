@@ -286,3 +286,12 @@ def test_data_that_say_little_give_a_report_with_a_warning(cli, here, stretches,
     assert float(row["C10_hdi_low"]) < 0.05 < float(row["C10_hdi_high"])
     amplitude = next(line for line in (here / "run" / "parameters.csv").read_text().splitlines() if ",c1," in line)
     assert ",,," in amplitude  # no mean, no sd
+
+
+def test_a_fit_of_stable_materials_is_repeated_from_its_run_toml(cli, here):
+    asked = ("--material", "mooney-rivlin", "--stable-in", "uniaxial")
+    assert cli("fit", "rubber-treloar-uniaxial", *asked, *ALONE, "--out", "first").status == 0
+    assert 'stable_in = [\n    "uniaxial",\n]' in (here / "first" / "run.toml").read_text()
+    assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "second").status == 0
+    first, second = summary_of(here / "first")[0], summary_of(here / "second")[0]
+    assert (first["C10_mean"], first["stable"]) == (second["C10_mean"], "1.0")

@@ -1,4 +1,4 @@
-"""The same laws in another library, where it is installed: `pip install felupe`."""
+"""The same laws in another library."""
 
 from __future__ import annotations
 

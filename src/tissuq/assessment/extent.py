@@ -250,7 +250,7 @@ def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
     own = {symbol: prior for symbol, prior in model.priors.items() if symbol in kept}
     try:
         return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None, curve=None)])[0]
-    except ModelError:  # a sampler that was asked for has nothing left to sample
+    except ModelError:  # a sampler that was asked for has nothing left to sample, or nothing is stable
         return None
 
 
@@ -258,7 +258,7 @@ def _rescaled(model: StatisticalModel, solve: Solve) -> dict[str, Solution]:
     """Return the solutions with other prior scales of the discrepancy's random part, where there are any."""
     found = {}
     for name, factor in SCALES.items():
-        with suppress(ConvergenceError):
+        with suppress(ConvergenceError, ModelError):
             found[name] = solve([rescaled(model, factor)])[0]
     return found
 

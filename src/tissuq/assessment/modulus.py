@@ -34,6 +34,7 @@ def modulus(solution: Solution) -> Marginal:
     if len(symbols) == 1 and not np.ptp(moduli, axis=0).any():
         factor = float(moduli[0, model.column_symbols.index(symbols[0])])
         return _scaled(solution.marginals[symbols[0]], factor)
+    bounds = (0.0 if solution.stable_in else -np.inf, np.inf)
     mean, root = coefficients(model, parts)
     means, sds = (moduli * mean).sum(axis=1), np.linalg.norm(np.einsum("mk,mkp->mp", moduli, root), axis=1)
     is_wide = sds > 0
@@ -42,9 +43,9 @@ def modulus(solution: Solution) -> Marginal:
         own = marginal_of_mixture(parts.weights[is_wide], means[is_wide], sds[is_wide])
         found.append((float(parts.weights[is_wide].sum()), own))
     if not is_wide.all():
-        own = marginal_of_points(means[~is_wide], parts.weights[~is_wide], (-np.inf, np.inf))
+        own = marginal_of_points(means[~is_wide], parts.weights[~is_wide], bounds)
         found.append((float(parts.weights[~is_wide].sum()), own))
-    return widened(blended(found, (-np.inf, np.inf)), model.common_error)
+    return widened(blended(found, bounds), model.common_error)
 
 
 def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:

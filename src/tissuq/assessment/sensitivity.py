@@ -90,7 +90,8 @@ def rescaled(model: StatisticalModel, factor: float) -> StatisticalModel:
 def known_evidence_changes(solution: Solution) -> dict[str, float]:
     """Return changes of the log evidence with the priors that need no other fit.
 
-    boxes: were the uniform boxes of the linear parameters four times as wide, where they do not cut. quarter and
+    boxes: were the uniform boxes of the linear parameters four times as wide, where they do not cut and nothing but
+    them bounds the prior. quarter and
     fourfold, of the prior scales of the discrepancy's random part: zero where it has none.
     """
     model = solution.model
@@ -98,7 +99,7 @@ def known_evidence_changes(solution: Solution) -> dict[str, float]:
     if solution.log_evidence is None:
         return found
     boxes = [symbol for symbol in model.linear if isinstance(model.priors[symbol], Uniform)]
-    if not any(_cuts(solution, symbol) for symbol in boxes):
+    if not solution.stable_in and not any(_cuts(solution, symbol) for symbol in boxes):
         found["boxes"] = -log(4.0) * len(boxes)
     if not scale_symbols(model):
         found |= dict.fromkeys(SCALES, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,12 +13,13 @@ from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.inference.resampling import systematic
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import Components, Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
 from tissuq.mechanics.path import farthest_stretch, invariants
+from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["LOST", "Loss", "Stability", "StableRange", "calibrated_range", "stability", "stable_ranges"]
+__all__ = ["LOST", "Loss", "Stability", "StableRange", "are_stable", "calibrated_range", "stability", "stable_ranges"]
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -26,6 +28,8 @@ DRAWS, POINTS = 500, 31
 """Draws, and stretches on either side of the reference, to whose distance it is known where stability is lost."""
 LOST = 0.05
 """Probability from which a loss of stability is worth a mark."""
+AT_ONCE = 4000
+"""Draws for which the stresses are computed together."""
 STEP = 1e-4
 """Of the logarithmic strains, for the tangent."""
 NEUTRAL = 1e-9
@@ -112,7 +116,7 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     ModelError
         When the material's energy cannot be differentiated at many states at once.
     """
-    found = _criteria(solution, mode, stretch)
+    found = _criteria(solution.model, _some(solution), mode, stretch)
     stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(found))
     shares = (each.mean(axis=0) for each in (*found, stable))
     return Stability(mode.name, stretch, *shares)
@@ -128,24 +132,65 @@ def stable_ranges(solution: Solution) -> dict[str, StableRange]:
     for mode in (kind() for kind in loading_modes().values()):
         if not mode.is_curve:
             continue
-        low, high = calibrated_range(solution.model.experiment, mode)
-        sides = np.linspace(1.0, low, POINTS), np.linspace(1.0, high, POINTS)
-        stretch = np.unique(np.concatenate(sides))
+        stretch = _measured(solution.model.experiment, mode)
         try:
-            stable = _from_reference(stretch - 1, np.logical_and.reduce(_criteria(solution, mode, stretch)))
+            criteria = _criteria(solution.model, _some(solution), mode, stretch)
         except ModelError:
             return {}
+        stable = _from_reference(stretch - 1, np.logical_and.reduce(criteria))
+        low, high = float(stretch[0]), float(stretch[-1])
         sure, below, above = _surely(stretch, stable), _loss(stretch, stable, -1), _loss(stretch, stable, 1)
         found[mode.name] = StableRange(mode.name, low, high, float(stable.all(axis=1).mean()), *sure, below, above)
     return found
 
 
-def _criteria(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> tuple[Flags, Flags, Flags]:
-    """Return for draws (M, g) whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode."""
-    model, parts = solution.model, solution.components
-    parts = parts[systematic(parts.weights[None], DRAWS)[0]]
-    count = MOST_VALUES // (10 * len(stretch) * len(model.column_symbols)) if model.bent_symbols else DRAWS
-    blocks = [parts[block] for block in np.array_split(np.arange(DRAWS), -(-DRAWS // max(1, count)))]
+def are_stable(model: StatisticalModel, points: Components, modes: Sequence[LoadingMode]) -> Flags:
+    """Return whether draws (M,) are stable over the measured range of all of some loading modes.
+
+    Parameters
+    ----------
+    model : StatisticalModel
+    points : Components
+        The draws, without width.
+    modes : sequence of LoadingMode
+
+    Raises
+    ------
+    ModelError
+        As `stability` does.
+    """
+    stable = np.ones(len(points.weights), dtype=bool)
+    paths = [(mode, _measured(model.experiment, mode)) for mode in modes]
+    first, whole = paths[0]
+    at_few = first, np.unique([whole[0], 1.0, whole[-1]])  # where most draws fail that do, at little cost
+    for mode, stretch in (at_few, *paths):
+        left = np.flatnonzero(stable)
+        if len(left):
+            stable[left] = np.logical_and.reduce(_criteria(model, points[left], mode, stretch)).all(axis=1)
+    return stable
+
+
+def _measured(data: Experiment, mode: LoadingMode) -> FloatArray:
+    """Return stretches of a mode on either side of the reference, and that, over the range that was measured."""
+    return np.unique(np.concatenate([np.linspace(1.0, end, POINTS) for end in calibrated_range(data, mode)]))
+
+
+def _some(solution: Solution) -> Components:
+    """Return components of which one draw each stands for the posterior."""
+    parts = solution.components
+    return parts[systematic(parts.weights[None], DRAWS)[0]]
+
+
+def _criteria(
+    model: StatisticalModel, parts: Components, mode: LoadingMode, stretch: FloatArray
+) -> tuple[Flags, Flags, Flags]:
+    """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each.
+
+    For one draw of every component.
+    """
+    draws = len(parts.weights)
+    count = MOST_VALUES // (10 * len(stretch) * len(model.column_symbols)) if model.bent_symbols else AT_ONCE
+    blocks = [parts[block] for block in np.array_split(np.arange(draws), -(-draws // max(1, count)))]
 
     def drawn(points: FloatArray, path: LoadingMode) -> FloatArray:
         curves = [drawn_curves(model, block, points, seed, path) for seed, block in enumerate(blocks)]
@@ -156,7 +201,7 @@ def _criteria(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> tup
     paths = [_Path(base * np.exp(nudge)[:, None], direction) for nudge in nudges for direction in DIRECTIONS]
     whole = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
     try:
-        stress = drawn(np.ones(whole.base.shape[1]), whole).reshape(DRAWS, 5, 2, len(stretch))
+        stress = drawn(np.ones(whole.base.shape[1]), whole).reshape(draws, 5, 2, len(stretch))
     except TypeError as error:
         raise ModelError(
             f"the stability of material '{model.material.name}' is not known, because its energy is not plain "
@@ -171,7 +216,7 @@ def _criteria(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> tup
     determinant = tangent[:, 0, 0] * tangent[:, 1, 1] - tangent[:, 0, 1] * tangent[:, 1, 0]
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
     near = np.concatenate([stretch - STEP, stretch + STEP])
-    rising = np.diff(drawn(near, mode).reshape(DRAWS, 2, -1), axis=1)[:, 0] > 0
+    rising = np.diff(drawn(near, mode).reshape(draws, 2, -1), axis=1)[:, 0] > 0
     return baker, drucker, rising
 
 

@@ -83,6 +83,10 @@ def fit(
     sheet: reading.Sheet = None,
     skip_rows: reading.SkipRows = None,
     method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
+    stable_in: Annotated[
+        list[str] | None,
+        typer.Option(help="Leave out what is not stable in this loading mode, or in all; repeat for more."),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
     config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
@@ -100,7 +104,7 @@ def fit(
     files = several.files_of(file or [])
     options: dict[str, Any] = {
         "material": material, "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
-        "tolerances": several.tolerances(tolerance),
+        "tolerances": several.tolerances(tolerance), "stable_in": stable_in or None,
     }  # fmt: skip
     options |= several.measured([] if config else files, given, mode, specimen, noise_sd)
     if prior:

@@ -36,7 +36,7 @@ from tissuq.inference.threads import one_thread
 from tissuq.model import StatisticalModel
 from tissuq.priors import Flat, Prior
 
-__all__ = ["EnergySolution", "solve_energies", "why_no_energies"]
+__all__ = ["EnergySolution", "discrepancy_in_draws", "shares_of_members", "solve_energies", "why_no_energies"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -106,6 +106,27 @@ def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[En
         return [EnergySolution(m, [node], np.zeros(1), 0.0, seed) for m, node in zip(models, nodes, strict=True)]
 
 
+def shares_of_members(model: StatisticalModel, members: Places, weights: FloatArray) -> dict[str, float]:
+    """Return the probability of every sum of blocks, its length scales together, for weighted members (M,)."""
+    found: dict[str, float] = {}
+    shares = np.bincount(members, weights, minlength=len(model.energy_members))
+    for member, share in zip(model.energy_members, shares, strict=True):
+        found[member.name] = found.get(member.name, 0.0) + float(share)
+    return found
+
+
+def discrepancy_in_draws(model: StatisticalModel, members: Places, linear: FloatArray) -> FloatArray:
+    """Return the discrepancy's stress (chains, draws, n) at the measurements.
+
+    For members (chains, draws) and linear parameters (chains, draws, q), after which come the discrepancy's weights.
+    """
+    start, values = len(model.linear), np.zeros((*members.shape, len(model.experiment)))
+    for place in np.unique(members):
+        features, own = side_by_side(model.energy_features(place), values.shape[2]), members == place
+        values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
+    return values
+
+
 class EnergySolution(Solution):
     """The posterior of one data set under an energy discrepancy.
 
@@ -169,12 +190,7 @@ class EnergySolution(Solution):
     @cached_property
     def members(self) -> dict[str, float]:  # type: ignore[override]  # a cached property
         """The posterior probability of every sum of blocks, its length scales together."""
-        found: dict[str, float] = {}
-        every = self.model.energy_members
-        shares = np.bincount(self._points.lattice, self._weights, minlength=len(every))
-        for member, share in zip(every, shares, strict=True):
-            found[member.name] = found.get(member.name, 0.0) + float(share)
-        return found
+        return shares_of_members(self.model, self._points.lattice, self._weights)
 
     @cached_property
     def components(self) -> Components:  # type: ignore[override]  # a cached property
@@ -225,13 +241,7 @@ class EnergySolution(Solution):
         """The discrepancy's stress (chains, draws, n) at the measurements in every draw."""
         chosen, linear = self._drawn
         assert self.components.member is not None  # noqa: S101 (this solution's components have one)
-        member, start = self.components.member[chosen], len(self.model.linear)
-        values = np.zeros((*chosen.shape, len(self.model.experiment)))
-        for place in np.unique(member):
-            features = side_by_side(self.model.energy_features(place), values.shape[2])
-            own = member == place
-            values[own] = linear[own][:, start : start + features.shape[1]] @ features.T
-        return values
+        return discrepancy_in_draws(self.model, self.components.member[chosen], linear)
 
     @cached_property
     def _drawn(self) -> tuple[Places, FloatArray]:

@@ -16,7 +16,7 @@ from tissuq.inference.marginal import Marginal, widened
 from tissuq.inference.resampling import systematic
 from tissuq.model import StatisticalModel
 
-__all__ = ["Components", "Diagnostics", "Marginals", "Solution"]
+__all__ = ["CHAINS", "Components", "Diagnostics", "Marginals", "Solution"]
 
 FloatArray = NDArray[np.float64]
 
@@ -148,6 +148,8 @@ class Solution(ABC):
         The discrepancy's stress at the measurements in every draw, MPa, where it has weights of its own.
     members : mapping of str to float
         Posterior probabilities of the members, where the discrepancy is an average.
+    stable_in : tuple of str
+        Loading modes in which what is not stable is left out.
     """
 
     model: StatisticalModel
@@ -159,6 +161,7 @@ class Solution(ABC):
     diagnostics: Diagnostics | None = None
     drawn_discrepancy: FloatArray | None = None
     members: Mapping[str, float] = MappingProxyType({})
+    stable_in: tuple[str, ...] = ()
 
     @property
     def wide_components(self) -> Components:

@@ -50,6 +50,7 @@ class SpecimenSettings(MeasuredFile):
     noise: Literal["unknown", "proportional", "repeats"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
     method: Method = "auto"
+    stable_in: tuple[str, ...] = ()
     seed: int = Field(0, ge=0)
 
     @field_validator("discrepancies")
@@ -201,6 +202,7 @@ def run_specimen(
                 priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
                 tolerances=settings.tolerances_in(unit),
                 method=settings.method,
+                stable_in=settings.stable_in,
                 seed=settings.seed,
             )
             seconds[name] = perf_counter() - start
