@@ -46,7 +46,8 @@ def modes_named(names: str | Sequence[str]) -> tuple[str, ...]:
     found = curves if chosen == [ALL] else list(dict.fromkeys(loading_mode(name).name for name in chosen))
     other = [name for name in found if name not in curves]
     if other:
-        raise InputError(f"stable_in takes modes of one stretch and one stress ({', '.join(curves)}), not '{other[0]}'.")
+        known = ", ".join(curves)
+        raise InputError(f"stable_in takes modes of one stretch and one stress ({known}), not '{other[0]}'.")
     return tuple(found)
 
 

@@ -1,0 +1,145 @@
+"""``tissuq fit`` of several files at once."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+STRETCH = {"uniaxial": np.array([0.8, 0.9, 1.1, 1.2, 1.3, 1.4]), "planar": np.array([1.05, 1.1, 1.2, 1.3, 1.4])}
+NOISE = {"uniaxial": 1e-3 * np.array([1, 0, -2, 1, 0, -1]), "planar": 1e-3 * np.array([2, -4, 0, 3, -1])}
+ALONE = ["--discrepancy", "none", "--no-figures"]
+
+
+def written(folder, mode, name, head=""):
+    stress = tq.engineering_stress(tq.materials()["neo-hookean"](), tq.loading_modes()[mode](), STRETCH[mode], [0.05])
+    rows = [
+        f"{a!r},{b!r}" for a, b in zip(STRETCH[mode].tolist(), (1e3 * (stress + NOISE[mode])).tolist(), strict=True)
+    ]
+    file = folder / name
+    file.write_text("\n".join([*([head] if head else []), "stretch,stress_kPa", *rows]) + "\n")
+    return file
+
+
+@pytest.fixture
+def files(here):
+    (here / "tests").mkdir()
+    return [
+        written(here / "tests", "planar", "b.csv", head="# mode: planar"),
+        written(here / "tests", "uniaxial", "uniaxial.csv"),
+    ]
+
+
+def summary_of(folder):
+    with (folder / "summary.csv").open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def expected(files, **options):
+    parts = [tq.read_experiment(file, mode=mode) for file, mode in zip(files, ("planar", "uniaxial"), strict=True)]
+    return tq.fit(parts, discrepancy="none", **options)
+
+
+def test_a_folder_is_fitted_with_the_modes_that_files_or_names_say(cli, files, here):
+    said = cli("fit", "tests", *ALONE, "--noise-sd", "1.5")
+    assert (said.status, said.err) == (0, "")
+    (row,) = summary_of(here / "runs" / "tests")
+    posterior = expected(files, noise_sd=1.5e-3)
+    assert float(row["C10_mean"]) == pytest.approx(posterior.marginals["C10"].mean, rel=1e-9)
+    assert float(row["C10_sd"]) == pytest.approx(posterior.marginals["C10"].sd, rel=1e-9)
+    assert posterior.model.tolerances.stress > 0
+    page = (here / "runs" / "tests" / "report.html").read_text()
+    assert "planar test, 5 measurements, stretch 1.05 to 1.4" in page
+    assert "uniaxial test, 6 measurements, stretch 0.8 to 1.4" in page
+    assert "Whole tests may be off by (standard deviations) 0.18 of the stress" in page
+    with (here / "runs" / "tests" / "data.csv").open(newline="") as lines:
+        assert [row["mode"] for row in csv.DictReader(lines)] == ["planar"] * 5 + ["uniaxial"] * 6
+
+
+def test_specimens_noise_and_tolerances_are_those_given(cli, files, here):
+    options = ["--specimen", "one", "--specimen", "two", "--noise-sd", "1,2", "--tolerance", "stress=10%"]
+    options += ["--tolerance", "zero=0.5", "--mode", "planar", "--mode", "uniaxial", "--out", "run"]
+    said = cli("fit", *files, *ALONE, *options)
+    assert said.status == 0, said.err
+    (row,) = summary_of(here / "run")
+    tolerances = tq.Tolerances(stress=0.1, zero=0.5e-3)
+    posterior = expected(files, noise_sd=[1e-3, 2e-3], tolerances=tolerances)
+    assert float(row["C10_mean"]) == pytest.approx(posterior.marginals["C10"].mean, rel=1e-9)
+    assert float(row["log_evidence"]) == pytest.approx(posterior.solution.log_evidence, rel=1e-9)
+
+
+def test_a_run_of_several_files_repeats(cli, files, here):
+    assert cli("fit", *files, *ALONE, "--tolerance", "none", "--out", "first").status == 0
+    recipe = tomllib.loads((here / "first" / "run.toml").read_text())
+    assert [test["file"] for test in recipe["tests"]] == ["input/b.csv", "input/uniaxial.csv"]
+    assert recipe["tolerances"] == {}
+    said = cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "again")
+    assert said.status == 0, said.err
+    same = [{name: value for name, value in row.items() if name != "seconds"} for row in summary_of(here / "first")]
+    again = [{name: value for name, value in row.items() if name != "seconds"} for row in summary_of(here / "again")]
+    assert same == again
+    assert cli("show", "again").status == 0
+
+
+def test_tests_in_a_toml_file_have_their_own_options(cli, here):
+    written(here, "uniaxial", "a.csv")
+    (here / "b.csv").write_text("gamma;tau (Pa)\n0,1;9800\n0,2;20100\n0,3;29900\n0,4;40000\n")
+    (here / "both.toml").write_text(
+        'discrepancies = ["none"]\nnoise_sd = 0.1\n[tolerances]\n[[tests]]\nfile = "a.csv"\nmode = "uniaxial"\n'
+        '[[tests]]\nfile = "b.csv"\nmode = "simple-shear"\ncolumns = { shear = "gamma", stress = "tau (Pa)" }\n'
+    )
+    said = cli("fit", "--config", "both.toml")
+    assert said.status == 0, said.err
+    assert (here / "runs" / "both" / "figures" / "with_discrepancy.png").exists()
+    unit, shear = 2 * (STRETCH["uniaxial"] - STRETCH["uniaxial"] ** -2), 2 * np.array([0.1, 0.2, 0.3, 0.4])
+    x = np.concatenate([unit, shear])
+    y = np.concatenate([0.05 * unit + NOISE["uniaxial"], 1e-6 * np.array([9800, 20100, 29900, 40000])])
+    (row,) = summary_of(here / "runs" / "both")
+    assert float(row["C10_mean"]) == pytest.approx(x @ y / (x @ x), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["tests/b.csv", "other.csv"], ["neither 'other.csv' nor its name says", "--mode once for each file"]),
+        (
+            ["tests/b.csv", "tests/uniaxial.csv", "--mode", "planar", "--mode", "planar", "--mode", "planar"],
+            ["3 times"],
+        ),
+        (["tests/b.csv", "tests/uniaxial.csv", "--noise-sd", "1,2,3"], ["--noise-sd is given 3 times for 2 files"]),
+        (["tests/b.csv", "--noise-sd", "1,2"], ["--noise-sd is given 2 times for one file"]),
+        (["tests/b.csv", "--tolerance", "stress"], ["'stress' is no tolerance; write stress=10%"]),
+        (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is no tolerance"]),
+        (["tests/b.csv", "--tolerance", "stress=1%", "--tolerance", "stress=2%"], ["given twice for 'stress'"]),
+        (["empty"], ["folder 'empty' has no file of measurements"]),
+        (["tests", "--config", "x.toml"], ["give FILES or --config, not both"]),
+    ],
+)
+def test_what_cannot_be_used_is_said(cli, files, here, arguments, words):
+    (here / "empty").mkdir()
+    written(here, "uniaxial", "other.csv")
+    (here / "x.toml").write_text('file = "other.csv"\n')
+    said = cli("fit", *arguments)
+    assert (said.status, said.out) == (2, "")
+    for word in words:
+        assert word in " ".join(said.err.split())
+    assert not (here / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('file = "a.csv"\n[[tests]]\nfile = "b.csv"\n', "give one file, or several tests with a file each"),
+        ('mode = "planar"\n[[tests]]\nfile = "b.csv"\n', "said in each of the tests, not beside them (mode)"),
+        ('[[tests]]\nfile = "a.csv"\nnoise_sd = 1\n[[tests]]\nfile = "b.csv"\n', "noise_sd in each of the tests"),
+    ],
+)
+def test_settings_that_contradict_each_other_are_refused(cli, here, text, words):
+    (here / "run.toml").write_text(text)
+    said = cli("fit", "--config", "run.toml")
+    assert said.status == 2
+    assert words in " ".join(said.err.split())
