@@ -22,18 +22,28 @@ def two_tests(*specimens):
     return joined([Experiment("uniaxial", each, each - 1, name="test", specimen=name) for each, name in parts])
 
 
-def of(tolerances, *specimens):
-    return whitening(two_tests(*specimens), NOISE_SD, 0.03, tolerances, CURVE)
+def of(tolerances, *specimens, lag=0.0):
+    return whitening(two_tests(*specimens), NOISE_SD, 0.03, tolerances, CURVE, lag)
 
 
-def covariance(tolerances, *specimens):
+def noise(size, lag):
+    place = np.arange(7)
+    same = np.repeat([0, 1], [3, 4])[:, None] == np.repeat([0, 1], [3, 4])
+    return np.outer(size, size) * same * float(lag) ** np.abs(place[:, None] - place)
+
+
+def covariance(tolerances, *specimens, lag=0.0):
     """Noise, and what the tolerances add: of the stress only the differences between specimens."""
     first = np.repeat([1.0, 0.0], [3, 4])
     same = np.array(specimens)[:, None] == np.array(specimens)
     shared = np.kron(same, np.ones(1))[np.ix_(np.repeat([0, 1], [3, 4]), np.repeat([0, 1], [3, 4]))]
     apart = np.outer(CURVE, CURVE) * (np.outer(2 * first - 1, 2 * first - 1) / 2 if not same.all() else 0.0)
     strain = np.concatenate(STRETCH) - 1
-    found = np.diag(SIZE**2) + tolerances.stress**2 * apart + tolerances.zero**2 * shared
+    found = (
+        noise(np.hypot(SIZE, tolerances.stretch * SLOPE), lag)
+        + tolerances.stress**2 * apart
+        + tolerances.zero**2 * shared
+    )
     found += tolerances.slack**2 * shared * np.outer((strain + 1) * SLOPE, (strain + 1) * SLOPE)
     return found + tolerances.length**2 * shared * np.outer(strain * SLOPE, strain * SLOPE)
 
@@ -44,18 +54,21 @@ CASES = [
     (Tolerances(stress=0.15, zero=0.01), ("a", "a"), 1e-12),
     (Tolerances(stress=0.3, zero=0.1), ("a", "b"), 1e-12),
     (Tolerances(length=0.02), ("a", "b"), 0.5),  # the slope is that of few points
+    (Tolerances(stretch=0.001), ("a", "b"), 0.1),
 ]
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.7])
 @pytest.mark.parametrize(("tolerances", "specimens", "within"), CASES)
-def test_the_covariance_becomes_that_of_equal_independent_errors(tolerances, specimens, within):
-    white = of(tolerances, *specimens)(np.eye(7))
-    assert np.allclose(white @ covariance(tolerances, *specimens) @ white.T, 0.03**2 * np.eye(7), atol=within * 0.03**2)
+def test_the_covariance_becomes_that_of_equal_independent_errors(tolerances, specimens, within, lag):
+    white, full = of(tolerances, *specimens, lag=lag)(np.eye(7)), covariance(tolerances, *specimens, lag=lag)
+    assert np.allclose(white @ full @ white.T, 0.03**2 * np.eye(7), atol=within * 0.03**2)
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.7])
 @pytest.mark.parametrize(("tolerances", "specimens", "within"), CASES)
-def test_its_other_faces_are_the_same_matrix(tolerances, specimens, within):
-    found = of(tolerances, *specimens)
+def test_its_other_faces_are_the_same_matrix(tolerances, specimens, within, lag):
+    found = of(tolerances, *specimens, lag=lag)
     white, columns = found(np.eye(7)), np.random.default_rng(1).random((7, 3))
     assert np.allclose(found(columns), white @ columns, rtol=1e-12)
     assert np.allclose(found(columns[:, 0]), white @ columns[:, 0], rtol=1e-12)

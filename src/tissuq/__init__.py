@@ -23,7 +23,7 @@ from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, Unkn
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
-from tissuq.whitening import Tolerances
+from tissuq.tolerances import Tolerances
 
 __version__ = "0.1.0"
 

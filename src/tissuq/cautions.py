@@ -11,6 +11,7 @@ from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import LOST, StableRange
 from tissuq.assessment.stable_posterior import StableSolution
 from tissuq.inference.solution import Solution
+from tissuq.prediction.moments import mean_curve
 
 __all__ = ["warnings_about"]
 
@@ -24,6 +25,11 @@ UNSTABLE = 0.5
 """Probability of stability over the measured range below which a simulation is likely to fail."""
 HIGH = 0.1
 """Density at a bound, relative to the largest, above which the bound decides."""
+
+SOME, MOST_VALUES, FEWEST = 200, 4_000_000, 12
+"""Components whose mean the residuals are from, and values at once; measurements from which they tell something."""
+NOTABLE, BEYOND_CHANCE = 0.3, 4.0
+"""Correlation of consecutive residuals worth a word; standard errors beyond which it is no chance."""
 
 
 def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Iterator[str]:
@@ -55,6 +61,12 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Ite
         yield (
             f"the sums behind this posterior are rough (the log evidence {size}), as where the "
             "noise that was given is far smaller than the scatter of the data: give a larger one, or leave it unknown."
+        )
+    together = _correlation(solution)
+    if together is not None:
+        yield (
+            f"consecutive residuals hang together (correlation {together:.2f}), so that the measurements are not "
+            "independent and the intervals too narrow: fit with the noise 'autoregressive', or with fewer points."
         )
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
@@ -93,6 +105,22 @@ def _noise_is_inseparable(solution: Solution) -> bool:
     own = model.discrepancy.independent_variance(values) + model.discrepancy.correlated_variance(values)
     low, high = np.quantile(noise / (noise + own), [0.05, 0.95])
     return bool(low < INSEPARABLE and high > 1 - INSEPARABLE)
+
+
+def _correlation(solution: Solution) -> float | None:
+    """Return the correlation of consecutive residuals, whitened, where it is beyond chance; None where it is not."""
+    model, whole = solution.model, []
+    if model.is_correlated or len(model.experiment) < FEWEST:
+        return None
+    some = int(np.clip(MOST_VALUES // len(model.experiment), 1, SOME))
+    residual = model.stress - np.asarray(model.white(mean_curve(solution, thinned=some)))
+    start = 0
+    for _, _, stress in model.experiment.curves:
+        whole.append(residual[start : start + len(stress)])
+        start += len(stress)
+    size = sum(float(each @ each) for each in whole)
+    found = sum(float(each[1:] @ each[:-1]) for each in whole) / size if size else 0.0
+    return found if found > max(NOTABLE, BEYOND_CHANCE / np.sqrt(len(residual))) else None
 
 
 def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:

@@ -9,7 +9,6 @@ from numbers import Integral
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.assessment.stable_posterior import StableSolution, modes_named
 from tissuq.discrepancy import Discrepancy, discrepancy_named
@@ -25,16 +24,17 @@ from tissuq.noise import Noise, noise_named
 from tissuq.posterior import Posterior
 from tissuq.prediction.moments import mean_curve
 from tissuq.priors import Prior
-from tissuq.whitening import BETWEEN_SPECIMENS, Tolerances, specimens_of
+from tissuq.tolerances import BETWEEN_SPECIMENS, Tolerances, specimens_of
 
 __all__ = ["METHODS", "Method", "fit", "fit_many"]
 
-FloatArray = NDArray[np.float64]
 Method = Literal["auto", "exact", "nuts", "smc", "joint"]
 FACTORISED = 3
 """Parameters of the structure from which `auto` samples."""
 ROUNDS = 2
 """In which the curve is found along which whole tests err."""
+LAGS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99)
+"""Correlations of consecutive errors that are tried."""
 METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
 
 
@@ -68,8 +68,9 @@ def fit(
         several tests a sequence of numbers, one for each, is taken, too; where it is unknown, its ratios between the
         tests are those of their scatter about smooth curves, and noise_sd is its geometric mean.
     noise : str or Noise
-        Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), or ``"repeats"`` (told
-        by repeated measurements at the same stretch).
+        Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), ``"repeats"`` (told
+        by repeated measurements at the same stretch), or ``"autoregressive"`` (errors of consecutive measurements
+        correlated).
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     tolerances : Tolerances
@@ -176,7 +177,7 @@ def fit_many(
     parts = discrepancy_named(discrepancy), material_named(material), chosen
     recipe = _Recipe(*parts, dict(priors or {}), tolerances, method, modes_named(stable_in), seed)
     every = [joined(data) for data in datasets]
-    is_shared = [len(data.parts) == 1 and not tolerances for data in every]
+    is_shared = [len(data.parts) == 1 and not tolerances and not chosen.is_consecutive for data in every]
     keys = [
         (data.mode.name, data.stretch.tobytes(), 0 if shared else place)
         for place, (data, shared) in enumerate(zip(every, is_shared, strict=True))
@@ -212,11 +213,34 @@ class _Recipe:
 
     def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
         """Return the posteriors of models on the same stretches."""
-        ready = [self._with_curve(model) for model in models]
+        ready = [self._with_lag(self._with_curve(model)) for model in models]
         solutions = self._solve(ready)
         if self.stable_in:
             solutions = [StableSolution(solution, self.stable_in, self.seed) for solution in solutions]
         return [Posterior(solution, self.seed, self.solved) for solution in solutions]
+
+    def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model with consecutive noise at the lag under which the data are most probable."""
+        if not model.noise.is_consecutive or model.lag:
+            return model
+        tried = [replace(model, lag=lag) for lag in LAGS]
+        evidence = [self._evidence(each) for each in tried]
+        best = int(np.argmax(evidence))
+        if best in (0, len(LAGS) - 1):
+            return tried[best]
+        # A parabola through the best three, in the lag's inverse hyperbolic tangent.
+        at, around = np.arctanh(LAGS[best - 1 : best + 2]), np.array(evidence[best - 1 : best + 2])
+        second, first, _ = np.polyfit(at, around, 2)
+        return replace(model, lag=float(np.tanh(-first / (2 * second))))
+
+    def _evidence(self, model: StatisticalModel) -> float:
+        found = self._solve([model])[0].log_evidence
+        if found is None:
+            raise ModelError(
+                f"noise '{model.noise}' needs the evidence, which this fit does not have: choose proper priors, and a "
+                "discrepancy and a method that give it, such as 'auto'."
+            )
+        return found
 
     def _with_curve(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with tolerances along its own mean curve: as if there were none, and then with these."""

@@ -21,7 +21,8 @@ from tissuq.parameters import Parameter
 from tissuq.priors import Flat, Prior, Uniform
 from tissuq.scales import default_prior, support
 from tissuq.statistics import CHUNK, Statistics
-from tissuq.whitening import Tolerances, Whitening, whitening
+from tissuq.tolerances import Tolerances
+from tissuq.whitening import Whitening, whitening
 
 __all__ = ["StatisticalModel"]
 
@@ -57,6 +58,8 @@ class StatisticalModel:
         By how much whole tests may be off; nothing, where nothing is said.
     curve : (n,) array, MPa, optional
         About what stress the measurements have without errors, along which tolerances act; `tissuq.fit` finds it.
+    lag : float
+        Correlation of the noise of consecutive measurements; `tissuq.fit` finds it for noise that has one.
     known_statistics : Statistics, optional
         `statistics`, where they are known already.
 
@@ -75,6 +78,7 @@ class StatisticalModel:
     chosen_priors: Mapping[str, Prior] = field(default_factory=dict)
     tolerances: Tolerances = Tolerances()  # noqa: RUF009 (frozen)
     curve: FloatArray | None = None
+    lag: float = 0.0
     known_statistics: Statistics | None = None
 
     def __post_init__(self) -> None:
@@ -165,13 +169,13 @@ class StatisticalModel:
     @cached_property
     def whitening(self) -> Whitening | None:
         """What makes the errors of several tests independent and equal; None where they are so already."""
-        if len(self.experiment.parts) == 1 and not self.tolerances:
+        if len(self.experiment.parts) == 1 and not self.tolerances and not self.lag:
             return None
         noise_sd = self.noise.of_tests(self.experiment)
         usual = float(np.exp(np.log(noise_sd).mean()))
         if self.noise.depends_on_level:
             noise_sd = np.full(len(noise_sd), usual)
-        return whitening(self.experiment, noise_sd, usual, self.tolerances, self.curve)
+        return whitening(self.experiment, noise_sd, usual, self.tolerances, self.curve, self.lag)
 
     @property
     def common_error(self) -> float:
@@ -387,6 +391,11 @@ class StatisticalModel:
     def _check_tolerances(self) -> None:
         if not self.noise.parameters:
             self.noise.of_tests(self.experiment)  # says where there is not one for each test
+        if self.noise.is_consecutive and self.discrepancy.is_correlated:
+            raise ModelError(
+                f"discrepancy '{self.discrepancy.name}' takes up correlated noise itself: choose the noise 'unknown', "
+                "or a discrepancy that is an energy, such as 'auto'."
+            )
         if not self.tolerances:
             return
         if self.discrepancy.is_correlated:

@@ -20,6 +20,7 @@ from tissuq.registry import find, variants
 from tissuq.smoothing import scatter, smoothed
 
 __all__ = [
+    "AutoregressiveNoise",
     "KnownNoise",
     "KnownNoises",
     "Noise",
@@ -56,6 +57,8 @@ class Noise(ABC):
     depends_on_level: ClassVar[bool] = False
     shares_discrepancy: ClassVar[bool] = False
     """Whether measurements at one stretch share the independent part of the discrepancy (S), too."""
+    is_consecutive: ClassVar[bool] = False
+    """Whether the error of a measurement tells something about the next one."""
 
     @abstractmethod
     def sd(self, values: Mapping[str, Any], level: Any) -> Any:
@@ -153,6 +156,18 @@ class RepeatNoise(UnknownNoise):
     name = "repeats"
     description = "unknown, told by repeated measurements at the same stretch"
     shares_discrepancy = True
+
+
+class AutoregressiveNoise(UnknownNoise):
+    """The same unknown standard deviation everywhere, the errors of consecutive measurements correlated.
+
+    Their correlation, that of first-order autoregression in the order of the measurements, is the one under which the
+    data are most probable, everything else integrated (`tissuq.fit` finds it): a plug-in.
+    """
+
+    name = "autoregressive"
+    description = "unknown, the errors of consecutive measurements correlated"
+    is_consecutive = True
 
 
 def noise_named(noise: float | Sequence[float] | str | Noise) -> Noise:

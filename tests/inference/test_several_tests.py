@@ -210,3 +210,61 @@ def test_what_does_not_go_together_is_said(options, message):
 def test_a_prediction_says_its_mode():
     with pytest.raises(tq.InputError, match="in several modes \\(uniaxial, planar\\): say which one"):
         fit("none").predict([1.1])
+
+
+def autoregressive(seed, lag, count=80, sd=0.05):
+    stretch, score = np.linspace(0.7, 1.8, count), np.random.default_rng(seed).standard_normal(count)
+    error = [score[0]]
+    for new in score[1:]:
+        error.append(lag * error[-1] + np.sqrt(1 - lag**2) * new)
+    return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * np.array(error))
+
+
+def test_correlated_noise_is_generalised_least_squares_at_the_likeliest_lag():
+    data = autoregressive(3, 0.8)
+    posterior = tq.fit(data, discrepancy="none", noise="autoregressive")
+    lag, x = posterior.model.lag, 2 * (data.stretch - data.stretch**-2)
+    assert 0.6 < lag < 0.95
+    place = np.arange(len(x))
+
+    def profile(lag):
+        """The likelihood of the lag, C10 and noise_sd integrated with flat priors."""
+        covariance = lag ** np.abs(place[:, None] - place)
+        inverse = np.linalg.inv(covariance)
+        precision = x @ inverse @ x
+        mean = x @ inverse @ data.stress / precision
+        rest = (data.stress - mean * x) @ inverse @ (data.stress - mean * x)
+        size = -0.5 * (np.linalg.slogdet(covariance)[1] + np.log(precision) + (len(x) - 2) * np.log(rest))
+        return size, mean, np.sqrt(rest / (len(x) - 4) / precision)
+
+    _, mean, sd = profile(lag)
+    assert posterior.marginals["C10"].mean == pytest.approx(mean, rel=1e-6)
+    assert posterior.marginals["C10"].sd == pytest.approx(sd, rel=1e-3)
+    grid = np.linspace(0.5, 0.98, 200)
+    assert lag == pytest.approx(grid[np.argmax([profile(each)[0] for each in grid])], abs=0.03)
+
+
+def test_residuals_that_hang_together_are_told():
+    warnings = tq.fit(autoregressive(3, 0.8), discrepancy="none").warnings
+    assert any("consecutive residuals hang together" in text for text in warnings)
+    assert not any("hang together" in text for text in tq.fit(autoregressive(3, 0.0), discrepancy="none").warnings)
+    mended = tq.fit(autoregressive(3, 0.8), discrepancy="none", noise="autoregressive").warnings
+    assert not any("hang together" in text for text in mended)
+
+
+def test_errors_of_single_stretches_count_as_noise_where_the_curve_is_steep():
+    stretch = np.linspace(0.6, 2.0, 30)
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.01, seed=4)
+    posterior = tq.fit(data, discrepancy="none", noise_sd=0.01, tolerances=tq.Tolerances(stretch=0.01))
+    found = posterior.marginals["C10"]
+    slope = (found.mean) * 2 * (1 + 2 * stretch**-3)
+    x, weight = 2 * (stretch - stretch**-2), 1 / (0.01**2 + (0.01 * slope) ** 2)
+    inner = slice(2, -2)  # the spline bends at the ends
+    size = posterior.model.whitening.size[inner]
+    assert np.allclose(size, 1 / np.sqrt(weight[inner]) / 0.01, rtol=0.02)
+    assert found.sd == pytest.approx(1 / np.sqrt(weight @ x**2), rel=0.02)
+
+
+def test_a_process_and_correlated_noise_do_not_go_together():
+    with pytest.raises(tq.ModelError, match="takes up correlated noise itself"):
+        tq.fit(autoregressive(1, 0.5), discrepancy="gp", noise="autoregressive")

@@ -42,7 +42,10 @@ def fit(
     ] = None,
     noise: Annotated[
         str | None,
-        typer.Option(help="Instead: unknown, proportional (grows with the stress) or repeats (same stretch again)."),
+        typer.Option(
+            help="Instead: unknown, proportional (grows with the stress), repeats (same stretch again) or autoregressive "
+            "(errors of consecutive measurements correlated)."
+        ),
     ] = None,
     prior: Annotated[
         list[str] | None,
@@ -51,8 +54,9 @@ def fit(
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
-            help="By how much a whole test may be off: stress=10%, length=2%, slack=0.01 (of stretch) or zero=0.1 (in "
-            "the stress unit), or none; repeat [stress=18% for files of different specimens]."
+            help="By how much a whole test may be off: stress=10%, length=2%, slack=0.01 (of stretch), zero=0.1 (in "
+            "the stress unit), or every single stretch=0.001; or none; repeat [stress=18% for files of different "
+            "specimens]."
         ),
     ] = None,
     specimen: Annotated[

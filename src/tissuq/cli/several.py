@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 __all__ = ["files_of", "measured", "run_name", "tolerances"]
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
-KINDS = ("stress", "length", "slack", "zero")
+KINDS = ("stress", "length", "slack", "zero", "stretch")
 
 
 def files_of(given: Sequence[Path]) -> list[Path]:
@@ -90,7 +90,9 @@ def _tolerance(text: str) -> tuple[str, float]:
     except ValueError:
         value = -1.0
     if name.strip() not in KINDS or value < 0 or (name.strip() == "zero" and scale != 1.0):
-        raise InputError(f"'{text}' is no tolerance; write stress=10%, length=2%, slack=0.01 or zero=0.1.")
+        raise InputError(
+            f"'{text}' is no tolerance; write stress=10%, length=2%, slack=0.01, zero=0.1 or stretch=0.001."
+        )
     return name.strip(), value
 
 

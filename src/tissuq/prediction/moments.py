@@ -200,9 +200,13 @@ def stress_moments(
     return mean, extra + (root**2).sum(axis=2)
 
 
-def mean_curve(solution: Solution) -> FloatArray:
-    """Return the posterior mean of the stress (n,) at the measurements, without noise and errors of whole tests."""
-    model, components = solution.model, solution.components
+def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
+    """Return the posterior mean of the stress (n,) at the measurements, without noise and errors of whole tests.
+
+    With a number, from so many components that stand for all.
+    """
+    model = solution.model
+    components = solution.components if thinned is None else solution.components.thinned(thinned)
     mean, _ = stress_moments(model, components, model.experiment.stretch, discrepancy=True, noise=False)
     return np.asarray(components.weights @ mean)
 

@@ -10,7 +10,7 @@ from tissuq.assessment.stability import LOST
 from tissuq.experiments.units import StressUnit
 from tissuq.posterior import Posterior
 from tissuq.report.tables import headline_of
-from tissuq.whitening import Tolerances
+from tissuq.tolerances import Tolerances
 
 __all__ = [
     "readable_methods",
@@ -137,5 +137,6 @@ def tolerances_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
         "length": f"{tolerances.length:.3g} of the strain",
         "slack": f"{tolerances.slack:.3g} of stretch by slack",
         "zero": f"{tolerances.zero / unit.to_mpa:.3g} {unit.name} at rest",
+        "stretch": f"{tolerances.stretch:.3g} in every single stretch",
     }
     return ", ".join(text for name, text in parts.items() if getattr(tolerances, name))

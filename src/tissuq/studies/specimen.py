@@ -27,7 +27,7 @@ from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
 from tissuq.studies.measured_file import MeasuredFile, MeasuredTest
-from tissuq.whitening import Tolerances
+from tissuq.tolerances import Tolerances
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
 
@@ -43,11 +43,11 @@ class SpecimenSettings(MeasuredFile):
 
     file: str = ""
     tests: tuple[MeasuredTest, ...] = ()
-    tolerances: dict[Literal["stress", "length", "slack", "zero"], float] | None = None
+    tolerances: dict[Literal["stress", "length", "slack", "zero", "stretch"], float] | None = None
     material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     noise_sd: float | Literal["unknown"] = "unknown"
-    noise: Literal["unknown", "proportional", "repeats"] | None = None
+    noise: Literal["unknown", "proportional", "repeats", "autoregressive"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
     method: Method = "auto"
     stable_in: tuple[str, ...] = ()
