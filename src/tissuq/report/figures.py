@@ -48,8 +48,8 @@ def predictive_figure(
 ) -> Figure:
     """Return one panel a formulation: data, 95 % predictive band and mean, the band of "none" for comparison.
 
-    Stretches at which what is drawn has lost its stability with more than 5 % are shaded; a discrepancy that is no
-    energy has none to lose, so that its panels are shaded for the model alone only.
+    Stretches at which what is drawn has lost its stability with a probability above 5 % are shaded; a discrepancy that
+    is no energy has none to lose, so that its panels are shaded for the model alone only.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def _shade_instability(axis: Axes, posterior: Posterior, stretch: FloatArray) ->
     found = posterior.stable_ranges.get(posterior.model.experiment.mode.name)
     if found is None:
         return
-    label = f"stability lost with more than {100 * LOST:.0f} %"
+    label = f"stability lost (probability > {100 * LOST:.0f} %)"
     for sure, end in ((found.surely_low, found.low), (found.surely_high, found.high)):
         sure, end = np.clip([sure, end], stretch[0], stretch[-1])
         if sure != end:
