@@ -52,8 +52,8 @@ def predictive_figure(
 
     With the mean of "none" for comparison.
 
-    Stretches at which what is drawn has lost its stability with more than 5 % are shaded; a discrepancy that is no
-    energy has none to lose, so that its panels are shaded for the model alone only.
+    Stretches at which what is drawn has lost its stability with a probability above 5 % are shaded; a discrepancy that
+    is no energy has none to lose, so that its panels are shaded for the model alone only.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _shade_instability(axis: Axes, posterior: Posterior, mode: str, stretch: Flo
     found = posterior.stable_ranges.get(mode)
     if found is None:
         return
-    label = f"stability lost with more than {100 * LOST:.0f} %"
+    label = f"stability lost (probability > {100 * LOST:.0f} %)"
     for sure, end in ((found.surely_low, found.low), (found.surely_high, found.high)):
         sure, end = np.clip([sure, end], stretch[0], stretch[-1])
         if sure != end:
