@@ -23,6 +23,7 @@ from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, Unkn
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from tissuq.studies.held_out import held_out_tests
 from tissuq.tolerances import Tolerances
 
 __version__ = "0.1.0"
@@ -65,6 +66,7 @@ __all__ = [
     "engineering_stress",
     "fit",
     "fit_many",
+    "held_out_tests",
     "initial_shear_modulus",
     "inspect",
     "load_material",

@@ -31,6 +31,8 @@ __all__ = ["METHODS", "Method", "fit", "fit_many"]
 Method = Literal["auto", "exact", "nuts", "smc", "joint"]
 FACTORISED = 3
 """Parameters of the structure from which `auto` samples."""
+ENOUGH, SPREADS = 4, (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Specimens that tell how far they are apart, and the values that are tried, over the usual one."""
 ROUNDS = 2
 """In which the curve is found along which whole tests err."""
 LAGS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99)
@@ -75,7 +77,7 @@ def fit(
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     tolerances : Tolerances
         By how much whole tests may be off, such as ``Tolerances(stress=0.1, length=0.02)``; by default tests of
-        different specimens agree to 18 % in stress, and a single test has no such errors.
+        different specimens agree to 18 % in stress (four or more tell by themselves how far they are apart), and a single test has no such errors.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
@@ -209,7 +211,7 @@ class _Recipe:
     def _model(self, data: Experiment) -> StatisticalModel:
         chosen = Tolerances() if self.tolerances is None else self.tolerances
         model = StatisticalModel(data, self.material, self.discrepancy, self.noise, self.priors, chosen)
-        return model if self.tolerances is not None else replace(model, tolerances=_usual_tolerances(model))
+        return model if self.tolerances is not None else self._with_spread(model)
 
     def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
         """Return the posteriors of models on the same stretches."""
@@ -218,6 +220,24 @@ class _Recipe:
         if self.stable_in:
             solutions = [StableSolution(solution, self.stable_in, self.seed) for solution in solutions]
         return [Posterior(solution, self.seed, self.solved) for solution in solutions]
+
+    def _with_spread(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model with the usual tolerances; where there are specimens enough, their spread as the data tell it.
+
+        The root of its posterior mean square over some values, under a half-Cauchy prior of the usual spread: what the
+        error in common needs of it. A plug-in, like the curve along which tests err.
+        """
+        usual = _usual_tolerances(model)
+        model = replace(model, tolerances=usual)
+        if not usual or len(specimens_of(model.experiment)) < ENOUGH:
+            return model
+        model = self._with_curve(model)
+        spread = usual.stress * np.array(SPREADS)
+        tried = [replace(model, tolerances=replace(usual, stress=float(each))) for each in spread]
+        evidence = np.array([self._evidence(each) for each in tried])
+        weight = np.exp(evidence - evidence.max()) / (1 + np.array(SPREADS) ** 2) * spread  # even in the logarithm
+        told = float(np.sqrt(weight @ spread**2 / weight.sum()))
+        return self._with_curve(replace(model, tolerances=replace(usual, stress=told), curve=None))
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""

@@ -43,8 +43,8 @@ def fit(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Instead: unknown, proportional (grows with the stress), repeats (same stretch again) or autoregressive "
-            "(errors of consecutive measurements correlated)."
+            help="Instead: unknown, proportional (grows with the stress), repeats (same stretch again) or "
+            "autoregressive (errors of consecutive measurements correlated)."
         ),
     ] = None,
     prior: Annotated[
