@@ -1,7 +1,7 @@
 """Stresses of every material by tensors and closed forms, which share no code with the materials.
 
-The Cauchy stress is 2 W1 B - 2 W2 B^-1 + sum over k of l_k w'(l_k) n_k n_k - p I, with the derivatives W1 and W2 of an
-energy of the invariants and a sum of w(l_k); the free face gives p.
+The Cauchy stress is 2 W1 B - 2 W2 B^-1 + sum over k of l_k w'(l_k) n_k n_k + sum over fibres of 2 W4 F a (F a)' - p I,
+with the derivatives W1, W2 and W4 of an energy of the invariants and a sum of w(l_k); the free face gives p.
 """
 
 from __future__ import annotations
@@ -9,13 +9,17 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import special_ortho_group
 
-from loading import LARGEST
+from loading import LARGEST, MEASURED
 from tissuq.mechanics import material_named
 from tissuq.mechanics.material import materials
 
 RELATIVE = 1e-10
 TURN = special_ortho_group.rvs(3, random_state=7)
-OTHER_NAMES = "rivlin:C10,C01,C11,C22", "ogden-5", "gent+mooney-rivlin", "demiray+veronda-westmann", "ogden-1+hencky"
+OTHER_NAMES = (
+    "rivlin:C10,C01,C11,C22", "ogden-5", "gent+mooney-rivlin", "demiray+veronda-westmann", "ogden-1+hencky",
+    "neo-hookean+exponential-fibres", "mooney-rivlin+dispersed-fibres:one@35", "neo-hookean+standard-fibres:one",
+    "ogden-1+dispersed-fibres:one@0", "neo-hookean+exponential-fibres:one@0+exponential-fibres@40",
+)  # fmt: skip
 EVERY = [kind() for kind in materials().values()] + [material_named(name) for name in OTHER_NAMES]
 
 
@@ -101,6 +105,51 @@ OF_STRETCHES = {  # (l, values) to l w'(l)
 }
 
 
+def exponential(I1, I4, k1, k2):
+    strain = np.maximum(I4 - 1, 0)
+    return 0.0, k1 * strain * np.exp(k2 * strain**2)
+
+
+def dispersed(I1, I4, k1, k2, kappa):
+    strain = np.maximum(kappa * (I1 - 3) + (1 - 3 * kappa) * (I4 - 1), 0)
+    slope = k1 * strain * np.exp(k2 * strain**2)
+    return kappa * slope, (1 - 3 * kappa) * slope
+
+
+OF_FIBRES = {  # (I1, I4, values without the angle) to W1 and W4 of one family
+    "standard-fibres": lambda I1, I4, k: (0.0, k * np.maximum(I4 - 1, 0)),
+    "exponential-fibres": exponential,
+    "dispersed-fibres": dispersed,
+}
+ONLY_ALONG_AXIS_1 = ["ogden-1+dispersed-fibres:one@0"]
+"""Materials with fibres that stay symmetric about the axis of a uniaxial test."""
+
+
+def has_stress(material, measured):
+    """Whether the deformation of a mode is that of the material: of one with fibres, where all of it is prescribed."""
+    has_fibres = "fibres" in material.name
+    only_isotropic = measured.mode.name in ("uniaxial", "equibiaxial")
+    along = measured.mode.name == "uniaxial" and material.name in ONLY_ALONG_AXIS_1
+    return not has_fibres or not only_isotropic or along
+
+
+STRESSES = [(material, measured) for material in EVERY for measured in MEASURED if has_stress(material, measured)]
+ISOTROPIC = [material for material in EVERY if "fibres" not in material.name]
+
+
+def of_fibres(name, values, F):
+    """Return the Cauchy stress of fibres, whose name tells how many families there are, and a known angle."""
+    law, _, known = name.partition("@")
+    law, _, one = law.partition(":")
+    *values, angle = [*values, np.radians(float(known))] if known else values
+    stress = np.zeros((3, 3))
+    for sign in (1,) if one else (1, -1):
+        fibre = F @ [np.cos(angle), sign * np.sin(angle), 0]
+        W1, W4 = OF_FIBRES[law](np.trace(F.T @ F), fibre @ fibre, *values)
+        stress += 2 * W1 * F @ F.T + 2 * W4 * np.outer(fibre, fibre)
+    return stress
+
+
 def of_invariants(name, I1, I2, values):
     return OF_INVARIANTS[name](I1, I2, *values) if name in OF_INVARIANTS else (0.0, 0.0)
 
@@ -122,6 +171,8 @@ def tensor_stress(name, values, F, turn=TURN):
         count = len(material_named(part).parameters)
         own = values[start : start + count]
         start += count
+        if "fibres" in part:
+            cauchy += turn @ of_fibres(part, own, turn.T @ F @ turn) @ turn.T
         W1, W2 = of_invariants(part, I1, I2, own)
         cauchy += 2 * W1 * B - 2 * W2 * np.linalg.inv(B)
         cauchy += (axes * of_stretches(part, np.sqrt(squares), own)) @ axes.T

@@ -10,6 +10,7 @@ from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.experiments.reading import read_experiment
 from tissuq.fitting import fit, fit_many
 from tissuq.mechanics import (
+    FibreMaterial,
     FunctionLaw,
     Material,
     StretchMaterial,
@@ -35,6 +36,7 @@ __all__ = [
     "Discrepancy",
     "Experiment",
     "Exponential",
+    "FibreMaterial",
     "Flat",
     "FunctionLaw",
     "HalfCauchy",

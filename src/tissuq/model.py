@@ -379,8 +379,17 @@ class StatisticalModel:
                 f"experiment '{self.experiment.name}' measures {' and '.join(mode.stresses)} ({mode.name}): a fit "
                 "takes one stress of one control."
             )
+        for part in self.experiment.parts:
+            for path in part.mode.channels:
+                if problem := self.material.why_not(path.moved(part.stretch[:1], 0.0)):
+                    raise ModelError(problem)
 
     def _check_parameters(self) -> None:
+        if self.material.needs_matrix:
+            raise ModelError(
+                f"material '{self.material.name}' is fibres alone, without stiffness where they are not stretched: add "
+                f"a matrix, as in 'neo-hookean+{self.material.name}'."
+            )
         shared = [p.symbol for p in self.discrepancy.parameters if p.symbol in self.material_symbols]
         if shared:
             raise ModelError(

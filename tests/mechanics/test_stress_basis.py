@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from loading import MEASURED
-from tissuq.experiments.modes import Equibiaxial, Planar, Uniaxial
+from tissuq.experiments.modes import Equibiaxial, Planar, SimpleShearNormal, Uniaxial
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3, StretchMaterial, stress_basis, traced_stress_basis
 from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.stress import differentiator
@@ -77,6 +77,13 @@ def test_few_points_and_many_give_the_same_stress(material, nonlinear, measured)
     repeated = np.concatenate([points] * (1 + MANY.size // len(points)))
     few, many = (stress_basis(material, measured.path, each, nonlinear) for each in (points, repeated))
     np.testing.assert_allclose(few, many[: len(points)], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(("material", "nonlinear"), [(NeoHookean(), []), (Ogden1(), [3.3])])
+def test_the_compiled_normal_stress_of_no_shear_is_nothing_although_two_stretches_are_equal(material, nonlinear):
+    shear, normal = SimpleShearNormal().channels
+    for path in (shear, normal):
+        assert np.asarray(traced_stress_basis(material, path, np.zeros(1), nonlinear)) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_what_an_imaginary_step_cannot_differentiate_is_left_to_jax():

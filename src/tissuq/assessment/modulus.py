@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tissuq.experiments.modes import loading_mode
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points, widened
 from tissuq.inference.solution import Solution
-from tissuq.mechanics import stress_basis
+from tissuq.mechanics import Material, initial_shear_modulus, stress_basis
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import coefficients
 
@@ -56,14 +56,27 @@ def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:
 
 def _moduli(model: StatisticalModel, bent: FloatArray) -> FloatArray:
     """Return the initial shear moduli (M, k) of unit `column_symbols` at exponents (M, s); zero for a discrepancy's."""
-    near = 1 + STEP * np.array([-2, -1, 1, 2])
     distinct, group = np.unique(bent, axis=0, return_inverse=True)
-    basis = stress_basis(model.material, loading_mode("uniaxial"), near, distinct)
-    basis = np.broadcast_to(basis, (len(distinct), *basis.shape[-2:]))
-    slope = np.einsum("s,msk->mk", np.array([1, -8, 8, -1]) / (12 * STEP), basis)
+    own = (_slopes if model.material.is_isotropic else _derivatives)(model.material, distinct)
     found = np.zeros((len(bent), len(model.column_symbols)))
-    found[:, : slope.shape[1]] = slope[group.ravel()] / 3
+    found[:, : own.shape[1]] = own[group.ravel()]
     return found
+
+
+def _slopes(material: Material, bent: FloatArray) -> FloatArray:
+    """Return initial shear moduli by differences of the stress, which need no compiler."""
+    near = 1 + STEP * np.array([-2, -1, 1, 2])
+    basis = stress_basis(material, loading_mode("uniaxial"), near, bent)
+    basis = np.broadcast_to(basis, (len(bent), *basis.shape[-2:]))
+    return np.asarray(np.einsum("s,msk->mk", np.array([1, -8, 8, -1]) / (12 * STEP), basis) / 3)
+
+
+def _derivatives(material: Material, bent: FloatArray) -> FloatArray:
+    """Return initial shear moduli of a material with fibres: of its matrix, as fibres at rest bear nothing."""
+    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(bent), axis=0)
+    values[:, :, ~is_linear] = bent[:, None]
+    return np.array([[initial_shear_modulus(material, each) for each in unit] for unit in values])
 
 
 def _scaled(marginal: Marginal, factor: float) -> Marginal:

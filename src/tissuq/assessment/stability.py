@@ -114,7 +114,7 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     Raises
     ------
     ModelError
-        When the material's energy cannot be differentiated at many states at once.
+        When the material has directions, or its energy cannot be differentiated at many states at once.
     """
     found = _criteria(solution.model, _some(solution), mode, stretch)
     stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(found))
@@ -188,6 +188,11 @@ def _criteria(
 
     For one draw of every component.
     """
+    if not model.material.is_isotropic:
+        raise ModelError(
+            f"the stability of material '{model.material.name}' is not known: the criteria are those of isotropic "
+            "materials, and it has fibres."
+        )
     draws = len(parts.weights)
     count = MOST_VALUES // (10 * len(stretch) * len(model.column_symbols)) if model.bent_symbols else AT_ONCE
     blocks = [parts[block] for block in np.array_split(np.arange(draws), -(-draws // max(1, count)))]

@@ -1,5 +1,6 @@
 """What the material says: strain energies, and stress as their derivative along a loading mode."""
 
+from tissuq.mechanics.fibres import FibreMaterial
 from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Ogden1, Ogden2, Ogden3, Yeoh
 from tissuq.mechanics.named import material_named
@@ -8,6 +9,7 @@ from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, s
 from tissuq.mechanics.user_law import FunctionLaw, load_material
 
 __all__ = [
+    "FibreMaterial",
     "FunctionLaw",
     "Material",
     "MooneyRivlin",

@@ -10,7 +10,7 @@ import numpy as np
 from tissuq.parameters import Parameter
 from tissuq.priors import LogUniform
 
-__all__ = ["LIMIT", "exp", "expm1", "library", "log", "log_left", "sqrt"]
+__all__ = ["LIMIT", "cos", "exp", "expm1", "library", "log", "log_left", "positive_part", "sin", "sqrt"]
 
 LIMIT = Parameter(
     "Jm", "value of I1 - 3 at which the material locks", "limit", (0.0, float("inf")), False, LogUniform(1.001, 100.0)
@@ -41,6 +41,21 @@ def expm1(value: Any) -> Any:
 def sqrt(value: Any) -> Any:
     """Return the square root."""
     return library(value).sqrt(value)
+
+
+def cos(value: Any) -> Any:
+    """Return the cosine."""
+    return library(value).cos(value)
+
+
+def sin(value: Any) -> Any:
+    """Return the sine."""
+    return library(value).sin(value)
+
+
+def positive_part(value: Any) -> Any:
+    """Return the value where its real part is positive, and zero (with its derivatives) elsewhere."""
+    return library(value).where(value.real > 0, value, 0.0)
 
 
 def log_left(ratio: Any) -> Any:

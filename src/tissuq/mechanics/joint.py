@@ -50,7 +50,8 @@ def rows_along(path: Path, points: FloatArray, curve: int) -> FloatArray:
     found = np.empty((len(points), PLANE_RATES.stop))
     found[:, CURVE], found[:, ABSCISSA] = curve, path.abscissa(points)
     for parts, values, rates in ((moved.stretches, STRETCHES, RATES), (moved.plane, PLANE, PLANE_RATES)):
-        columns = np.stack([np.broadcast_to(each, len(points)).astype(complex) for each in parts], axis=1)
+        known = [np.nan if each is None else each for each in parts]
+        columns = np.stack([np.broadcast_to(each, len(points)).astype(complex) for each in known], axis=1)
         found[:, values], found[:, rates] = columns.real, columns.imag / STEP / path.loaded_axes
     return found
 

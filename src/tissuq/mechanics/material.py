@@ -18,12 +18,12 @@ __all__ = ["Material", "StretchMaterial", "materials"]
 
 @dataclass(frozen=True)
 class Material(ABC):
-    """An isotropic, incompressible hyperelastic material W(I1, I2).
+    """An incompressible hyperelastic material, isotropic as W(I1, I2) unless it says otherwise.
 
     A new material is one subclass in one file: its name, formula, parameters and energy. The energy is written
     with plain arithmetic and must vanish at I1 = I2 = 3; every stress is its derivative along a loading mode, so no
-    material holds a stress formula. A law of the principal stretches, such as Ogden's, is a `StretchMaterial`. The sum
-    of two materials is a material.
+    material holds a stress formula. A law of the principal stretches, such as Ogden's, is a `StretchMaterial`; fibres
+    are a `FibreMaterial`. The sum of two materials is a material.
     """
 
     name: ClassVar[str]
@@ -32,6 +32,9 @@ class Material(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     caution: ClassVar[str] = ""
     """What a reader of its parameters must know."""
+    is_isotropic: ClassVar[bool] = True
+    needs_matrix: ClassVar[bool] = False
+    """Whether it has no stiffness of its own at the reference, so that it is only part of a sum."""
 
     def __add__(self, other: Material) -> Material:
         from tissuq.mechanics.materials.sums import added
@@ -50,6 +53,10 @@ class Material(ABC):
     def energy_of(self, deformation: Deformation, values: Any) -> Any:
         """Return the same energy (MPa) of a deformation; a material with directions sees more than the stretches."""
         return self.energy(deformation.stretches, values)
+
+    def why_not(self, deformation: Deformation) -> str:
+        """Return why a mode does not say how a specimen of this material deforms, in a sentence, or nothing."""
+        return ""
 
 
 class StretchMaterial(Material):

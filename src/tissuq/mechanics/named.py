@@ -6,6 +6,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from tissuq.errors import ModelError
+from tissuq.mechanics.fibres import FibreMaterial
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.materials.ogden import Ogden
 from tissuq.mechanics.materials.polynomial import Rivlin
@@ -17,8 +18,19 @@ __all__ = ["FORMS", "GROUP", "material_named", "plugins"]
 
 GROUP = "tissuq.materials"
 """The entry points through which other packages add materials."""
-FAMILIES = Rivlin, Ogden
-FORMS = (*(family.form for family in FAMILIES), "gent+mooney-rivlin (a sum of any)", "law.py:Name (a law of your own)")
+FAMILIES = Rivlin, Ogden, FibreMaterial
+SUMS = {
+    "standard-reinforcing": "neo-hookean+standard-fibres",
+    "holzapfel-gasser-ogden": "neo-hookean+exponential-fibres",
+    "gasser-ogden-holzapfel": "neo-hookean+dispersed-fibres",
+}
+"""Sums that have a name in the literature."""
+FORMS = (
+    *(family.form for family in FAMILIES),
+    *(f"{name} ({parts})" for name, parts in SUMS.items()),
+    "gent+mooney-rivlin (a sum of any)",
+    "law.py:Name (a law of your own)",
+)
 """What names can be, beside those of the list."""
 
 
@@ -45,7 +57,8 @@ def material_named(material: str | Material, *, laws: bool = False) -> Material:
     """
     if isinstance(material, Material):
         return material
-    parts = [_single(part.strip(), laws) for part in material.split("+")]
+    names = [SUMS.get(part.strip(), part) for part in material.split("+")]
+    parts = [_single(part.strip(), laws) for part in "+".join(names).split("+")]
     return added(*parts) if len(parts) > 1 else parts[0]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.errors import InputError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Components, Solution
@@ -96,6 +96,9 @@ def predict_average(
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
     if not 0 <= channel < len(asked.stresses):
         raise InputError(f"mode '{asked.name}' has the stresses {', '.join(asked.stresses)}: no number {channel}.")
+    for _, solution in parts:
+        if problem := solution.model.material.why_not(asked.channels[channel].moved(points[:1], 0.0)):
+            raise ModelError(problem)
     for _, solution in parts if discrepancy else ():
         _check_mode(solution, asked)
     count = FEW if len(points) > BLOCK else MANY

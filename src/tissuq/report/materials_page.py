@@ -14,10 +14,10 @@ __all__ = ["default_in_words", "materials_page"]
 HEAD = """# Materials
 
 Written by `tissuq materials --markdown` from the classes; a test holds it up to date. W is the strain energy per
-undeformed volume, I1 and I2 the invariants of the right Cauchy-Green tensor, l1, l2, l3 the principal stretches; every
-material is incompressible, and every stress is a derivative of W. Linear parameters, to which the stress is
-proportional, are integrated in closed form. A limit Jm is never inside the data: a specimen that was stretched so
-far has not locked.
+undeformed volume, I1 and I2 the invariants of the right Cauchy-Green tensor, l1, l2, l3 the principal stretches, I4
+the squared stretch along fibres; every material is incompressible, and every stress is a derivative of W. Linear
+parameters, to which the stress is proportional, are integrated in closed form. A limit Jm is never inside the data: a
+specimen that was stretched so far has not locked.
 """
 LIBRARY = "tissuq.mechanics.materials."
 SCALES = {

@@ -39,6 +39,7 @@ class Deformation:
         The principal stretches, that of the thickness last where it is free of stress.
     plane : tuple of three arrays
         C11, C22 and C12 of C = F'F in the plane of the test, the first loaded axis first: what fibres there feel.
+        None where the test leaves it to the material, so that only a symmetric one is known to deform like this.
     """
 
     stretches: tuple[Any, Any, Any]
@@ -80,7 +81,8 @@ class LoadingMode(Path):
 
     A new mode is one subclass: it names itself and says which deformation belongs to a stretch. The
     engineering stress is the derivative of the strain energy along the path, shared by the loaded axes. A mode with
-    other controls, or with several stresses, names them and overrides `moved` or `channels`.
+    other controls, or with several stresses, names them and overrides `moved` or `channels`; one whose deformation only
+    an isotropic material has overrides `moved` to say so.
     """
 
     name: ClassVar[str]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from tissuq.experiments.modes.mode import LoadingMode
+from tissuq.experiments.modes.mode import Deformation, LoadingMode
 
 __all__ = ["Equibiaxial", "Planar", "Uniaxial"]
 
 
 class Uniaxial(LoadingMode):
-    """Tension or compression along one axis: F = diag(l, l^-1/2, l^-1/2)."""
+    """Tension or compression along one axis: F = diag(l, l^-1/2, l^-1/2).
+
+    The lateral stretches are equal because the material is isotropic, or symmetric about the axis.
+    """
 
     name = "uniaxial"
     description = "tension or compression along one axis"
@@ -19,9 +22,16 @@ class Uniaxial(LoadingMode):
         lateral = stretch**-0.5
         return stretch, lateral, lateral
 
+    def moved(self, point: Any, step: Any) -> Deformation:
+        stretches = self.principal_stretches(point + step)
+        return Deformation(stretches, (stretches[0] ** 2, None, None))
+
 
 class Equibiaxial(LoadingMode):
-    """Equal stretch along two axes: F = diag(l, l, l^-2)."""
+    """Equal stretch along two axes: F = diag(l, l, l^-2).
+
+    The stresses of both axes are one because the material is isotropic; `Biaxial` has two.
+    """
 
     name = "equibiaxial"
     description = "equal tension along two axes"
@@ -29,6 +39,9 @@ class Equibiaxial(LoadingMode):
 
     def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
         return stretch, stretch, stretch**-2
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        return Deformation(self.principal_stretches(point + step), (None, None, None))
 
 
 class Planar(LoadingMode):

@@ -3,6 +3,7 @@
 from tissuq.mechanics.materials.arruda_boyce import ArrudaBoyce
 from tissuq.mechanics.materials.exponential import Demiray, Fung, VerondaWestmann
 from tissuq.mechanics.materials.extended_tube import ExtendedTube
+from tissuq.mechanics.materials.fibres import DispersedFibres, ExponentialFibres, StandardFibres
 from tissuq.mechanics.materials.gent import Gent, GentGent
 from tissuq.mechanics.materials.knowles import Knowles
 from tissuq.mechanics.materials.ogden import Ogden, Ogden1, Ogden2, Ogden3
@@ -15,6 +16,8 @@ __all__ = [
     "ArrudaBoyce",
     "Biderman",
     "Demiray",
+    "DispersedFibres",
+    "ExponentialFibres",
     "ExtendedTube",
     "Fung",
     "Gent",
@@ -31,6 +34,7 @@ __all__ = [
     "Ogden3",
     "PengLandel",
     "Rivlin",
+    "StandardFibres",
     "ValanisLandel",
     "VanDerWaals",
     "VerondaWestmann",

@@ -56,6 +56,16 @@ class MaterialSum(Material):
         return " ".join([*(part.caution for part in self.parts if part.caution), own])
 
     @property
+    def is_isotropic(self) -> bool:  # type: ignore[override]
+        """Whether all parts are."""
+        return all(part.is_isotropic for part in self.parts)
+
+    @property
+    def needs_matrix(self) -> bool:  # type: ignore[override]
+        """Whether all parts do."""
+        return all(part.needs_matrix for part in self.parts)
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         """The parameters of its parts."""
         every = [each.symbol for part in self.parts for each in part.parameters]
@@ -73,6 +83,9 @@ class MaterialSum(Material):
 
     def energy_of(self, deformation: Deformation, values: Any) -> Any:
         return sum(part.energy_of(deformation, own) for part, own in self._shares(values))
+
+    def why_not(self, deformation: Deformation) -> str:
+        return next(filter(None, (part.why_not(deformation) for part in self.parts)), "")
 
     def _shares(self, values: Any) -> list[tuple[Material, Any]]:
         """Return every part with its values."""
