@@ -77,7 +77,8 @@ def fit(
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     tolerances : Tolerances
         By how much whole tests may be off, such as ``Tolerances(stress=0.1, length=0.02)``; by default tests of
-        different specimens agree to 18 % in stress (four or more tell by themselves how far they are apart), and a single test has no such errors.
+        different specimens agree to 18 % in stress (four or more tell by themselves how far they are apart), and a
+        single test has no such errors.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.

@@ -44,15 +44,16 @@ def measured(
     InputError
         When there is not one mode, specimen or noise for each file, or a file does not say its mode.
     """
+    from tissuq.experiments.told_mode import said_mode, told_mode
+
     noise = _numbers(noise_sd)
     if len(files) < 2:
         for option, every in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if every and len(every) > 1:
                 raise InputError(f"{option} is given {len(every)} times for one file; give it once.")
         own: dict[str, Any] = {"file": str(files[0])} if files else {}
-        return reading | own | {"mode": modes[0] if modes else None, "noise_sd": noise[0] if noise else None}
-    from tissuq.experiments.told_mode import told_mode
-
+        mode = modes[0] if modes else said_mode(files[0]) if files else None
+        return reading | own | {"mode": mode, "noise_sd": noise[0] if noise else None}
     modes = _for_each(files, "--mode", modes) or [told_mode(file) for file in files]
     names = _for_each(files, "--specimen", specimens)
     each_noise = _for_each(files, "--noise-sd", noise) if noise and len(noise) > 1 else None

@@ -83,21 +83,21 @@ def _hysteresis(reading: Reading) -> str:
 
 def _reference(reading: Reading) -> str:
     used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
-    nearest = int(np.argmin(np.abs(used.stretch - 1)))
-    gap = abs(float(used.stretch[nearest]) - 1)
-    furthest = float(np.abs(used.stretch - 1).max())
+    control = reading.experiment.mode.controls[0]
+    change = np.abs(used.stretch - control.reference)
+    nearest = int(np.argmin(change))
+    gap, furthest = float(change[nearest]), float(change.max())
     if gap > NOTABLE * furthest:
         position = " If the file gives positions, not displacements, --preload sets their zero."
-        return f"the measurements begin at stretch {used.stretch[nearest]:.4g}, not near 1." + position * (
-            reading.choice.measure == "displacement"
-        )
+        begin = f"the measurements begin at {control.name} {used.stretch[nearest]:.4g}, not near {control.reference:g}."
+        return begin + position * (reading.choice.measure == "displacement")
     stress = float(used.stress[nearest])
     if abs(stress) <= NOTABLE * np.abs(used.stress).max():
         return ""
     return (
-        f"at stretch {used.stretch[nearest]:.4g} the stress is already {stress / unit.to_mpa:.3g} {unit.name}, "
+        f"at {control.name} {used.stretch[nearest]:.4g} the stress is already {stress / unit.to_mpa:.3g} {unit.name}, "
         f"{abs(stress) / np.abs(used.stress).max():.0%} of the largest: a preload, or the zero of the load cell. "
-        "A hyperelastic material has no stress at stretch 1."
+        f"A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
 
 

@@ -8,10 +8,15 @@ from pathlib import Path
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_modes
 
-__all__ = ["told_mode"]
+__all__ = ["said_mode", "told_mode"]
 
 OTHER_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "shear": "simple-shear", "biaxial": "biaxial"}
 LINES = 20
+
+
+def said_mode(file: Path) -> str | None:
+    """Return the mode that a comment line such as ``# mode: planar`` at the head of a file says; None without one."""
+    return _named(_in_comments(file))
 
 
 def told_mode(file: Path) -> str:
@@ -27,19 +32,22 @@ def told_mode(file: Path) -> str:
     >>> told_mode(Path("liver-7-planar.csv")), told_mode(Path("simple_shear.csv")), told_mode(Path("tension.csv"))
     ('planar', 'simple-shear', 'uniaxial')
     """
-    said = _in_comments(file)
-    for text in (said, file.stem):
-        words = "-".join(re.findall(r"[a-z]+", text.lower()))
-        for name in sorted(loading_modes(), key=len, reverse=True):
-            if re.search(rf"(^|-){name}($|-)", words):
-                return name
-        found = {mode for word, mode in OTHER_WORDS.items() if word in words.split("-")}
-        if len(found) == 1:
-            return found.pop()
+    found = said_mode(file) or _named(file.stem)
+    if found:
+        return found
     raise InputError(
         f"neither '{file}' nor its name says in which loading mode it was measured: give --mode once for each file, "
         f"in their order ({', '.join(loading_modes())})."
     )
+
+
+def _named(text: str) -> str | None:
+    words = "-".join(re.findall(r"[a-z]+", text.lower()))
+    for name in sorted(loading_modes(), key=len, reverse=True):
+        if re.search(rf"(^|-){name}($|-)", words):
+            return name
+    found = {mode for word, mode in OTHER_WORDS.items() if word in words.split("-")}
+    return found.pop() if len(found) == 1 else None
 
 
 def _in_comments(file: Path) -> str:
