@@ -66,7 +66,7 @@ def test_a_copied_data_set_is_overwritten_with_force_alone(cli, here):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--copy", "rubber-treloar"], ["'rubber-treloar'", "Did you mean 'rubber-treloar-uniaxial'?"]),
+        (["--copy", "rubber-treloar-uni"], ["'rubber-treloar-uni'", "Did you mean 'rubber-treloar-uniaxial'?"]),
         (["--copy", ""], ["no data set named ''"]),
         (["--to", "folder"], ["--to", "--copy NAME"]),
         (["--force"], ["--force", "--copy NAME"]),

@@ -54,6 +54,8 @@ def held_out_tests(tests: Sequence[Experiment], **options: Any) -> pd.DataFrame:
 
     if len(tests) < 2:
         raise InputError("to predict a test from the others there must be two or more.")
+    if options.get("tolerances") is None:  # those of all tests, of which one alone has none
+        options["tolerances"] = fit(tests, **options).model.tolerances
     rows = []
     for place, test in enumerate(tests):
         posterior = fit([other for number, other in enumerate(tests) if number != place], **options)

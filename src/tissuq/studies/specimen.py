@@ -216,6 +216,7 @@ def run_specimen(
     for name in posteriors if settings.held_out else ():
         step(f"{name}: each test from the others")
         options = _options(settings, material, priors, symbols[name], unit)
+        options["tolerances"] = posteriors[name].model.tolerances
         found = held_out_tests(experiment.parts, discrepancy=name, **options).to_dict("records")
         held_out += [{"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in found]
     parts = settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings)
