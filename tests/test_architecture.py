@@ -15,8 +15,8 @@ from tissuq.registry import variants
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "gaussian", "priors", "parameters", "smoothing", "experiments", "mechanics", "discrepancy",
-    "noise", "statistics", "scales", "tolerances", "whitening", "model", "inference", "prediction", "assessment",
-    "cautions", "posterior", "fitting", "studies", "report", "cli", "__main__",
+    "noise", "statistics", "scales", "tolerances", "whitening", "compatibility", "model", "inference", "prediction",
+    "assessment", "cautions", "posterior", "fitting", "studies", "report", "cli", "__main__",
 ]  # fmt: skip
 
 

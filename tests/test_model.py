@@ -20,10 +20,12 @@ def model(discrepancy="quadratic", material=None, noise_sd=0.1, **options):
     return StatisticalModel(DATA, material or NeoHookean(), discrepancy_named(discrepancy), noise_sd, **options)
 
 
-def test_an_experiment_with_several_stresses_is_refused_in_words():
-    data = tq.simulate("neo-hookean", {"C10": 1.0}, [[1.1, 1.0], [1.2, 1.1], [1.3, 1.0]], mode="biaxial")
-    with pytest.raises(tq.ModelError, match=r"stress of axis 1 and .* of axis 2 \(biaxial\): a fit takes one stress"):
-        StatisticalModel(data, NeoHookean(), discrepancy_named("none"))
+def test_an_experiment_with_several_stresses_has_a_row_for_each():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, [1.1, 1.2, 1.3], 0.01, mode="constrained-uniaxial")
+    model = StatisticalModel(data, NeoHookean(), discrepancy_named("none"), 0.01)
+    assert len(model.experiment) == 6
+    held = 2 * (1 - model.experiment.stretch[3:, 1] ** -2)
+    assert np.allclose(model.design[3:, 0], held, rtol=1e-12)
 
 
 def test_linear_and_nonlinear_parameters_are_told_apart_without_names():
@@ -85,7 +87,7 @@ def test_chosen_priors_replace_defaults():
         (lambda: model(noise_sd=0.0), "noise_sd must be a positive number"),
         (lambda: model(noise_sd=-1.0), "noise_sd must be a positive number"),
         (lambda: model(noise_sd=float("nan")), "noise_sd must be a positive number"),
-        (lambda: model(noise_sd="big"), "one of unknown, proportional, repeats; not 'big'"),
+        (lambda: model(noise_sd="big"), "one of unknown, proportional, repeats, autoregressive; not 'big'"),
         (lambda: model("yeoh", Yeoh()), "adds C20, C30, which material 'yeoh' has already"),
         (lambda: model(chosen_priors={"mu": tq.Uniform(0, 1)}), "a prior for 'mu'"),
         (lambda: model(chosen_priors={"C10": tq.Uniform(-1, 1)}), "C10: .* reaches beyond"),

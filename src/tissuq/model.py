@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.compatibility import check_linearity, check_parts, check_separable
 from tissuq.discrepancy import Discrepancy, EnergyDiscrepancy, Member, separated
-from tissuq.errors import InputError, ModelError
+from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Path
-from tissuq.mechanics import Material, engineering_stress, stress_basis
-from tissuq.mechanics.joint import CURVE
+from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics.joint import CURVE, joined
 from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
 from tissuq.priors import Flat, Prior, Uniform
@@ -82,11 +83,10 @@ class StatisticalModel:
     known_statistics: Statistics | None = None
 
     def __post_init__(self) -> None:
-        self._check_mode()
+        object.__setattr__(self, "experiment", joined(self.experiment))
         object.__setattr__(self, "noise", noise_named(self.noise))
         object.__setattr__(self, "discrepancy", separated(self.discrepancy, self.material, self.experiment))
-        self._check_parameters()
-        self._check_tolerances()
+        check_parts(self.material, self.discrepancy, self.noise, self.tolerances, self.experiment)
         self._check_priors()
         self._check_data()
 
@@ -372,52 +372,6 @@ class StatisticalModel:
             boxes[parameter.symbol] = Uniform(max(low, -reach), min(high, reach))
         return boxes
 
-    def _check_mode(self) -> None:
-        mode = self.experiment.mode
-        if len(mode.channels) > 1:
-            raise ModelError(
-                f"experiment '{self.experiment.name}' measures {' and '.join(mode.stresses)} ({mode.name}): a fit "
-                "takes one stress of one control."
-            )
-        for part in self.experiment.parts:
-            for path in part.mode.channels:
-                if problem := self.material.why_not(path.moved(part.stretch[:1], 0.0)):
-                    raise ModelError(problem)
-
-    def _check_parameters(self) -> None:
-        if self.material.needs_matrix:
-            raise ModelError(
-                f"material '{self.material.name}' is fibres alone, without stiffness where they are not stretched: add "
-                f"a matrix, as in 'neo-hookean+{self.material.name}'."
-            )
-        shared = [p.symbol for p in self.discrepancy.parameters if p.symbol in self.material_symbols]
-        if shared:
-            raise ModelError(
-                f"discrepancy '{self.discrepancy.name}' adds {', '.join(shared)}, which material "
-                f"'{self.material.name}' has already: no data can tell the two apart. Choose another of the two."
-            )
-
-    def _check_tolerances(self) -> None:
-        if not self.noise.parameters:
-            self.noise.of_tests(self.experiment)  # says where there is not one for each test
-        if self.noise.is_consecutive and self.discrepancy.is_correlated:
-            raise ModelError(
-                f"discrepancy '{self.discrepancy.name}' takes up correlated noise itself: choose the noise 'unknown', "
-                "or a discrepancy that is an energy, such as 'auto'."
-            )
-        if not self.tolerances:
-            return
-        if self.discrepancy.is_correlated:
-            raise ModelError(
-                f"discrepancy '{self.discrepancy.name}' takes up errors of a whole test itself: choose no tolerances, "
-                "or a discrepancy that is an energy, such as 'auto'."
-            )
-        if self.noise.depends_on_level or self.noise.shares_discrepancy:
-            raise ModelError(
-                f"noise '{self.noise}' and tolerances of whole tests do not go together: choose the noise 'unknown', "
-                "or tolerances=Tolerances(), which are none."
-            )
-
     def _check_priors(self) -> None:
         for symbol in self.chosen_priors:
             if symbol not in self.symbols:
@@ -447,15 +401,8 @@ class StatisticalModel:
         for part in self.experiment.parts:
             for path in part.mode.channels:
                 ends = np.array([part.stretch.min(axis=0), part.stretch.max(axis=0)])
-                _check_linearity(self.material, path, ends.tobytes(), ends.shape, self.usual_bent)
-        triangle = self.statistics.triangle[:, :-1]
-        lengths = np.linalg.norm(triangle, axis=0)
-        if not lengths.all() or np.linalg.cond(triangle / lengths) > 1e10:
-            raise ModelError(
-                f"the stretches of experiment '{name}' cannot separate the parameters "
-                f"{', '.join(self.column_symbols)}: measure at more or other stretches, or choose a simpler "
-                "material or discrepancy."
-            )
+                check_linearity(self.material, path, ends.tobytes(), ends.shape, self.usual_bent)
+        check_separable(self.statistics.triangle[:, :-1], name, self.column_symbols)
 
 
 def _off_zero(prior: Prior, probability: float) -> float:
@@ -475,25 +422,3 @@ def _basis(
 ) -> FloatArray:
     own, other = stress_basis(material, mode, stretch, bent), discrepancy.mean_basis(mode, stretch)
     return np.concatenate([own, np.broadcast_to(other, (*own.shape[:-1], other.shape[-1]))], axis=-1)
-
-
-@lru_cache(maxsize=256)
-def _check_linearity(
-    material: Material, mode: Path, ends: bytes, shape: tuple[int, ...], bent: tuple[float, ...]
-) -> None:
-    """Refuse a material whose stress is not proportional to the parameters that it calls linear."""
-    low, high = np.frombuffer(ends).reshape(shape)
-    stretch = np.linspace(low, high, 16)
-    is_linear = np.array([p.is_linear for p in material.parameters])
-    tried = np.empty((is_linear.sum() + 1, len(is_linear)))
-    tried[:, ~is_linear] = bent
-    tried[:, is_linear] = 0.3 + np.random.default_rng(0).random((len(tried), is_linear.sum()))
-    found = engineering_stress(material, mode, stretch, tried)
-    expected = tried[:, is_linear] @ stress_basis(material, mode, stretch, bent).T
-    if not np.allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()):
-        linear = [p.symbol for p in material.parameters if p.is_linear]
-        raise ModelError(
-            f"the stress of material '{material.name}' is not proportional to its parameters ({', '.join(linear)}), "
-            "for example because one stands in an exponent: declare such a parameter with is_linear=False and a "
-            "relative_prior."
-        )
