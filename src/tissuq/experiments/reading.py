@@ -125,7 +125,9 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
         How the specimen was loaded; uniaxial unless given.
     columns : mapping, optional
         From ``stretch``, ``strain``, ``displacement`` or ``shear`` (the amount of shear), and ``stress`` or ``force``,
-        to the name of a column or its number from 1. Columns with usual names (with a unit or not) need none.
+        to the name of a column or its number from 1. Columns with usual names (with a unit or not) need none. The
+        second axis or stress of a loading mode that has two is ``stretch2`` ... ``force2``; columns with x and y in
+        their names need none in the mode ``biaxial``.
     stress_unit : str, optional
         Unit of the stresses; without it the file's own, and MPa when the file states none. For a file of forces,
         the unit in which people want to read the stresses, kPa unless given.
@@ -138,7 +140,9 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
         Such as ``mN`` and ``um``, for columns of which the file states no unit.
     dimensions : mapping, optional
         Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
-        Without it those in the lines above the table. Only displacements and forces need them.
+        Without it those in the lines above the table. Only displacements and forces need them. In the mode
+        ``biaxial`` length and width are the sizes along the first and the second axis, and the width of one axis is
+        the length of the other.
     compression_positive : bool
         Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
         displacements that are positive, too.
@@ -152,7 +156,7 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     every : int
         Use only every second (2), third (3) ... of these rows.
     axis : str, optional
-        ``x`` or ``y``: whose columns to read from the file of a biaxial machine.
+        ``x`` or ``y``: the only one whose columns to read from the file of a biaxial machine.
     sheet : str or int, optional
         Name or number (from 1) of the sheet of an Excel workbook.
     name : str, optional
@@ -163,7 +167,8 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     Returns
     -------
     Experiment
-        Stretches (dimensionless) and engineering stresses (MPa) in the order of the file; its ``source``
+        Stretches (dimensionless) and engineering stresses (MPa) in the order of the file, with a column for each
+        axis where the loading mode has two; its ``source``
         tells the file, columns, units and every step. :func:`tissuq.inspect` shows them.
 
     Raises

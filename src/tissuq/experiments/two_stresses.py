@@ -73,7 +73,7 @@ def of_the_second(labels: Sequence[str], mode: LoadingMode) -> Iterator[None]:
     except InputError as error:
         sizes = " Along it the specimen measures --width, and across it --length." if mode.machine_axes else ""
         raise InputError(
-            f"{error} (This is the {labels[1]}: roles of its columns end in 2, as in --column stress2=NAME.{sizes})"
+            f"{error} (This is about {labels[1]}: roles of its columns end in 2, as in --column stress2=NAME.{sizes})"
         ) from error
 
 
