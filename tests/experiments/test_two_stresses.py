@@ -67,6 +67,13 @@ def test_one_area_is_that_of_both_axes(tmp_path):
     np.testing.assert_allclose(data.stress, file.stress * [0.51, 0.5], atol=1e-6)
 
 
+def test_a_given_thickness_goes_before_an_area_in_the_file(tmp_path):
+    file = biotester_protocols()
+    path = file.written(tmp_path)
+    path.write_bytes(b"Area,99,mm2\n" + path.read_bytes())
+    np.testing.assert_allclose(read_experiment(path, **file.options).stress, file.stress, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("heading", "columns"),
     [
@@ -122,6 +129,11 @@ def test_a_preload_is_that_of_each_axis_and_both_carry_it_in_the_rows_kept(tmp_p
     reference = [np.interp(5e-3, mooney_rivlin(stretch)[:, k], stretch[:, k]) for k in range(2)]
     np.testing.assert_allclose(data.stretch, stretch[kept] / reference, rtol=1e-9)
     np.testing.assert_allclose(data.stress, mooney_rivlin(stretch)[kept], rtol=1e-9)
+
+
+def test_a_preload_that_the_axes_never_carry_together_is_told(tmp_path):
+    path = of_axes(tmp_path, stress=np.array([[0, 0.02], [0, 0.02], [0.02, 0], [0.02, 0]]))
+    assert "no row is left, for all are carrying less than 5 kPa" in message(path, mode="biaxial", preload="5 kPa")
 
 
 def test_one_axis_may_be_shorter_than_undeformed_under_tension(tmp_path):

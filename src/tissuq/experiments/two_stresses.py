@@ -34,7 +34,7 @@ OTHER_WAY = {"length": "width", "width": "length"}
 def choose_every(
     table: Table, mode: LoadingMode, columns: Mapping[str, str | int] | None, stress_type: str, axis: str | None
 ) -> dict[str, ColumnChoice]:
-    """Return the columns of every stress of a mode, by what it is called; nothing where there is one.
+    """Return the columns of every stress of a mode, by what it is called; of a mode with one by "".
 
     Those of a second stress are found by the axis in their names, or given in roles that end in 2.
 
@@ -102,7 +102,8 @@ def dimensions_of_axes(
         unneeded = {"length"} if choice.measure != "displacement" and other.load == "force" else set()
         unneeded |= {"width"} if choice.load != "force" and other.measure == "displacement" else set()
         known = dict(each.known)
-        if other.measure == "displacement" and not {"area", "width"} & set(known):
+        is_sought = "width" not in known and ("area" not in known or "thickness" in each.given)
+        if other.measure == "displacement" and is_sought:
             size = initial_size(table, other, moved)
             known |= {"width": size} if size else {}
         found.append(replace(each, known=known, given=each.given - unneeded))
@@ -110,8 +111,18 @@ def dimensions_of_axes(
 
 
 def on_same_rows(curves: Sequence[Curve], reason: str) -> list[Curve]:
-    """Return the curves with only the rows that each of them has kept; the others are dropped for a reason."""
+    """Return the curves with only the rows that each of them has kept; the others are dropped for a reason.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
     common = reduce(np.intersect1d, [curve.rows for curve in curves])
+    if not len(common):
+        raise InputError(
+            f"{curves[0].table.file}: no row is left, for all are {reason}. Give a lower --preload, or another --cycle."
+        )
     return [curve.kept(np.flatnonzero(np.isin(curve.rows, common)), reason) for curve in curves]
 
 
