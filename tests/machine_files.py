@@ -120,6 +120,33 @@ def biotester() -> MachineFile:
     )
 
 
+C10, C01 = 0.015, 0.005
+
+
+def mooney_rivlin(stretch):
+    """Engineering stresses (MPa) of both axes, (n, 2), at stretches of both (n, 2); C10 and C01 as above."""
+    own, other = stretch, stretch[:, ::-1]
+    thickness = 1 / (own * other)
+    return 2 * (own**2 - thickness**2) * (C10 + C01 * other**2) / own
+
+
+def biotester_protocols() -> MachineFile:
+    """The BioTester with different stretches on its axes, a cycle each: 1:1, 1:0.5 and 0.5:1."""
+    there = np.linspace(0.0, 0.25, 31)
+    back = np.concatenate([there, there[-2::-1]])
+    stretch = np.concatenate([1 + np.outer(back, ratio) for ratio in ((1, 1), (1, 0.5), (0.5, 1))])
+    moved, stress = (stretch - 1) * [5000, 5100], mooney_rivlin(stretch)
+    force = stress * [5.1 * 1.5, 5.0 * 1.5] * 1e3
+    lines = ["SetName,Cycle,Time_S,Temperature,XSize_um,YSize_um,XDisplacement_um,YDisplacement_um,XForce_mN,YForce_mN"]
+    for i, (u, f) in numbered(moved, force):
+        phase = "Stretch" if i % 61 < 31 else "Recover"
+        sizes = f"{5000 + u[0]:.3f},{5100 + u[1]:.3f},{u[0]:.3f},{u[1]:.3f}"
+        lines.append(f"Test,{i // 61 + 1}-{phase},{i / 5},37.0,{sizes},{f[0]:.3f},{f[1]:.3f}")
+    loading = np.arange(len(stretch)) % 61 < 31
+    options = {"mode": "biaxial", "branch": "loading", "dimensions": {"thickness": "1.5 mm"}}
+    return MachineFile("biaxialData.csv", "\n".join(lines).encode(), stretch[loading], stress[loading], options)
+
+
 def univert() -> MachineFile:
     """CellScale's UniVert: one axis; the length is the size less the displacement."""
     stretch = ramp(rows=50)
@@ -166,7 +193,8 @@ def mts() -> MachineFile:
 
 
 LAYOUTS: dict[str, Callable[[], MachineFile]] = {
-    layout.__name__: layout for layout in (instron, instron_compression, zwick, biotester, univert, wintest, mts)
+    layout.__name__: layout
+    for layout in (instron, instron_compression, zwick, biotester, biotester_protocols, univert, wintest, mts)
 }
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from machine_files import instron, wintest, zwick
+from machine_files import biotester_protocols, instron, wintest, zwick
 
 from .conftest import tree
 
@@ -67,6 +67,24 @@ def test_a_fit_says_what_is_strange_about_the_measurements(cli, here):
     said = cli("fit", path, "--length", "10 mm", "--area", "6 mm2", "--discrepancy", "none", "--no-figures")
     assert said.status == 0, said.err
     assert "all 3 cycles are used; to fit one" in said.out
+
+
+def test_both_axes_of_a_biaxial_test_are_inspected_and_fitted_at_once(cli, here):
+    file = biotester_protocols()
+    options = [file.written(here), "--mode", "biaxial", "--thickness", "1.5 mm", "--branch", "loading"]
+    said = cli("inspect", *options, "--out", "seen")
+    assert (said.status, said.err) == (0, "")
+    assert "'YForce_mN' is force of axis y" in " ".join(said.out.split())
+    assert "axis x, as recorded" in (here / "seen" / "figures" / "curve.svg").read_text()
+    said = cli("fit", *options, "--material", "mooney-rivlin", "--discrepancy", "none", "--no-figures", "--out", "run")
+    assert said.status == 0, said.err
+    for folder in ("seen", "run"):
+        data = np.loadtxt(here / folder / "data.csv", delimiter=",", skiprows=1, usecols=(3, 4))
+        np.testing.assert_allclose(data[:, 0], file.stretch.T.ravel(), atol=1e-6)
+        np.testing.assert_allclose(data[:, 1], file.stress.T.ravel(), atol=1e-6)
+    said = cli("fit", "--config", "run/run.toml", "--out", "again", "--no-figures")
+    assert said.status == 0, said.err
+    assert (here / "again" / "data.csv").read_bytes() == (here / "run" / "data.csv").read_bytes()
 
 
 @pytest.mark.parametrize("command", ["inspect", "fit"])

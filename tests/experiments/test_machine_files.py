@@ -146,7 +146,7 @@ def test_a_biaxial_file_is_read_one_axis_at_a_time(tmp_path):
     path = biotester().written(tmp_path)
     text = message(path)
     assert "axis='x' (--axis x)" in text
-    assert "Both axes at once belong to a biaxial mode" in text
+    assert "both at once: mode='biaxial' (--mode biaxial)" in text
     assert "no columns of an axis 'x'" in message(instron().written(tmp_path), axis="x")
     assert "axis must be one of x, y, not 'z'" in message(path, axis="z")
 

@@ -468,7 +468,7 @@ def test_a_column_is_given_as_shear_by_name(tmp_path):
         ({"mode": "uniaxial", "columns": {"shear": "gamma"}}, "given as shear, but this loading mode has a stretch"),
         ({"mode": "simple-shear", "columns": {"strain": "gamma"}}, "given as strain, but .* has an amount of shear"),
         ({"mode": "simple-shear", "compression_positive": True}, "no meaning for a shear stress"),
-        ({"mode": "biaxial"}, "modes with one stress, and 'biaxial' has .* axis 2: give its values to Experiment"),
+        ({"mode": "biaxial"}, "'biaxial' has .* axis 2, and the file's columns do not tell both"),
     ],
 )
 def test_what_does_not_go_with_a_mode_is_refused(tmp_path, options, words):

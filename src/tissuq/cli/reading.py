@@ -39,7 +39,8 @@ Mode = Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")]
 Column = Annotated[
     list[str] | None,
     typer.Option(
-        help="ROLE=COLUMN for stretch, strain or displacement, and stress or force, such as stretch=Strain; repeat."
+        help="ROLE=COLUMN for stretch, strain or displacement, and stress or force, such as stretch=Strain; repeat. "
+        "Of a second axis or stress: stretch2 ... force2."
     ),
 ]
 StressUnit = Annotated[
@@ -49,9 +50,13 @@ StressType = Annotated[str | None, typer.Option(help="engineering or cauchy [eng
 StrainUnit = Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")]
 ForceUnit = Annotated[str | None, typer.Option(help="Unit of a force column that states none, such as mN.")]
 DisplacementUnit = Annotated[str | None, typer.Option(help="Unit of a displacement column that states none.")]
-Length = Annotated[str | None, typer.Option(help="Undeformed length, such as '20 mm' [the file's].")]
+Length = Annotated[
+    str | None, typer.Option(help="Undeformed length, such as '20 mm' [the file's]; in mode biaxial that along x.")
+]
 Area = Annotated[str | None, typer.Option(help="Undeformed cross-section, such as '10 mm2' [the file's].")]
-Width = Annotated[str | None, typer.Option(help="With --thickness, instead of --area.")]
+Width = Annotated[
+    str | None, typer.Option(help="With --thickness, instead of --area; in mode biaxial the size along y.")
+]
 Thickness = Annotated[str | None, typer.Option(help="With --width, instead of --area.")]
 Diameter = Annotated[str | None, typer.Option(help="Of a round specimen, instead of --area.")]
 CompressionPositive = Annotated[
@@ -63,7 +68,7 @@ Preload = Annotated[
     str | None, typer.Option(help="Force or stress at which the specimen is taut ('0.05 N'): stretch 1 is there.")
 ]
 Every = Annotated[int | None, typer.Option(help="Use only every N-th row [1].")]
-Axis = Annotated[str | None, typer.Option(help="x or y: the axis to read from a biaxial machine's file.")]
+Axis = Annotated[str | None, typer.Option(help="x or y: the only axis to read from a biaxial machine's file.")]
 Sheet = Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")]
 SkipRows = Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")]
 

@@ -12,7 +12,17 @@ from tissuq.experiments.table import Table
 from tissuq.experiments.units import looks_like_unit
 from tissuq.experiments.vocabulary import STRESS_NAMES, on_axis, plain, role_names
 
-__all__ = ["ColumnChoice", "Heading", "choose_columns", "declared_unit", "heading"]
+__all__ = [
+    "DEFORMATIONS",
+    "LOADS",
+    "ColumnChoice",
+    "Heading",
+    "axes_of",
+    "choose_columns",
+    "columns_there_are",
+    "declared_unit",
+    "heading",
+]
 
 DEFORMATIONS = ("stretch", "strain", "displacement", "shear")
 LOADS = ("stress", "force")
@@ -86,6 +96,11 @@ def declared_unit(table: Table, column: int) -> str:
     return beneath or in_heading
 
 
+def axes_of(table: Table) -> list[str]:
+    """Return the axes (x, y) of which the table has columns."""
+    return sorted({axis for axis, _ in (on_axis(heading(name).quantity) for name in table.names) if axis})
+
+
 def choose_columns(
     table: Table,
     mapping: Mapping[str, str | int] | None,
@@ -138,7 +153,7 @@ def choose_columns(
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
-            f"give two columns. {_columns_there_are(table)}"
+            f"give two columns. {columns_there_are(table)}"
         )
     choice = ColumnChoice(deformation, stress, measure, load)
     _check_measures(table, choice, stress_type)
@@ -148,15 +163,15 @@ def choose_columns(
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
     found = [on_axis(heading(name).quantity) for name in table.names]
-    axes = sorted({each for each, _ in found if each})
+    axes = axes_of(table)
     if axis is not None and axis not in axes:
         raise InputError(
-            f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
+            f"{table.file} has no columns of an axis '{axis}'. {columns_there_are(table)} Leave axis (--axis) out."
         )
     if axis is None and len(axes) == 2 and not mapping:
         raise InputError(
             f"{table.file} is of a biaxial test. Say which axis is read: axis='x' (--axis x) or axis='y' (--axis y), "
-            "with the loading mode that belongs to it. Both axes at once belong to a biaxial mode, not to this reader."
+            "with the loading mode that belongs to it, or read both at once: mode='biaxial' (--mode biaxial)."
         )
     wanted = axis or (axes[0] if len(axes) == 1 else "")
     return [name if each in ("", wanted) else "" for each, name in found]
@@ -199,7 +214,7 @@ def _find(table: Table, role: str, wanted: str | int) -> int:
     close = get_close_matches(text.lower(), [name.lower() for name in table.names], n=1)
     suggestion = next((f" Did you mean '{name}'?" for name in table.names if [name.lower()] == close), "")
     raise InputError(
-        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {_columns_there_are(table)}"
+        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {columns_there_are(table)}"
     )
 
 
@@ -224,7 +239,7 @@ def _recognise(
     if not found:
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
-            f"{_columns_there_are(table)} {_how_to_say(table, role)}"
+            f"{columns_there_are(table)} {_how_to_say(table, role)}"
         )
     return found[0]
 
@@ -245,7 +260,8 @@ def _ambiguous(table: Table, role: str, found: Sequence[int]) -> InputError:
     return InputError(f"{table.file}: several columns may be the {role}: {fitting}. {_how_to_say(table, role)}")
 
 
-def _columns_there_are(table: Table) -> str:
+def columns_there_are(table: Table) -> str:
+    """Return the sentence that lists the columns of a table."""
     if not any(table.names):
         return f"Its {len(table.names)} columns have no names."
     names = ", ".join(f"'{name}'" if name else "(no name)" for name in table.names)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.table import Table
 
-__all__ = ["Curve", "Dropped"]
+__all__ = ["Column", "Curve", "Dropped", "course"]
 
 Column = NDArray[np.float64]
 
@@ -65,3 +66,8 @@ class Curve:
             stress=self.stress[rows],
             dropped=(*self.dropped, Dropped(len(self) - len(rows), reason)),
         )
+
+
+def course(curves: Sequence[Curve]) -> Column:
+    """Return what tells how far a test has gone: its stretch, or the mean of the stretches of its axes."""
+    return np.asarray(np.mean([curve.stretch for curve in curves], axis=0))

@@ -9,7 +9,9 @@ import numpy as np
 from tissuq.experiments.columns import heading
 from tissuq.experiments.cycles import find_cycles
 from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.modes.mode import STRETCH
 from tissuq.experiments.reading import Reading
+from tissuq.experiments.two_stresses import told_once
 from tissuq.experiments.units import stress_unit
 from tissuq.experiments.vocabulary import ROLES, on_axis
 
@@ -29,9 +31,10 @@ SLACK_STRESS, SLACK_STRETCH = 0.01, 0.2
 
 
 def doubts(reading: Reading) -> tuple[str, ...]:
-    """Return what a person should look at before a fit."""
-    found = (doubt(reading) for doubt in DOUBTS)
-    return (*reading.warnings, *(text for text in found if text))
+    """Return what a person should look at before a fit; of two stresses each."""
+    labels = [each.label for each in reading.stresses]
+    found = (told_once(labels, [doubt(each) for each in reading.stresses]) for doubt in DOUBTS)
+    return (*reading.warnings, *(text for texts in found for text in texts if text))
 
 
 def _unit_assumed(reading: Reading) -> str:
@@ -55,23 +58,23 @@ def _stretch_size(reading: Reading) -> str:
 
 
 def _cycles(reading: Reading) -> str:
-    count = len(find_cycles(reading.used.table, reading.used.stretch))
+    count = len(find_cycles(reading.used.table, reading.course))
     if count < 2 or len(reading.used) < ROWS_OF_A_CYCLE * count:
         return ""
     return f"all {count} cycles are used; to fit one, give --cycle last, first or a number."
 
 
 def _hysteresis(reading: Reading) -> str:
-    used = reading.used
-    cycle = find_cycles(used.table, used.stretch)[-1]
+    used, course = reading.used, reading.course
+    cycle = find_cycles(used.table, course)[-1]
     branches = [cycle.rows("loading"), cycle.rows("unloading")]
     if min(map(len, branches)) < ROWS_OF_A_CYCLE / 2:
         return ""
-    ordered = [rows[np.argsort(used.stretch[rows])] for rows in branches]
-    low = max(used.stretch[rows[0]] for rows in ordered)
-    high = min(used.stretch[rows[-1]] for rows in ordered)
+    ordered = [rows[np.argsort(course[rows])] for rows in branches]
+    low = max(course[rows[0]] for rows in ordered)
+    high = min(course[rows[-1]] for rows in ordered)
     grid = np.linspace(low, high, 50)
-    loading, unloading = (np.interp(grid, used.stretch[rows], used.stress[rows]) for rows in ordered)
+    loading, unloading = (np.interp(grid, course[rows], used.stress[rows]) for rows in ordered)
     share = float(np.abs(loading - unloading).max() / np.abs(used.stress).max())
     if share < NOTABLE:
         return ""
@@ -83,8 +86,9 @@ def _hysteresis(reading: Reading) -> str:
 
 def _reference(reading: Reading) -> str:
     used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
-    control = reading.experiment.mode.controls[0]
-    change = np.abs(used.stretch - control.reference)
+    mode, points = reading.experiment.mode, reading.experiment.stretch
+    control = mode.controls[0] if len(mode.controls) == 1 else STRETCH
+    change = np.abs((points - mode.reference).reshape(len(used), -1)).max(axis=1)
     nearest = int(np.argmin(change))
     gap, furthest = float(change[nearest]), float(change.max())
     if gap > NOTABLE * furthest:
@@ -102,12 +106,12 @@ def _reference(reading: Reading) -> str:
 
 
 def _slack(reading: Reading) -> str:
-    used = reading.used
+    used, course = reading.used, reading.course
     if any("the preload" in step for step in used.steps):
         return ""
     carries = np.abs(used.stress) > SLACK_STRESS * np.abs(used.stress).max()
     first = int(np.argmax(carries))
-    share = abs(float(used.stretch[first] - used.stretch[0])) / max(float(np.ptp(used.stretch)), 1e-12)
+    share = abs(float(course[first] - course[0])) / max(float(np.ptp(course)), 1e-12)
     if share < SLACK_STRETCH:
         return ""
     return (
@@ -137,8 +141,8 @@ def _other_axis(reading: Reading) -> str:
     if other < NOTABLE * own:
         return ""
     return (
-        f"column {table.label(others[0])} carries force, too, so the test is not uniaxial: give --mode equibiaxial if "
-        "both axes were stretched alike. Both axes at once belong to a biaxial mode."
+        f"column {table.label(others[0])} carries force, too, so the test is not uniaxial: give --mode biaxial to read "
+        "both axes, or equibiaxial with one of them if both were stretched alike."
     )
 
 

@@ -11,8 +11,10 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.experiments.curve import Curve, course
 from tissuq.experiments.doubts import doubts
 from tissuq.experiments.reading import Reading, ReadingOptions, read_file
+from tissuq.experiments.two_stresses import told_once
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["Inspection", "inspect", "noise_between_neighbours"]
@@ -34,17 +36,23 @@ class Inspection:
     ----------
     reading : Reading
         The experiment and what was done on the way to it.
-    noise_sd : float or None
-        Estimate of the noise of the engineering stress, MPa; None where the measurements do not tell it.
+    noise_sds : tuple of float or None
+        Estimate of the noise of the engineering stress, MPa, of each stress of the loading mode; None where the
+        measurements do not tell it.
     """
 
     reading: Reading
-    noise_sd: float | None
+    noise_sds: tuple[float | None, ...]
+
+    @property
+    def noise_sd(self) -> float | None:
+        """The noise of the stress, or the first of two."""
+        return self.noise_sds[0]
 
     @property
     def steps(self) -> tuple[str, ...]:
         """What was done, a sentence a step."""
-        return self.reading.used.steps
+        return tuple(self.reading.steps)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -65,39 +73,54 @@ class Inspection:
         cells = SEPARATORS[table.separator]
         yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {above}"
         yield "columns", ", ".join(self._columns())
-        dropped = "; ".join(f"{each.count} dropped: {each.reason}" for each in used.dropped)
-        yield "rows", f"{len(used)} of {len(table.rows)} used" + (f"; {dropped}" if dropped else "")
-        repeated = len(used) - len(np.unique(used.stretch))
+        dropped = [
+            "; ".join(f"{each.count} dropped: {each.reason}" for each in stress.used.dropped)
+            for stress in self.reading.stresses
+        ]
+        yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *filter(None, self._of_each(dropped))])
+        repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
-        yield "stretch", f"{used.stretch.min():.6g} to {used.stretch.max():.6g}{again}"
-        low, high = used.stress.min() / unit.to_mpa, used.stress.max() / unit.to_mpa
-        yield "stress", f"{low:.6g} to {high:.6g} {unit.name} (engineering stress, tension positive)"
-        yield "noise", self._noise()
+        curves = [stress.used for stress in self.reading.stresses]
+        spans = self._of_each([f"{each.stretch.min():.6g} to {each.stretch.max():.6g}" for each in curves])
+        yield "stretch", f"{'; '.join(spans)}{again}"
+        ends = [(each.stress.min() / unit.to_mpa, each.stress.max() / unit.to_mpa) for each in curves]
+        spans = self._of_each([f"{low:.6g} to {high:.6g} {unit.name}" for low, high in ends])
+        yield "stress", f"{'; '.join(spans)} (engineering stress, tension positive)"
+        noise = [self._noise(*each) for each in zip(self.noise_sds, curves, strict=True)]
+        yield "noise", "; ".join(self._of_each(noise))
+
+    def _of_each(self, texts: Sequence[str]) -> list[str]:
+        return told_once([stress.label for stress in self.reading.stresses], texts)
 
     def _columns(self) -> Iterator[str]:
-        table, choice = self.reading.table, self.reading.choice
-        taken = {choice.deformation: choice.measure, choice.stress: choice.load}
+        table = self.reading.table
+        taken = {}
+        for each in self.reading.stresses:
+            of = f" of {each.label}" if each.label else ""
+            taken[each.choice.stress] = f"{each.choice.load}{of}"
+            taken[each.choice.deformation] = each.choice.measure + of * (len(self.reading.experiment.mode.controls) > 1)
         for column in range(len(table.names)):
             yield f"{table.label(column)} {'is ' + taken[column] if column in taken else 'not read'}"
 
-    def _noise(self) -> str:
+    def _noise(self, noise_sd: float | None, curve: Curve) -> str:
         unit = stress_unit(self.reading.experiment.stress_unit)
-        if self.noise_sd is None:
+        if noise_sd is None:
             return "not told: too few neighbouring measurements"
-        if self.noise_sd == 0:
+        if noise_sd == 0:
             return "smaller than the last digit in the file"
-        share = self.noise_sd / float(np.abs(self.reading.used.stress).max())
+        share = noise_sd / float(np.abs(curve.stress).max())
         return (
-            f"sd about {self.noise_sd / unit.to_mpa:.2g} {unit.name} between neighbours, {100 * share:.2g} % of the "
+            f"sd about {noise_sd / unit.to_mpa:.2g} {unit.name} between neighbours, {100 * share:.2g} % of the "
             "largest stress; slow drifts are not in it"
         )
 
     def _cycle_table(self) -> Iterator[str]:
-        cycles, curve = self.reading.cycles, self.reading.recorded
-        yield "cycle     lines              stretch: from   turning at   to"
+        cycles, stretch = self.reading.cycles, course([each.recorded for each in self.reading.stresses])
+        mean = "mean " * (len(self.reading.experiment.mode.controls) > 1)
+        yield f"{'cycle     lines':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
         for number, cycle in list(enumerate(cycles, start=1))[:CYCLES_SHOWN]:
             rows = cycle.rows()
-            ends = (curve.stretch[row] for row in (rows[0], cycle.peak, rows[-1]))
+            ends = (stretch[row] for row in (rows[0], cycle.peak, rows[-1]))
             label = "" if cycle.label == str(number) else cycle.label
             span = _span(self.reading.table.lines[rows[0] : rows[-1] + 1])
             yield f"{number:<9} {span:<18}" + "".join(f"{end:>13.4f}" for end in ends) + f"  {label}".rstrip()
@@ -121,8 +144,8 @@ def inspect(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> 
     stretch = column 'stretch'
     """
     reading = read_file(path, **options)
-    used = reading.used
-    return Inspection(reading, noise_between_neighbours(used.stretch, used.stress))
+    sds = (noise_between_neighbours(reading.course, each.used.stress) for each in reading.stresses)
+    return Inspection(reading, tuple(sds))
 
 
 def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:

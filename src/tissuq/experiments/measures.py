@@ -16,7 +16,7 @@ from tissuq.experiments.quantities import FORCE, LENGTH, Kind
 from tissuq.experiments.table import Table
 from tissuq.experiments.vocabulary import on_axis
 
-__all__ = ["Load", "stress_of", "stretch_of"]
+__all__ = ["Load", "initial_size", "stress_of", "stretch_of"]
 
 Column = NDArray[np.float64]
 
@@ -119,14 +119,14 @@ def _from_displacement(
     table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
 ) -> tuple[Column, str]:
     factor, unit_source = _factor(table, choice.deformation, LENGTH, "displacement_unit", unit)
-    own = _initial_size(table, choice, values) if "length" not in dimensions.known else None
+    own = initial_size(table, choice, values) if "length" not in dimensions.known else None
     length = own or dimensions.length
     label = table.label(choice.deformation)
     source = f"stretch = 1 + column {label} in {unit_source} / {length.value:g} mm (length {length.source})"
     return 1 + values * factor / length.value, source
 
 
-def _initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> Dimension | None:
+def initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> Dimension | None:
     """Return the length from a column of sizes beside that of displacements (CellScale's machines write one)."""
     chosen = heading(table.names[choice.deformation])
     axis, _ = on_axis(chosen.quantity)

@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tissuq.experiments.inspection import Inspection
+from tissuq.experiments.reading import Reading
 from tissuq.experiments.units import stress_unit
 from tissuq.report.common import write_data, write_figures
 from tissuq.report.figures import BAND, BASE, INK, STYLE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["curve_figure", "write_inspection"]
@@ -24,25 +26,35 @@ def write_inspection(inspection: Inspection, folder: Path) -> None:
 
 
 def curve_figure(inspection: Inspection) -> Figure:
-    """Return two panels: every row of the file with those that are used, and these as they would be fitted."""
+    """Return two panels: every row of the file with those that are used, and these as they would be fitted.
+
+    Of a loading mode with two stresses, two for each.
+    """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    reading = inspection.reading
-    recorded, used, unit = reading.recorded, reading.used, stress_unit(reading.experiment.stress_unit)
+    stresses = inspection.reading.stresses
     with rc_context(STYLE):
-        figure = Figure(figsize=(9.2, 3.9))
-        left, right = figure.subplots(1, 2)
-        left.plot(recorded.stretch, recorded.stress / unit.to_mpa, "-", color=BASE, lw=0.8, label="all rows")
-        kept = used.rows
-        left.plot(recorded.stretch[kept], recorded.stress[kept] / unit.to_mpa, ".", color=BAND, ms=3, label="rows used")
-        left.set_title("as recorded")
-        left.legend(fontsize=9)
-        right.axhline(0, color=BASE, lw=0.6)
-        right.axvline(1, color=BASE, lw=0.6)
-        right.plot(used.stretch, used.stress / unit.to_mpa, ".", color=INK, ms=3)
-        right.set_title(f"to be fitted: {len(used)} rows")
-        for axis in (left, right):
-            axis.set_xlabel("stretch")
-            axis.set_ylabel(f"engineering stress [{unit.name}]")
+        figure = Figure(figsize=(9.2, 3.9 * len(stresses)))
+        for (left, right), stress in zip(figure.subplots(len(stresses), 2, squeeze=False), stresses, strict=True):
+            _draw_stress(left, right, stress)
     return figure
+
+
+def _draw_stress(left: Axes, right: Axes, reading: Reading) -> None:
+    recorded, used, unit = reading.recorded, reading.used, stress_unit(reading.experiment.stress_unit)
+    of = f"{reading.label}, " if reading.label else ""
+    controls = reading.experiment.mode.controls
+    name = controls[0].name if len(controls) == 1 else "stretch"
+    left.plot(recorded.stretch, recorded.stress / unit.to_mpa, "-", color=BASE, lw=0.8, label="all rows")
+    kept = used.rows
+    left.plot(recorded.stretch[kept], recorded.stress[kept] / unit.to_mpa, ".", color=BAND, ms=3, label="rows used")
+    left.set_title(f"{of}as recorded")
+    left.legend(fontsize=9)
+    right.axhline(0, color=BASE, lw=0.6)
+    right.axvline(controls[0].reference, color=BASE, lw=0.6)
+    right.plot(used.stretch, used.stress / unit.to_mpa, ".", color=INK, ms=3)
+    right.set_title(f"{of}to be fitted: {len(used)} rows")
+    for axis in (left, right):
+        axis.set_xlabel(name)
+        axis.set_ylabel(f"engineering stress [{unit.name}]")

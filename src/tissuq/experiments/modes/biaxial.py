@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,6 +51,7 @@ class Biaxial(LoadingMode):
     description = "any two stretches of a sheet, with the stresses of both axes"
     controls = (Control("stretch of axis 1"), Control("stretch of axis 2"))
     stresses = ("engineering stress of axis 1", "engineering stress of axis 2")
+    machine_axes: ClassVar[tuple[str, ...]] = ("x", "y")
 
     def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
         return _sheet(stretch[..., 0], stretch[..., 1]).stretches
@@ -70,6 +71,7 @@ class ThinTube(Biaxial):
     description = "extension and inflation of a thin tube: hoop and axial stretch, with both stresses"
     controls = (Control("hoop stretch"), Control("axial stretch"))
     stresses = ("hoop engineering stress", "axial engineering stress")
+    machine_axes = ()
 
     @staticmethod
     def engineering_stresses(

@@ -91,6 +91,8 @@ class LoadingMode(Path):
     """What is set, in the order of the last axis of points."""
     stresses: ClassVar[tuple[str, ...]] = ("engineering stress",)
     """What is measured, in the order of `channels`."""
+    machine_axes: ClassVar[tuple[str, ...]] = ()
+    """What the axes of the stresses are called in the file of a biaxial machine, where the mode is of such a test."""
 
     @abstractmethod
     def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
