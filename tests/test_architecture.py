@@ -16,7 +16,7 @@ ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "gaussian", "priors", "parameters", "experiments", "mechanics", "discrepancy", "noise",
     "statistics", "scales", "model", "inference", "prediction", "assessment", "cautions", "posterior", "fitting",
-    "studies", "report", "cli", "__main__",
+    "population", "studies", "report", "cli", "__main__",
 ]  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from tissuq.mechanics import (
 from tissuq.mechanics.material import materials
 from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, UnknownNoise
 from tissuq.parameters import Parameter
+from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 
@@ -46,6 +47,7 @@ __all__ = [
     "Noise",
     "Normal",
     "Parameter",
+    "Population",
     "Posterior",
     "Prior",
     "ProportionalNoise",
@@ -61,6 +63,7 @@ __all__ = [
     "engineering_stress",
     "fit",
     "fit_many",
+    "fit_population",
     "initial_shear_modulus",
     "load_material",
     "loading_modes",

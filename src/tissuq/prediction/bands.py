@@ -13,7 +13,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import stress_moments
 
-__all__ = ["Band", "predict_average", "predict_band", "share_inside"]
+__all__ = ["Band", "check_mode", "predict_average", "predict_band", "share_inside"]
 
 FloatArray = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def predict_average(
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
     asked = loading_mode(mode) if mode is not None else parts[0][1].model.experiment.mode
     for _, solution in parts if discrepancy else ():
-        _check_mode(solution, asked)
+        check_mode(solution, asked)
     count = FEW if len(points) > BLOCK else MANY
     mixture = [(weight, solution.model, solution.components.thinned(count)) for weight, solution in parts]
     weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
@@ -111,7 +111,8 @@ def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -
     return float(np.mean((band.low <= data.stress) & (data.stress <= band.high)))
 
 
-def _check_mode(solution: Solution, asked: LoadingMode) -> None:
+def check_mode(solution: Solution, asked: LoadingMode) -> None:
+    """Refuse a loading mode of which a discrepancy says nothing."""
     model = solution.model
     if asked != model.experiment.mode and not model.discrepancy.is_energy:
         raise InputError(
