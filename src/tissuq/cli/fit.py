@@ -8,7 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
+from tissuq.cli.options import (
+    load_settings,
+    noise_given,
+    not_converged,
+    once_each,
+    parse_prior,
+    progress,
+    role_given,
+)
 from tissuq.errors import InputError
 
 __all__ = ["fit"]
@@ -70,14 +78,14 @@ def fit(
 
     options: dict[str, Any] = {
         "file": str(_resolve(file)) if file and not config else None, "material": material, "mode": mode,
-        "discrepancies": discrepancy or None, "noise_sd": _noise(noise_sd), "stress_unit": stress_unit,
+        "discrepancies": discrepancy or None, "noise_sd": noise_given(noise_sd), "stress_unit": stress_unit,
         "stress_type": stress_type, "strain_unit": strain_unit, "compression_positive": compression_positive,
         "skip_rows": skip_rows, "noise": noise, "method": method, "seed": seed,
     }  # fmt: skip
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))
     if column:
-        options["columns"] = once_each("--column", map(_role, column))
+        options["columns"] = once_each("--column", map(role_given, column))
     if not file and not config:
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     law = material_named(material, laws=True) if material else None
@@ -121,19 +129,3 @@ def _check_same(file: Path, named: Path, config: Path) -> None:
             f"FILE '{file}' is not the file that '{config}' names, '{named}'. Leave FILE out to repeat that run, or "
             "leave --config out to fit FILE."
         )
-
-
-def _noise(text: str | None) -> float | str | None:
-    if text is None or text == "unknown":
-        return text
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error
-
-
-def _role(text: str) -> tuple[str, str | int]:
-    role, _, name = text.partition("=")
-    if not name:
-        raise InputError(f"--column needs ROLE=COLUMN, such as stress='Stress (kPa)', not '{text}'.")
-    return role.strip(), int(name) if name.strip().isdecimal() else name.strip()

@@ -18,7 +18,16 @@ from tissuq.registry import find
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["campaign_progress", "load_settings", "not_converged", "once_each", "parse_prior", "progress"]
+__all__ = [
+    "campaign_progress",
+    "load_settings",
+    "noise_given",
+    "not_converged",
+    "once_each",
+    "parse_prior",
+    "progress",
+    "role_given",
+]
 
 Settings = TypeVar("Settings", bound="BaseModel")
 
@@ -74,6 +83,24 @@ def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
         optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
         raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
     return symbol, {"distribution": distribution, **dict(zip(names, values, strict=False))}
+
+
+def noise_given(text: str | None) -> float | str | None:
+    """Return the standard deviation of the noise: a number, or 'unknown'."""
+    if text is None or text == "unknown":
+        return text
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'.") from error
+
+
+def role_given(text: str) -> tuple[str, str | int]:
+    """Return the role and the column of a text like ``stress=Force``, a column's number as a number."""
+    role, _, name = text.partition("=")
+    if not name:
+        raise InputError(f"--column needs ROLE=COLUMN, such as stress='Stress (kPa)', not '{text}'.")
+    return role.strip(), int(name) if name.strip().isdecimal() else name.strip()
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.table import Table
 from tissuq.experiments.units import looks_like_unit
 
-__all__ = ["ColumnChoice", "Heading", "choose_columns", "declared_unit", "heading"]
+__all__ = ["ColumnChoice", "Heading", "choose_columns", "declared_unit", "find_column", "heading"]
 
 STRETCH_NAMES = frozenset(["stretch", "stretch ratio", "lambda", "λ"])
 STRAIN_NAMES = frozenset(["strain", "engineering strain", "nominal strain"])
@@ -94,12 +94,12 @@ def choose_columns(table: Table, mapping: Mapping[str, str | int] | None, stress
     mapping = dict(mapping or {})
     _check_roles(table, mapping)
     if "stress" in mapping:
-        stress = _find(table, "stress", mapping["stress"])
+        stress = find_column(table, "stress", mapping["stress"])
     else:
         stress = _recognise(table, "stress", STRESS_NAMES[stress_type], _stress_hint(table, stress_type))
     role = next((role for role in ("stretch", "strain") if role in mapping), None)
     if role:
-        deformation = _find(table, role, mapping[role])
+        deformation = find_column(table, role, mapping[role])
         is_strain = role == "strain"
     else:
         deformation = _recognise(table, "stretch", STRETCH_NAMES | STRAIN_NAMES)
@@ -128,7 +128,8 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int]) -> None:
         raise InputError(f"{table.file}: columns are given for both stretch and strain; give only one of them.")
 
 
-def _find(table: Table, role: str, wanted: str | int) -> int:
+def find_column(table: Table, role: str, wanted: str | int) -> int:
+    """Return the place of a column, by its name or its number from 1, that is asked for in a role."""
     text = str(wanted).strip()
     readings = (
         table.names,

@@ -17,7 +17,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.plausibility import check_signs, check_strain, check_stretch
 from tissuq.experiments.table import Table, read_table
 
-__all__ = ["STRESS_TYPES", "read_experiment"]
+__all__ = ["STRESS_TYPES", "experiment_of", "read_experiment"]
 
 STRESS_TYPES = ("engineering", "cauchy")
 
@@ -82,9 +82,33 @@ def read_experiment(
     ('MPa', 21)
     """
     mode = loading_mode(mode)
+    return experiment_of(
+        read_table(path, skip_rows),
+        Path(path).stem if name is None else name,
+        mode=mode,
+        columns=columns,
+        stress_unit=stress_unit,
+        stress_type=stress_type,
+        strain_unit=strain_unit,
+        compression_positive=compression_positive,
+    )
+
+
+def experiment_of(
+    table: Table,
+    name: str,
+    *,
+    mode: str | LoadingMode,
+    columns: Mapping[str, str | int] | None,
+    stress_unit: str | None,
+    stress_type: str,
+    strain_unit: str | None,
+    compression_positive: bool,
+) -> Experiment:
+    """Return the experiment in a table; the options are those of `read_experiment`."""
+    mode = loading_mode(mode)
     if stress_type not in STRESS_TYPES:
         raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
-    table = read_table(path, skip_rows)
     choice = choose_columns(table, columns, stress_type)
     deformation, stress = table.numbers([choice.deformation, choice.stress])
     stretch, stretch_source = _stretch(table, choice, deformation, stress, strain_unit)
@@ -109,8 +133,8 @@ def read_experiment(
         mode=mode,
         stretch=stretch,
         stress=stress,
-        name=Path(path).stem if name is None else name,
-        source=f"{Path(path).name}: {stretch_source}; {stress_source}; {rows}",
+        name=name,
+        source=f"{Path(table.file).name}: {stretch_source}; {stress_source}; {rows}",
         stress_unit=unit.name,
     )
 

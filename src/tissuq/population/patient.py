@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.stability import calibrated_range
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Components
 from tissuq.mechanics import Material, engineering_stress
@@ -44,11 +45,11 @@ def patient_curves(
     draws: Components,
     new: FloatArray,
     stretch: FloatArray,
-    mode: LoadingMode,
     *,
+    mode: LoadingMode,
     discrepancy: bool,
 ) -> FloatArray:
-    """Return stresses (N, g) of new patients whose model error is that of one specimen.
+    """Return stresses (N, g) of new patients whose model error is that of one specimen; nan where it was not measured.
 
     Parameters
     ----------
@@ -73,7 +74,9 @@ def patient_curves(
         return curves
     _, error = drawn_curves(model, draws, stretch, mode=None if mode == model.experiment.mode else mode)
     before, after = (_initial_modulus(model.material, each) for each in (own, values))
-    return curves + error * (after / np.maximum(before, LEAST_MODULUS * np.median(before)))[:, None]
+    curves = curves + error * (after / np.maximum(before, LEAST_MODULUS * np.median(before)))[:, None]
+    low, high = calibrated_range(model.experiment, mode)
+    return np.where((stretch < low - SMALL) | (stretch > high + SMALL), np.nan, curves)
 
 
 def _initial_modulus(material: Material, values: FloatArray) -> FloatArray:

@@ -33,8 +33,6 @@ LEAST_EFFECTIVE = 0.5
 """Share of draws that must stay effective when they are corrected."""
 FEW = 5
 """Specimens below which the prior of the spread has its say."""
-CURVES = 4000
-"""Stress curves of new patients, at most."""
 ENDS = ["median", "hdi_low", "hdi_high"]
 
 
@@ -206,9 +204,8 @@ class Population:
         """Return the engineering stress that is to be expected of a patient who has not been measured.
 
         The material is drawn from the population. Nothing is known of a new patient's model error but that it is like
-        those that were seen: it is the discrepancy of one of the specimens at random, in proportion to the initial
-        modulus, from the same draw as that specimen's parameters. So the band holds at stretches at which specimens
-        were measured.
+        those that were seen: at every stretch it is the discrepancy of one at random of the specimens that were
+        measured there, in proportion to the initial modulus, from the same draw as that specimen's parameters.
 
         Parameters
         ----------
@@ -241,10 +238,16 @@ class Population:
         for i, posterior in enumerate(self.posteriors.values()):
             own = np.arange(i, chains * draws, count)
             matching = matching_draws(posterior, self.coordinates, places[own, i])
-            curves.append(
-                patient_curves(posterior, self.coordinates, matching, new[own], points, asked, discrepancy=discrepancy)
+            given = posterior, self.coordinates, matching, new[own], points
+            curves.append(patient_curves(*given, mode=asked, discrepancy=discrepancy))
+        found = np.concatenate(curves)
+        unseen = np.isnan(found).all(axis=0)
+        if unseen.any():
+            raise InputError(
+                f"no specimen was measured at a stretch of {points[unseen][0]:g}, so that nothing is known of its model "
+                "error: predict nearer to the data, or with discrepancy=False."
             )
-        low, median, high = np.quantile(np.concatenate(curves), [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
+        low, median, high = np.nanquantile(found, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
         return pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
 
     @cached_property

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
-from tissuq.mechanics.user_law import LAW
-from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
+from tissuq.report.common import copied_laws, write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
 from tissuq.report.rows import readable_methods, readable_parameters, readable_summary, significant
-from tissuq.report.run_folder import ASSESSMENT, RECIPE
+from tissuq.report.run_folder import ASSESSMENT, INPUT, RECIPE
 from tissuq.report.tables import Row, summary_row, write_json
 from tissuq.studies.specimen import SpecimenStudy
 
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["specimen_summary", "write_specimen_run"]
-
-INPUT = "input"
-"""The folder of a run that holds a copy of the user's file, so that the run can be repeated."""
 
 
 def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figures: bool = True) -> None:
@@ -40,7 +36,7 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
     """
     (folder / INPUT).mkdir()
     shutil.copyfile(source, folder / INPUT / source.name)
-    kept = {"file": f"{INPUT}/{source.name}", "material": _with_laws(study.settings.material, folder)}
+    kept = {"file": f"{INPUT}/{source.name}", "material": copied_laws(study.settings.material, folder)}
     named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
     command = f"fit{'' if figures else ' --no-figures'}{named}"
     write_recipe(folder, command, study.settings.model_copy(update=kept))
@@ -53,17 +49,6 @@ def write_specimen_run(study: SpecimenStudy, source: Path, folder: Path, *, figu
         write_figures(folder, _figures(study))
     page = render("specimen.html", **_context(study, summary, folder), command=command)
     (folder / "report.html").write_text(page, encoding="utf-8")
-
-
-def _with_laws(material: str, folder: Path) -> str:
-    """Return the name of a material with the laws in the user's files, of which copies go with the run."""
-    parts = material.split("+")
-    for place, match in enumerate(map(LAW.fullmatch, parts)):
-        if match:
-            law = Path(match["path"].strip())
-            shutil.copyfile(law, folder / INPUT / law.name)
-            parts[place] = f"{INPUT}/{law.name}:{match['name']}"
-    return "+".join(parts)
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:

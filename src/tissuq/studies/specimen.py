@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from tissuq.assessment import Assessment, design_warnings
 from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named
@@ -17,12 +15,12 @@ from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import read_experiment
 from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.fitting import Method, fit
+from tissuq.fitting import fit
 from tissuq.mechanics import Material, material_named
-from tissuq.noise import Noise, noise_named
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
+from tissuq.studies.measured import MeasuredSettings
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
 
@@ -30,26 +28,12 @@ ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
 
 
-class SpecimenSettings(BaseModel):
+class SpecimenSettings(MeasuredSettings):
     """Everything that a fit of a file depends on; stresses (noise, priors) in the file's unit of stress."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     file: str
-    mode: str = "uniaxial"
-    columns: dict[str, str | int] = Field(default_factory=dict)
-    stress_unit: str | None = None
-    stress_type: str = "engineering"
-    strain_unit: str | None = None
-    compression_positive: bool = False
-    skip_rows: int = Field(0, ge=0)
-    material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
-    noise_sd: float | Literal["unknown"] = "unknown"
-    noise: Literal["unknown", "proportional", "repeats"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
-    method: Method = "auto"
-    seed: int = Field(0, ge=0)
 
     @field_validator("discrepancies")
     @classmethod
@@ -58,41 +42,9 @@ class SpecimenSettings(BaseModel):
             raise ValueError(f"'{ALL}' stands alone; leave it out, or leave out the names beside it")
         return given
 
-    @field_validator("noise_sd", mode="before")
-    @classmethod
-    def _positive_or_unknown(cls, given: Any) -> Any:
-        is_number = isinstance(given, int | float) and not isinstance(given, bool)
-        if given != "unknown" and not (is_number and 0 < given < inf):
-            raise ValueError(
-                f"must be a positive number in the file's stress unit, or 'unknown', not {given!r}; noise of zero "
-                "would make every measurement exact"
-            )
-        return given
-
-    @model_validator(mode="after")
-    def _one_noise(self) -> Self:
-        if self.noise is not None and self.noise_sd != "unknown":
-            raise ValueError(f"give noise_sd or noise, not both (noise_sd is {self.noise_sd}, noise is '{self.noise}')")
-        return self
-
-    def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise, a known standard deviation converted from a unit to MPa."""
-        if self.noise_sd == "unknown":
-            return noise_named(self.noise or "unknown")
-        return noise_named(self.noise_sd * unit.to_mpa)
-
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements; a relative file lies in ``folder``."""
-        return read_experiment(
-            folder / self.file,
-            mode=self.mode,
-            columns=self.columns or None,
-            stress_unit=self.stress_unit,
-            stress_type=self.stress_type,
-            strain_unit=self.strain_unit,
-            compression_positive=self.compression_positive,
-            skip_rows=self.skip_rows,
-        )
+        return read_experiment(folder / self.file, **self.reading)
 
 
 @dataclass(frozen=True)
