@@ -1,4 +1,4 @@
-"""Time a population of 50 specimens with 100 measurements each, under the default discrepancy, as a user would fit it."""
+"""Time a population of 50 specimens with 100 measurements each, under the default discrepancy."""
 
 from __future__ import annotations
 

@@ -21,7 +21,9 @@ def test_help_is_shown_without_importing_a_heavy_library():
     assert json.loads(said.splitlines()[-1]) == [0, []]
 
 
-@pytest.mark.parametrize("name", ["paper", "fit", "show", "materials", "discrepancies", "datasets", "study"])
+@pytest.mark.parametrize(
+    "name", ["paper", "fit", "population", "show", "materials", "discrepancies", "datasets", "study"]
+)
 def test_every_command_has_help(cli, name):
     said = cli(name, "--help")
     assert (said.status, said.err) == (0, "")

@@ -1,8 +1,8 @@
 """What each specimen's data say of the pooled parameters, its own fit's prior divided out: sums of Gaussians.
 
 A specimen's posterior by itself is a mixture of thousands of Gaussians. On the line of the logarithms each of them is
-still nearly one, as long as it is much narrower than its mean is large; wider ones are replaced by draws. Few Gaussians
-then stand for all (`mixture`).
+still nearly one, as long as it is much narrower than its mean is large; wider ones are split. Few Gaussians then stand
+for all (`mixture`).
 
 A likelihood need not fall off: where a modulus may be zero, it is level towards minus infinity on the line. So the
 mixture is that of the posterior under a wide Gaussian reference that all specimens share, and the reference is divided
@@ -31,10 +31,16 @@ REFERENCE = 2.0
 """Sd of the reference on the line, at least: in logarithms, a factor of seven either way."""
 BEYOND = 3.0
 """The same, as a multiple of the sd between the specimens."""
-NARROW = 0.1
+NARROW = 0.02
 """Sd over mean up to which a Gaussian is taken to be one of the logarithm, too."""
+SPLIT, NODES = 64, 60
+"""Wider Gaussians at most, and into how many narrow ones each is split."""
+REACH = 5.0
+"""Standard deviations of them that are split."""
+LEAST = 1e-4
+"""Where the line ends towards a modulus of zero, over the size of the modulus."""
 DRAWN = 4000
-"""Draws, at least, that stand for wider ones."""
+"""Draws, at least, that stand for what has no extent in some direction."""
 KERNEL = 0.5
 """Width of the kernel around draws over Silverman's: the clusters that they go into smooth them, too."""
 
@@ -86,37 +92,68 @@ def likelihoods_of(mixtures: Sequence[Mixture], reference: FloatArray, most: int
 
 def _on_line(solution: Solution, coordinates: Coordinates) -> Mixture:
     """Return the posterior of one specimen as Gaussians on the line."""
-    parts, is_log = solution.components, coordinates.is_log
-    mean, root = values_of(solution.model, parts, coordinates.symbols)
+    mean, root = values_of(solution.model, solution.components, coordinates.symbols)
+    every = Mixture(solution.components.weights, mean, root @ root.swapaxes(1, 2))
     sd = np.linalg.norm(root, axis=2)
-    is_narrow = ((sd > 0) & (~is_log | (sd <= NARROW * mean))).all(axis=1)
-    slope = np.where(is_log, 1 / np.where(is_log, mean[is_narrow], 1.0), 1 / coordinates.scale)
-    side = root[is_narrow] * slope[:, :, None]
-    middle = coordinates.to_line(mean[is_narrow]) - np.where(is_log, 0.5 * (sd[is_narrow] * slope) ** 2, 0.0)
-    narrow = Mixture(parts.weights[is_narrow], middle, side @ side.swapaxes(1, 2))
-    if is_narrow.all():
-        return narrow
-    wide = _smoothed(parts.weights[~is_narrow], mean[~is_narrow], root[~is_narrow], coordinates)
-    pairs = zip(vars(narrow).values(), vars(wide).values(), strict=True)
-    return Mixture(*(np.concatenate(pair) for pair in pairs))
+    is_point = (sd == 0).any(axis=1)
+    is_narrow = ~is_point & (~coordinates.is_log | (sd <= NARROW * mean)).all(axis=1)
+    parts = [_mapped(every[is_narrow], coordinates)]
+    if (~is_narrow & ~is_point).any():
+        parts.append(_split(reduced(every[~is_narrow & ~is_point], SPLIT), coordinates))
+    if is_point.any():
+        parts.append(_smoothed(every[is_point], coordinates))
+    return Mixture(*(np.concatenate(each) for each in zip(*(vars(part).values() for part in parts), strict=True)))
 
 
-def _smoothed(weights: FloatArray, mean: FloatArray, root: FloatArray, coordinates: Coordinates) -> Mixture:
-    """Return draws from Gaussians (M,) with a Gaussian kernel on the line that keeps the moments of all."""
+def _mapped(mixture: Mixture, coordinates: Coordinates) -> Mixture:
+    """Return Gaussians on the line for Gaussians of parameters that are narrow: to second order in their width."""
+    slope = np.where(coordinates.is_log, 1 / np.where(coordinates.is_log, mixture.means, 1.0), 1 / coordinates.scale)
+    covariances = mixture.covariances * slope[:, :, None] * slope[:, None, :]
+    shift = np.where(coordinates.is_log, -0.5 * np.diagonal(covariances, axis1=1, axis2=2), 0.0)
+    return Mixture(mixture.weights, coordinates.to_line(mixture.means) + shift, covariances)
+
+
+def _split(mixture: Mixture, coordinates: Coordinates) -> Mixture:
+    """Return Gaussians on the line for wider ones: each cut into narrow ones along its parameter of least precision.
+
+    Where a bound does not cut them already, what lies below zero is left out.
+    """
+    variance = np.diagonal(mixture.covariances, axis1=1, axis2=2)
+    relative = np.sqrt(variance) / np.abs(mixture.means) * coordinates.is_log
+    row, along = np.arange(len(variance)), relative.argmax(axis=1)
+    middle, sd = mixture.means[row, along], np.sqrt(variance[row, along])
+    least = LEAST * (np.abs(middle) + sd)
+    low, high = (np.log(np.maximum(middle + sign * REACH * sd, least)) for sign in (-1, 1))
+    logs = low[:, None] + np.linspace(0, 1, NODES) * (high - low)[:, None]
+    step = np.diff(logs[:, :2], axis=1)
+    score = (np.exp(logs) - middle[:, None]) / sd[:, None]
+    weights = mixture.weights[:, None] * np.exp(-0.5 * score**2 + logs) * step / sd[:, None]
+    pull = mixture.covariances[row, :, along] / sd[:, None]
+    means = mixture.means[:, None] + score[:, :, None] * pull[:, None]
+    own = (0.5 * step * np.exp(logs) / sd[:, None])[:, :, None, None] ** 2  # of the score, around a node
+    rest = mixture.covariances - pull[:, :, None] * pull[:, None, :]
+    covariances = rest[:, None] + own * (pull[:, :, None] * pull[:, None, :])[:, None]
+    size = means.shape[2]
+    is_inside = (np.where(coordinates.is_log, means, 1.0) > 0).all(axis=2)
+    kept = Mixture(weights[is_inside], means[is_inside], covariances[is_inside].reshape(-1, size, size))
+    return _mapped(kept, coordinates)
+
+
+def _smoothed(mixture: Mixture, coordinates: Coordinates) -> Mixture:
+    """Return draws from Gaussians with no extent in some direction, with a kernel that keeps the moments."""
     from scipy.special import ndtri
 
-    each = -(-DRAWN // len(weights))
-    values, vectors = np.linalg.eigh(root @ root.swapaxes(1, 2))
+    count, size = mixture.means.shape
+    each = -(-DRAWN // count)
+    values, vectors = np.linalg.eigh(mixture.covariances)
     side = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
-    score = ndtri(quasi_random(mean.shape[1], len(weights) * each)).reshape(len(weights), each, -1)
-    values = (mean[:, None] + np.einsum("mdp,mep->med", side, score)).reshape(-1, mean.shape[1])
-    weights = np.repeat(weights / each, each)
-    is_inside = (values[:, coordinates.is_log] > 0).all(axis=1)
-    weights, values = weights[is_inside], values[is_inside]
-    size, line = mean.shape[1], coordinates.to_line(values)
+    score = ndtri(quasi_random(size, count * each)).reshape(count, each, size)
+    drawn = (mixture.means[:, None] + np.einsum("mdp,mep->med", side, score)).reshape(-1, size)
+    is_inside = (drawn[:, coordinates.is_log] > 0).all(axis=1)
+    weights, line = np.repeat(mixture.weights / each, each)[is_inside], coordinates.to_line(drawn[is_inside])
     middle, covariance = Mixture(weights, line, np.zeros((len(line), size, size))).moments()
-    count = weights.sum() ** 2 / (weights**2).sum()
-    width = KERNEL * (4 / (size + 2) / count) ** (1 / (size + 4))
+    effective = weights.sum() ** 2 / (weights**2).sum()
+    width = KERNEL * (4 / (size + 2) / effective) ** (1 / (size + 4))
     places = middle + np.sqrt(1 - width**2) * (line - middle)
     return Mixture(weights, places, np.broadcast_to(width**2 * covariance, (len(places), size, size)))
 

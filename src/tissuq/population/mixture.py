@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ class Mixture:
     means: FloatArray
     covariances: FloatArray
 
+    def __getitem__(self, chosen: NDArray[Any]) -> Mixture:
+        return Mixture(self.weights[chosen], self.means[chosen], self.covariances[chosen])
+
     def moments(self) -> tuple[FloatArray, FloatArray]:
         """Return the mean (d,) and the covariance (d, d) of the whole."""
         weights = self.weights / self.weights.sum()
@@ -35,7 +39,7 @@ class Mixture:
 
 
 def reduced(mixture: Mixture, count: int) -> Mixture:
-    """Return at most ``count`` Gaussians with the moments of the clusters that they stand for; weights sum to one.
+    """Return at most ``count`` Gaussians with the moments of the clusters that they stand for.
 
     The Gaussians of a posterior differ in scale as much as in place: they start sorted by size, and every one then goes
     to the cluster from which it diverges least, until none moves. Whole Gaussians are moved, so that nothing is drawn.
@@ -75,7 +79,7 @@ def reduced(mixture: Mixture, count: int) -> Mixture:
         before, cluster = cluster, np.argmax(features @ factors.T, axis=1)
         if (cluster == before).all():
             break
-    return Mixture(total / total.sum(), mean + means @ root.T, root @ covariances @ root.T)
+    return Mixture(total, mean + means @ root.T, root @ covariances @ root.T)
 
 
 def _first(places: FloatArray, own: FloatArray, weights: FloatArray, count: int) -> NDArray[np.intp]:

@@ -244,8 +244,8 @@ class Population:
         unseen = np.isnan(found).all(axis=0)
         if unseen.any():
             raise InputError(
-                f"no specimen was measured at a stretch of {points[unseen][0]:g}, so that nothing is known of its model "
-                "error: predict nearer to the data, or with discrepancy=False."
+                f"no specimen was measured at a stretch of {points[unseen][0]:g}, so that nothing is known of the "
+                "model error there: predict nearer to the data, or with discrepancy=False."
             )
         low, median, high = np.nanquantile(found, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
         return pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
