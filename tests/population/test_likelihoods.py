@@ -9,9 +9,9 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
 import tissuq as tq
-from tissuq.population.coordinates import coordinates_of
+from tissuq.population.coordinates import Coordinates, coordinates_of
 from tissuq.population.hierarchy import _population, _terms
-from tissuq.population.likelihoods import likelihoods_of, mixtures_of
+from tissuq.population.likelihoods import _split, likelihoods_of, mixtures_of
 from tissuq.population.mixture import Mixture, reduced
 
 STRETCH = np.linspace(0.8, 1.5, 12)
@@ -78,6 +78,23 @@ def test_the_likelihood_of_a_modulus_is_that_of_the_data(modulus, noise_sd, erro
     near = expected > -3
     assert near[0] == (modulus < 0.1)
     assert np.ptp((log_likelihood(found, theta) - expected)[near]) < error
+
+
+def test_a_gaussian_that_is_split_keeps_its_weight_and_its_moments_under_the_logarithm():
+    """Against quadrature of log b and its products with a correlated c over the Gaussian of both."""
+    mean, covariance = np.array([0.5, 1.0]), np.array([[0.0025, 0.003], [0.003, 0.01]])
+    coordinates = Coordinates(("C10", "C01"), np.array([True, False]), np.array([1.0, 2.0]), np.array([-0.5, 0.25]))
+    found = _split(Mixture(np.array([3.0]), mean[None], covariance[None]), coordinates)
+    score, weights = np.polynomial.hermite_e.hermegauss(20)
+    b, c = mean[0] + 0.05 * score, mean[1] + 0.06 * score
+    log_mean, c_mean = (weights @ each / weights.sum() for each in (np.log(b), c / 2))
+    expected = weights @ ((np.log(b) - log_mean) * (c / 2 - c_mean)) / weights.sum()
+    own_mean, own = found.moments()
+    assert found.weights.sum() == pytest.approx(3, rel=1e-4)
+    assert own_mean == pytest.approx([log_mean + 0.5, c_mean - 0.25], abs=1e-3)
+    assert own[0, 0] == pytest.approx(weights @ (np.log(b) - log_mean) ** 2 / weights.sum(), rel=0.02)
+    assert own[0, 1] == pytest.approx(expected, rel=0.02)
+    assert own[1, 1] == pytest.approx(0.01 / 4, rel=0.02)
 
 
 def test_two_parameters_under_an_energy_are_represented_jointly():

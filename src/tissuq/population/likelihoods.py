@@ -127,7 +127,7 @@ def _split(mixture: Mixture, coordinates: Coordinates) -> Mixture:
     logs = low[:, None] + np.linspace(0, 1, NODES) * (high - low)[:, None]
     step = np.diff(logs[:, :2], axis=1)
     score = (np.exp(logs) - middle[:, None]) / sd[:, None]
-    weights = mixture.weights[:, None] * np.exp(-0.5 * score**2 + logs) * step / sd[:, None]
+    weights = mixture.weights[:, None] * np.exp(-0.5 * score**2 + logs) * step / (np.sqrt(2 * np.pi) * sd[:, None])
     pull = mixture.covariances[row, :, along] / sd[:, None]
     means = mixture.means[:, None] + score[:, :, None] * pull[:, None]
     own = (0.5 * step * np.exp(logs) / sd[:, None])[:, :, None, None] ** 2  # of the score, around a node

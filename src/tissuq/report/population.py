@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.errors import ModelError
 from tissuq.experiments.units import StressUnit
 from tissuq.report.common import copied_laws, write_figures, write_recipe
 from tissuq.report.page import embedded_figure, render
@@ -20,6 +21,9 @@ from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
     pass
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["HEADERS", "readable_population", "write_population_run"]
 
@@ -62,18 +66,30 @@ def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Pa
     write_csv(folder / "data.csv", rows)
     tables = {"population": population.summary(), "specimens": population.specimen_summary()}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
-    reach = np.concatenate([each.stretch for each in study.experiments.values()])
-    stretch = np.linspace(reach.min(), reach.max(), POINTS)
-    band, alone = (population.new_patient(stretch, discrepancy=which) for which in (True, False))
-    tables["new_patient"] = band.merge(alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
+    drawn, bands = {}, _bands(study)
+    if isinstance(bands, str):
+        not_predicted = bands
+    else:
+        not_predicted, (band, alone) = "", bands
+        tables["new_patient"] = band.merge(alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
+        drawn = {"new_patient": patient_figure(population, band, alone, unit)} if figures else {}
     for name, table in tables.items():
         table.to_csv(folder / f"{name}.csv")
     population.save(folder / "population.nc")
     if figures:
-        drawn = {"specimens": specimens_figure(population, unit)}
-        write_figures(folder, drawn | {"new_patient": patient_figure(population, band, alone, unit)})
-    page = render("population.html", **_context(study, folder), command=command)
+        write_figures(folder, drawn | {"specimens": specimens_figure(population, unit)})
+    page = render("population.html", **_context(study, folder), command=command, not_predicted=not_predicted)
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _bands(study: PopulationStudy) -> tuple[pd.DataFrame, pd.DataFrame] | str:
+    """Return the stress of a new patient with the model error and without; or why there is none."""
+    reach = np.concatenate([each.stretch for each in study.experiments.values()])
+    stretch = np.linspace(reach.min(), reach.max(), POINTS)
+    try:
+        return study.population.new_patient(stretch), study.population.new_patient(stretch, discrepancy=False)
+    except ModelError as error:  # some of the population's materials lock before the largest stretch
+        return str(error)
 
 
 def _copied(study: PopulationStudy, folder: Path, beside: Path) -> tuple[str, ...]:
