@@ -83,10 +83,11 @@ def reduced(mixture: Mixture, count: int) -> Mixture:
 
 
 def _first(places: FloatArray, own: FloatArray, weights: FloatArray, count: int) -> NDArray[np.intp]:
-    """Return first clusters: by size and distance from the middle, finer towards either end."""
+    """Return first clusters: by size and distance from the middle, on either side of it, finer towards the ends."""
     from scipy.special import ndtr
 
-    order = np.argsort((places**2).sum(axis=1) + np.trace(own, axis1=1, axis2=2), kind="stable")
+    size = (places**2).sum(axis=1) + np.trace(own, axis1=1, axis2=2)
+    order = np.argsort(np.where(places[:, 0] < 0, -size, size), kind="stable")
     below = np.empty(len(order))
     below[order] = np.cumsum(weights[order]) - 0.5 * weights[order]
     edges = ndtr(np.linspace(-REACH, REACH, count + 1)[1:-1])
