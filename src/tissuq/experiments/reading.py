@@ -24,7 +24,7 @@ from tissuq.experiments.signs import with_compression_negative
 from tissuq.experiments.slack import preload_stress, taut
 from tissuq.experiments.table import Table, read_table
 
-__all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file"]
+__all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file", "read_rows"]
 
 STRESS_TYPES = ("engineering", "cauchy")
 AXES = ("x", "y")
@@ -154,12 +154,17 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
 
 def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
     """Read a file as :func:`read_experiment` does, and keep what was done on the way."""
-    mode = loading_mode(options.get("mode", "uniaxial"))
+    _checked_mode(**options)
+    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
+    return read_rows(table, path, **options)
+
+
+def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
+    """Return what `read_file` does for the rows of a file that have been found already, all of them or some."""
+    mode = _checked_mode(**options)
     stress_type, axis = options.get("stress_type", "engineering"), options.get("axis")
     every, name = options.get("every", 1), options.get("name")
-    _check_options(mode, stress_type, axis, every)
     is_shear = mode.controls == (SHEAR,)
-    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
     choice = choose_columns(table, options.get("columns"), stress_type, axis, is_shear)
     dimensions = dimensions_of(table, options.get("dimensions"))
     deformation, load = table.numbers([choice.deformation, choice.stress])
@@ -203,7 +208,10 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
     return Reading(experiment, table, choice, recorded, curve, tuple(cycles), dimensions.warnings)
 
 
-def _check_options(mode: LoadingMode, stress_type: str, axis: str | None, every: int) -> None:
+def _checked_mode(**options: Unpack[ReadingOptions]) -> LoadingMode:
+    """Return the loading mode, once the options have been looked at that need no file."""
+    mode, stress_type = loading_mode(options.get("mode", "uniaxial")), options.get("stress_type", "engineering")
+    axis, every = options.get("axis"), options.get("every", 1)
     if len(mode.channels) > 1 or len(mode.controls) > 1:
         raise InputError(
             f"a file is read in loading modes with one stress, and '{mode.name}' has {', '.join(mode.stresses)}: give "
@@ -215,3 +223,4 @@ def _check_options(mode: LoadingMode, stress_type: str, axis: str | None, every:
         raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
     if not isinstance(every, int) or every < 1:
         raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
+    return mode
