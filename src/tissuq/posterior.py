@@ -17,6 +17,7 @@ from tissuq.cautions import warnings_about
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.reading import STRESS_TYPES
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.model import StatisticalModel
@@ -254,8 +255,9 @@ class Posterior:
         prob: float = 0.95,
         mode: str | LoadingMode | None = None,
         channel: int = 0,
+        stress_type: str = "engineering",
     ) -> pd.DataFrame:
-        """Return the predicted engineering stress at new stretches.
+        """Return the predicted stress at new stretches.
 
         Parameters
         ----------
@@ -270,6 +272,8 @@ class Posterior:
             Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy.
         channel : int
             Which of the mode's stresses, from 0, where it has several.
+        stress_type : str
+            ``"engineering"``, or ``"cauchy"``: times the stretch along the axis of the stress (a shear stress is both).
 
         Returns
         -------
@@ -279,8 +283,14 @@ class Posterior:
         import pandas as pd
 
         options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
-        options["channel"] = channel
-        return pd.DataFrame(vars(predict_band(self.solution, stretch, **options)))
+        if stress_type not in STRESS_TYPES:
+            raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
+        found = pd.DataFrame(vars(predict_band(self.solution, stretch, **options, channel=channel)))
+        if stress_type == "cauchy":
+            asked = self.model.experiment.modes[0] if mode is None else loading_mode(mode)
+            ratio = asked.channels[channel].cauchy_ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
+            found[["mean", "low", "high"]] *= np.asarray(ratio)[:, None]
+        return found
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""

@@ -27,6 +27,13 @@ def test_the_page_of_materials_is_up_to_date(cli):
     assert said.out == page.read_text(encoding="utf-8"), "run: tissuq materials --markdown > docs/materials.md"
 
 
+def test_the_page_of_loading_modes_is_up_to_date(cli):
+    said = cli("modes", "--markdown")
+    assert said.status == 0
+    page = Path(__file__).parents[2] / "docs" / "modes.md"
+    assert said.out == page.read_text(encoding="utf-8"), "run: tissuq modes --markdown > docs/modes.md"
+
+
 def test_no_line_of_the_list_of_materials_is_too_long_to_read(cli):
     assert max(map(len, cli("materials").out.splitlines())) <= 130
 
@@ -66,7 +73,7 @@ def test_a_copied_data_set_is_overwritten_with_force_alone(cli, here):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--copy", "rubber-treloar"], ["'rubber-treloar'", "Did you mean 'rubber-treloar-uniaxial'?"]),
+        (["--copy", "rubber-treloar-uni"], ["'rubber-treloar-uni'", "Did you mean 'rubber-treloar-uniaxial'?"]),
         (["--copy", ""], ["no data set named ''"]),
         (["--to", "folder"], ["--to", "--copy NAME"]),
         (["--force"], ["--force", "--copy NAME"]),

@@ -102,6 +102,21 @@ def test_tests_in_a_toml_file_have_their_own_options(cli, here):
     assert float(row["C10_mean"]) == pytest.approx(x @ y / (x @ x), rel=1e-9)
 
 
+def test_every_test_is_predicted_from_the_others(cli, files, here):
+    said = cli("fit", *files, *ALONE, "--noise-sd", "1.5", "--held-out", "--out", "run")
+    assert said.status == 0, said.err
+    assert "Every test predicted from the others" in said.out
+    parts = [tq.read_experiment(file, mode=mode) for file, mode in zip(files, ("planar", "uniaxial"), strict=True)]
+    found = tq.held_out_tests(parts, discrepancy="none", noise_sd=1.5e-3)
+    with (here / "run" / "held_out.csv").open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    assert [row["test"] for row in rows] == ["b", "uniaxial"]
+    for name in ("inside", "beyond", "half_width", "error", "C10_median"):
+        assert [float(row[name]) for row in rows] == pytest.approx(found[name].tolist(), rel=1e-9)
+    assert "Every test predicted from the others" in (here / "run" / "report.html").read_text()
+    assert "Every test predicted from the others" in cli("show", "run").out
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -115,6 +130,7 @@ def test_tests_in_a_toml_file_have_their_own_options(cli, here):
         (["tests/b.csv", "--tolerance", "stress"], ["'stress' is no tolerance; write stress=10%"]),
         (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is no tolerance"]),
         (["tests/b.csv", "--tolerance", "stress=1%", "--tolerance", "stress=2%"], ["given twice for 'stress'"]),
+        (["tests/b.csv", "--held-out"], ["held_out needs two tests or more"]),
         (["empty"], ["folder 'empty' has no file of measurements"]),
         (["tests", "--config", "x.toml"], ["give FILES or --config, not both"]),
     ],

@@ -9,7 +9,16 @@ from tissuq.experiments import datasets
 
 
 def test_the_data_sets_are_listed():
-    assert datasets.names() == ["brain-cortex-shear", "brain-cortex-uniaxial", "rubber-treloar-uniaxial"]
+    rubber = [f"rubber-treloar-{mode}" for mode in ("equibiaxial", "planar", "uniaxial")]
+    silicone = [f"silicone-meunier-{mode}" for mode in ("equibiaxial", "planar", "uniaxial")]
+    assert datasets.names() == ["brain-cortex-shear", "brain-cortex-uniaxial", *rubber, *silicone]
+
+
+@pytest.mark.parametrize("name", datasets.names())
+def test_every_data_set_can_be_fitted(name):
+    data = datasets.load(name)
+    assert len(data) > 10
+    assert np.sign(data.stress[np.abs(data.stress).argmax()]) in (-1, 1)
 
 
 @pytest.mark.parametrize("name", datasets.names())

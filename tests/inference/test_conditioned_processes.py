@@ -79,7 +79,9 @@ def test_predictions_are_those_of_dense_conditioning(name):
 def test_many_points_have_the_spectrum_of_the_whole_matrix(name, psi):
     points = np.linspace(*ENDS, 300)
     process = discrepancy_named(name).adapted_to(NeoHookean(), tq.Experiment("uniaxial", points, points))
-    model = SimpleNamespace(experiment=SimpleNamespace(stretch=points), discrepancy=process, is_repeated=False)
+    model = SimpleNamespace(
+        experiment=SimpleNamespace(stretch=points), discrepancy=process, is_repeated=False, is_joint=False
+    )
     found = correlation_spectrum(model, (psi,))
     dense = process.correlation(points, points, {"psi": psi})
     np.testing.assert_allclose((found.vectors * found.values) @ found.vectors.T, dense, atol=1e-10)

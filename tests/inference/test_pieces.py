@@ -75,7 +75,7 @@ def spectrum(points, psi):
     """The spectrum of a squared exponential at any points, also at fewer than a whole model accepts."""
     measured = SimpleNamespace(stretch=points)
     return correlation_spectrum(
-        SimpleNamespace(experiment=measured, discrepancy=GaussianProcess(), is_repeated=False), (psi,)
+        SimpleNamespace(experiment=measured, discrepancy=GaussianProcess(), is_repeated=False, is_joint=False), (psi,)
     )
 
 

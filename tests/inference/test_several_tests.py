@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import halfcauchy, multivariate_normal
 
 import tissuq as tq
+from tissuq.experiments.reading import STRESS_TYPES
 from tissuq.prediction.densities import leave_one_out
 
 UNIAXIAL, PLANAR = np.array([0.75, 0.85, 0.95, 1.05, 1.2, 1.35, 1.5]), np.array([1.05, 1.15, 1.25, 1.4, 1.5])
@@ -268,3 +269,14 @@ def test_errors_of_single_stretches_count_as_noise_where_the_curve_is_steep():
 def test_a_process_and_correlated_noise_do_not_go_together():
     with pytest.raises(tq.ModelError, match="takes up correlated noise itself"):
         tq.fit(autoregressive(1, 0.5), discrepancy="gp", noise="autoregressive")
+
+
+def test_cauchy_stress_is_the_engineering_stress_times_the_stretch_along_it():
+    posterior = fit("none")
+    engineering, cauchy = (posterior.predict([0.9, 1.3], mode="planar", stress_type=kind) for kind in STRESS_TYPES)
+    for name in ("mean", "low", "high"):
+        assert np.allclose(cauchy[name], engineering[name] * [0.9, 1.3], rtol=1e-12)
+    shear = [posterior.predict([0.2], mode="simple-shear", stress_type=kind) for kind in STRESS_TYPES]
+    assert shear[0].equals(shear[1])
+    with pytest.raises(tq.InputError, match="stress_type must be one of engineering, cauchy"):
+        posterior.predict([1.1], mode="planar", stress_type="true")

@@ -10,6 +10,7 @@ from scipy.stats import binomtest, kstest
 
 from tissuq.discrepancy import discrepancies
 from tissuq.inference.marginal import Marginal
+from tissuq.mechanics import engineering_stress
 from tissuq.studies.sbc import SbcSettings, run_sbc, summarise_ranks
 from tissuq.studies.sbc.campaign import carry_out, probability_below, tasks_of
 from tissuq.studies.sbc.prior_draws import draw_from_prior
@@ -132,3 +133,18 @@ def test_every_formulation_is_in_the_preset():
 def test_wrong_settings_are_refused(wrong, words):
     with pytest.raises(ValidationError, match=words):
         settings_of(**wrong)
+
+
+def test_a_material_with_exponents_is_drawn_and_fitted_with_its_default_priors():
+    settings = SbcSettings(material="demiray", formulations=("none",), noise=("known",), replicates=20, seed=2)
+    model = settings.model("none", "known")
+    assert model.symbols == ("mu", "b")
+    assert model.priors["mu"].support == (0.5, 1.5)
+    generator = np.random.default_rng(1)
+    values, stress = draw_from_prior(model, generator)
+    exact = engineering_stress(model.material, model.experiment.mode, model.experiment.stretch, list(values.values()))
+    assert np.abs(stress - exact).max() < 5 * settings.design.noise_sd
+    (task,) = tasks_of(settings)
+    below = carry_out(settings, task)["below"]
+    assert set(below) == {"mu", "b"}
+    assert all(value is not None and 0 <= value <= 1 for each in below.values() for value in each)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.between_tests import factors_of_tests
 from tissuq.assessment.design import design_warnings
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import (
@@ -90,6 +91,8 @@ class Assessment:
     stable : dict of str to float
         For every loading mode, the probability that material and energy discrepancy are stable over the measured range;
         empty where the material's energy does not tell.
+    factors : dict of str to float
+        By what factor the stress of each of several tests is larger than the common material says.
     power_scaling : PowerScaling or None
         Sensitivity of the parameter to the powers of prior and likelihood.
     warnings : tuple of str
@@ -113,6 +116,7 @@ class Assessment:
     evidence_changes: Mapping[str, float]
     has_energy: bool
     stable: Mapping[str, float]
+    factors: Mapping[str, float]
     power_scaling: PowerScaling | None
     warnings: tuple[str, ...]
 
@@ -138,6 +142,9 @@ class Assessment:
             )
         if self.stable:
             found.append(self._stability())
+        if self.factors:
+            named = ", ".join(f"{name} {factor - 1:+.0%}" for name, factor in self.factors.items())
+            found.append(f"of the material that they have in common the stresses of the tests differ by {named}")
         if self.power_scaling is not None:
             found.append(self.power_scaling.sentence(self.parameter))
         return [f"{text[0].upper()}{text[1:]}." for text in found]
@@ -231,6 +238,7 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
         evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, others),
         has_energy=has_energy(model),
         stable={mode: found.probability for mode, found in ranges.items()},
+        factors=factors_of_tests(solution),
         power_scaling=power_scaling(solution),
         warnings=tuple(design_warnings(model.experiment)),
     )

@@ -39,10 +39,16 @@ def materials(
         print(f"    {form}")
 
 
-def modes() -> None:
+def modes(
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the page docs/modes.md instead.")] = False,
+) -> None:
     """List the loading modes: what is set, and the stresses that are measured."""
     from tissuq.experiments.modes import loading_modes
+    from tissuq.report.modes_page import modes_page
 
+    if markdown:
+        print(modes_page(), end="")
+        return
     print("Loading modes: every stress is the derivative of W by what it does work on\n")
     for kind in loading_modes().values():
         controls = ", ".join(control.name for control in kind.controls)

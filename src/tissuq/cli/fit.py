@@ -91,6 +91,9 @@ def fit(
         list[str] | None,
         typer.Option(help="Leave out what is not stable in this loading mode, or in all; repeat for more."),
     ] = None,
+    held_out: Annotated[
+        bool | None, typer.Option("--held-out", help="Predict every one of several tests from the others, too.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
     config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
@@ -109,6 +112,7 @@ def fit(
     options: dict[str, Any] = {
         "material": material, "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
         "tolerances": several.tolerances(tolerance), "stable_in": stable_in or None,
+        "held_out": held_out,
     }  # fmt: skip
     options |= several.measured([] if config else files, given, mode, specimen, noise_sd)
     if prior:

@@ -73,6 +73,10 @@ def sbc(
     seed: Seed = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    material: Annotated[str | None, typer.Option(help="The material that is calibrated [neo-hookean].")] = None,
+    formulation: Annotated[
+        list[str] | None, typer.Option(help="A discrepancy that is; repeat for more [all of them].")
+    ] = None,
 ) -> None:
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
     from tissuq.cli.tables import print_rows
@@ -80,8 +84,9 @@ def sbc(
     from tissuq.studies.sbc import SbcSettings, run_sbc
     from tissuq.studies.sbc.campaign import tasks_of
 
-    settings = load_settings(SbcSettings, config, {"replicates": replicates, "noise": noise, "seed": seed})
-    folder = out or Path("runs") / (config.stem if config else "sbc")
+    options = {"replicates": replicates, "noise": noise, "seed": seed, "material": material}
+    settings = load_settings(SbcSettings, config, options | {"formulations": formulation or None})
+    folder = out or Path("runs") / (config.stem if config else f"sbc-{material}" if material else "sbc")
     results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_sbc)
     table = write_sbc(settings, results, folder)
     print_rows("Ranks of the truth", *readable_ranks(table))

@@ -8,7 +8,7 @@ from textwrap import fill
 from typing import Any
 
 from tissuq.errors import InputError
-from tissuq.report.run_folder import ASSESSMENT, RECIPE
+from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, RECIPE
 from tissuq.report.tables import headline_of
 
 __all__ = ["print_rows", "print_summary", "print_warnings"]
@@ -70,6 +70,7 @@ def print_summary(folder: Path) -> None:
         )
     print(f"A good predictive check does not mean that {headline_of(rows[0])} is right.")
     _print_assessment(folder / ASSESSMENT)
+    _print_held_out(folder / HELD_OUT_TESTS, headline_of(rows[0]), unit)
     print(f"Report: {folder / 'report.html'}")
 
 
@@ -81,6 +82,18 @@ def _print_assessment(path: Path) -> None:
         for text in found[0]["sentences"]:
             print(fill(text, 96, initial_indent="- ", subsequent_indent="  "))
         print()
+
+
+def _print_held_out(path: Path, headline: str, unit: str) -> None:
+    """Print how every test is predicted from the others, where that was asked for."""
+    if not path.exists():
+        return
+    from tissuq.experiments.units import stress_unit
+    from tissuq.report.rows import HELD_OUT, readable_held_out
+
+    rows = json.loads(path.read_text(encoding="utf-8"))
+    cells = readable_held_out(rows, headline, stress_unit(unit))
+    print_rows("Every test predicted from the others", [*HELD_OUT, f"{headline} of the others, {unit}"], cells)
 
 
 def print_warnings(warnings: list[str]) -> None:

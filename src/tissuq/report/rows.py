@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import floor, isnan, log10
 from typing import Any
 
@@ -13,6 +13,7 @@ from tissuq.report.tables import headline_of
 from tissuq.tolerances import Tolerances
 
 __all__ = [
+    "readable_held_out",
     "readable_methods",
     "readable_parameters",
     "readable_stability",
@@ -22,6 +23,10 @@ __all__ = [
 ]
 
 Row = dict[str, Any]
+
+
+HELD_OUT = ["formulation", "test", "measured", "inside", "beyond", "half width", "error"]
+"""What `readable_held_out` gives, before the headline parameter."""
 
 
 def significant(value: float | None, digits: int = 3) -> str:
@@ -128,6 +133,22 @@ def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -
             row = [formulation, parameter.symbol, name, prior, interval(median, median, spread)[0], *moments]
             rows.append([*row, f"[{ends[0]}, {ends[1]}]"])
     return rows
+
+
+def readable_held_out(rows: Sequence[Row], headline: str, unit: StressUnit) -> list[list[str]]:
+    """Return how every test is predicted from the others, as cells for people."""
+    found = []
+    for row in rows:
+        median, low, high = (
+            significant(row[f"{headline}_{name}"] / unit.to_mpa) for name in ("median", "hdi_low", "hdi_high")
+        )
+        shares = [_share(row[name]) for name in ("inside", "beyond", "half_width", "error")]
+        found.append([row["formulation"], row["test"], row["measured"], *shares, f"{median} [{low}, {high}]"])
+    return found
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"{value:.0%}"
 
 
 def tolerances_in_words(tolerances: Tolerances, unit: StressUnit) -> str:

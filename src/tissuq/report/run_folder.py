@@ -11,7 +11,7 @@ from tempfile import mkdtemp
 
 from tissuq.errors import InputError
 
-__all__ = ["ASSESSMENT", "CONTENTS", "INPUT", "RECIPE", "check_target", "run_folder"]
+__all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "INPUT", "RECIPE", "check_target", "run_folder"]
 
 RECIPE = "run.toml"
 """The file that says how a run is repeated."""
@@ -21,6 +21,9 @@ INPUT = "input"
 
 ASSESSMENT = "assessment.json"
 """The file that says what each discrepancy does."""
+
+HELD_OUT_TESTS = "held_out.json"
+"""The file that says how each of several tests is predicted from the others."""
 
 CONTENTS = "contents.txt"
 """The list of a run's own files; a folder without it is not a run, and files that it does not list are foreign."""

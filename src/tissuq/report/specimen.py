@@ -13,6 +13,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.report.common import copied_laws, write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
 from tissuq.report.rows import (
+    readable_held_out,
     readable_methods,
     readable_parameters,
     readable_stability,
@@ -20,7 +21,7 @@ from tissuq.report.rows import (
     significant,
     tolerances_in_words,
 )
-from tissuq.report.run_folder import ASSESSMENT, INPUT, RECIPE
+from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, INPUT, RECIPE
 from tissuq.report.tables import Row, stability_cells, stability_rows, summary_row, write_csv, write_json
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenStudy
@@ -56,6 +57,9 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     stability = stability_rows(study.posteriors)
     if stability:
         write_csv(folder / "stability.csv", stability)
+    if study.held_out:
+        write_csv(folder / "held_out.csv", list(study.held_out))
+        write_json(folder / HELD_OUT_TESTS, list(study.held_out))
     write_posteriors(folder, study.posteriors)
     write_json(folder / ASSESSMENT, [_assessment_row(*each) for each in study.assessments.items()])
     if figures:
@@ -125,6 +129,7 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         "parameters": readable_parameters(study.posteriors, study.unit),
         "assessments": {name: each.sentences for name, each in study.assessments.items()},
         "stability": readable_stability(stability_rows(study.posteriors)),
+        "held_out": readable_held_out(study.held_out, study.headline, study.unit),
         "methods": readable_methods(study.posteriors),
         "noise": known or noise.description,
         "skipped": study.skipped,

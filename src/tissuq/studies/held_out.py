@@ -10,6 +10,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.fitting import fit
+from tissuq.mechanics.path import invariants
 from tissuq.posterior import Posterior
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ def held_out_tests(tests: Sequence[Experiment], **options: Any) -> pd.DataFrame:
 
     if len(tests) < 2:
         raise InputError("to predict a test from the others there must be two or more.")
+    if options.get("tolerances") is None:  # those of all tests, of which one alone has none
+        options["tolerances"] = fit(tests, **options).model.tolerances
     rows = []
     for place, test in enumerate(tests):
         posterior = fit([other for number, other in enumerate(tests) if number != place], **options)
@@ -68,26 +71,29 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
     Returns
     -------
     list of dict
-        test, mode, measured; ``inside``, the share of measurements in the predictive band; ``half_width`` and
-        ``error``, root mean squares of the band's half width and of the error of its mean, over that of the stress; and
-        ``half_width_median``, the median of the half width over the predicted stress. Measurements at which nothing is
-        stressed are left out, and the band is one with an error of the whole test.
+        test, mode, measured; ``inside``, the share of measurements in the predictive band; ``beyond``, the share of
+        them at which an invariant is larger than it was in the data of the posterior; and of the others ``half_width``
+        and ``error``, root mean squares of the band's half width and of the error of its mean, over that of the stress.
+        Measurements without stress are left out, and the band is that of a new test with an error of its own.
     """
-    rows = []
+    data, rows = posterior.model.experiment, []
+    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     for number, stress in enumerate(test.stress.reshape(len(test), -1).T):
-        used = stress != 0
-        band = posterior.predict(test.stretch[used], mode=test.mode, channel=number, prob=prob)
-        measured, half = stress[used], 0.5 * (band["high"] - band["low"]).to_numpy()
-        mean, size = band["mean"].to_numpy(), float(np.sqrt((measured**2).mean()))
+        points, measured = test.stretch[stress != 0], stress[stress != 0]
+        band = posterior.predict(points, mode=test.mode, channel=number, prob=prob)
+        low, high, mean = (band[name].to_numpy() for name in ("low", "high", "mean"))
+        reached = invariants(test.mode.channels[number], points)
+        known = np.logical_and.reduce([own <= end * (1 + 1e-9) for own, end in zip(reached, most, strict=True)])
+        size = float(np.sqrt((measured[known] ** 2).mean())) if known.any() else np.nan
+        parts = {"half_width": 0.5 * (high - low)[known], "error": (mean - measured)[known]}
         rows.append(
             {
                 "test": test.name,
                 "mode": test.mode.name,
                 "measured": test.mode.stresses[number],
-                "inside": float(np.mean(np.abs(measured - 0.5 * (band["high"] + band["low"])) <= half)),
-                "half_width": float(np.sqrt((half**2).mean())) / size,
-                "half_width_median": float(np.median(half / np.abs(mean))),
-                "error": float(np.sqrt(((mean - measured) ** 2).mean())) / size,
+                "inside": float(np.mean((low <= measured) & (measured <= high))),
+                "beyond": float(1 - known.mean()),
             }
+            | {name: float(np.sqrt((own**2).mean())) / size if known.any() else np.nan for name, own in parts.items()}
         )
     return rows

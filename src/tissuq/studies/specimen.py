@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -26,6 +26,7 @@ from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
 from tissuq.studies.fitted import FittedSettings
+from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.measured_file import MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.tolerances import Tolerances
 
@@ -46,6 +47,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     tolerances: dict[Literal["stress", "length", "slack", "zero", "stretch"], float] | None = None
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
+    held_out: bool = False
     stable_in: tuple[str, ...] = ()
 
     @field_validator("discrepancies")
@@ -66,6 +68,8 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         told = [test.noise_sd is not None for test in self.tests]
         if any(told) and (not all(told) or self.noise or self.noise_sd != "unknown"):
             raise ValueError("give noise_sd in each of the tests, or once for all")
+        if self.held_out and (len(self.tests) < 2 or any(told)):
+            raise ValueError("held_out needs two tests or more, and one noise_sd for all of them or an unknown one")
         return self
 
     def readings(self, folder: Path = Path()) -> list[Reading]:
@@ -106,6 +110,8 @@ class SpecimenStudy:
     assessments: dict[str, Assessment]
     doubts: tuple[str, ...] = ()
     """What is strange about the measurements."""
+    held_out: tuple[dict[str, Any], ...] = ()
+    """How every test is predicted from the others, where that was asked for."""
 
     @property
     def unit(self) -> StressUnit:
@@ -170,17 +176,8 @@ def run_specimen(
             skipped[name] = f"{len(experiment)} measurements are too few for its parameters {', '.join(sorted(own))}."
             continue
         try:
-            posteriors[name] = fit(
-                experiment,
-                material=material,
-                discrepancy=name,
-                noise=settings.noise_in(unit),
-                priors={symbol: prior for symbol, prior in priors.items() if symbol in own},
-                tolerances=settings.tolerances_in(unit),
-                method=settings.method,
-                stable_in=settings.stable_in,
-                seed=settings.seed,
-            )
+            options = _options(settings, material, priors, symbols[name], unit)
+            posteriors[name] = fit(experiment, discrepancy=name, **options)
             seconds[name] = perf_counter() - start
         except (ConvergenceError, ModelError) as error:
             if not is_all:
@@ -191,7 +188,40 @@ def run_specimen(
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
     step("assessing")
     assessments = {name: each.assess() for name, each in posteriors.items() if name != "none" and not each.diagnostics}
-    return SpecimenStudy(settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings))
+    held_out: list[dict[str, Any]] = []
+    for name in posteriors if settings.held_out else ():
+        step(f"{name}: each test from the others")
+        options = _options(settings, material, priors, symbols[name], unit)
+        options["tolerances"] = posteriors[name].model.tolerances
+        found = held_out_tests(experiment.parts, discrepancy=name, **options).to_dict("records")
+        held_out += [{"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in found]
+    parts = settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings)
+    return SpecimenStudy(*parts, tuple(held_out))
+
+
+def _known(value: Any) -> Any:
+    """Return a value, None for one that is no number."""
+    return None if value != value else value
+
+
+def _options(
+    settings: SpecimenSettings,
+    material: Material,
+    priors: Mapping[str, Prior],
+    parameters: tuple[Parameter, ...],
+    unit: StressUnit,
+) -> dict[str, Any]:
+    """Return the options of a fit but the discrepancy."""
+    own = {p.symbol for p in parameters}
+    return {
+        "material": material,
+        "noise": settings.noise_in(unit),
+        "priors": {symbol: prior for symbol, prior in priors.items() if symbol in own},
+        "tolerances": settings.tolerances_in(unit),
+        "method": settings.method,
+        "stable_in": settings.stable_in,
+        "seed": settings.seed,
+    }
 
 
 def _doubts(readings: Sequence[Reading]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The fits of a campaign: a neo-Hookean material with a formulation of its error, on many data sets."""
+"""The fits of a campaign: a material (neo-Hookean) with a formulation of its error, on many data sets."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
 from tissuq.fitting import fit_many
 from tissuq.inference.energies import why_no_energies
-from tissuq.mechanics import NeoHookean, engineering_stress
+from tissuq.mechanics import Material, NeoHookean, engineering_stress
 from tissuq.model import StatisticalModel
 from tissuq.noise import noise_named
 from tissuq.posterior import Posterior
@@ -27,10 +27,15 @@ AVERAGES = {"average-of-seven": FORMULATIONS}
 """Averages of fits by their evidence: the paper's seven formulations."""
 NoiseSd = float | str
 """In MPa, or ``"unknown"``."""
+PLAIN = NeoHookean()
 
 
 def fit_all(
-    data: Sequence[Experiment], formulation: str, noise_sd: Sequence[NoiseSd], priors: Mapping[str, Prior]
+    data: Sequence[Experiment],
+    formulation: str,
+    noise_sd: Sequence[NoiseSd],
+    priors: Mapping[str, Prior],
+    material: Material = PLAIN,
 ) -> Iterator[tuple[int, Posterior | Average | None]]:
     """Yield the place and the posterior of every data set, None where a fit failed; those of the same noise in a row.
 
@@ -39,7 +44,7 @@ def fit_all(
     """
     for level in dict.fromkeys(noise_sd):
         places = [place for place, own in enumerate(noise_sd) if own == level]
-        posteriors = _fit_together([data[place] for place in places], formulation, level, priors)
+        posteriors = _fit_together([data[place] for place in places], formulation, level, priors, material)
         yield from zip(places, posteriors, strict=True)
 
 
@@ -49,7 +54,12 @@ def parts_of(formulation: str) -> tuple[str, ...]:
 
 
 def model_of(
-    formulation: str, mode: str, stretch: NDArray[np.float64], noise_sd: NoiseSd, priors: Mapping[str, Prior]
+    formulation: str,
+    mode: str,
+    stretch: NDArray[np.float64],
+    noise_sd: NoiseSd,
+    priors: Mapping[str, Prior],
+    material: Material = PLAIN,
 ) -> StatisticalModel:
     """Return the model that is fitted to data on these stretches, with a stress that does not matter.
 
@@ -58,34 +68,37 @@ def model_of(
     TissuqError
         When such data cannot be fitted.
     """
-    stress = engineering_stress(NeoHookean(), loading_mode(mode), stretch, [1.0])
-    own, noise = _own_priors(formulation, noise_sd, priors), noise_named(noise_sd)
+    stress = engineering_stress(PLAIN, loading_mode(mode), stretch, [1.0])
+    own, noise = _own_priors(formulation, noise_sd, priors, material), noise_named(noise_sd)
     data = Experiment(loading_mode(mode), stretch, stress)
-    model = StatisticalModel(data, NeoHookean(), discrepancy_named(formulation), noise, own)
+    model = StatisticalModel(data, material, discrepancy_named(formulation), noise, own)
     why = why_no_energies(model) if model.energy_symbols else ""
     if why:
         raise ModelError(f"'{formulation}' cannot be integrated: {why}")
     return model
 
 
-def _own_priors(formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]) -> dict[str, Prior]:
-    """Return those priors whose parameters a formulation has."""
-    every = (*NeoHookean.parameters, *discrepancy_named(formulation).parameters, *noise_named(noise_sd).parameters)
+def _own_priors(
+    formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior], material: Material
+) -> dict[str, Prior]:
+    """Return those priors whose parameters material, formulation or noise have."""
+    every = (*material.parameters, *discrepancy_named(formulation).parameters, *noise_named(noise_sd).parameters)
     return {p.symbol: priors[p.symbol] for p in every if p.symbol in priors}
 
 
 def _fit_together(
-    data: Sequence[Experiment], formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior]
+    data: Sequence[Experiment], formulation: str, noise_sd: NoiseSd, priors: Mapping[str, Prior], material: Material
 ) -> list[Posterior | Average | None]:
     names, noise = parts_of(formulation), noise_named(noise_sd)
     try:
-        fits = [
-            fit_many(data, discrepancy=name, noise=noise, priors=_own_priors(name, noise_sd, priors)) for name in names
-        ]
+        fits = []
+        for name in names:
+            own = _own_priors(name, noise_sd, priors, material)
+            fits.append(fit_many(data, material=material, discrepancy=name, noise=noise, priors=own))
         if len(names) == 1:
             return list(fits[0])
         return [average(dict(zip(names, each, strict=True))) for each in zip(*fits, strict=True)]
     except (TissuqError, np.linalg.LinAlgError):
         if len(data) == 1:
             return [None]
-        return [each for one in data for each in _fit_together([one], formulation, noise_sd, priors)]
+        return [each for one in data for each in _fit_together([one], formulation, noise_sd, priors, material)]

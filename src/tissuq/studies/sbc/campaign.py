@@ -69,7 +69,7 @@ def carry_out(settings: SbcSettings, task: Task) -> dict[str, Any]:
         scores.append(generator.uniform(size=len(values)))
         data.append(Experiment(model.experiment.mode, model.experiment.stretch, stress))
     noise_sd = settings.design.noise_sd if noise == "known" else noise
-    fits = fit_all(data, formulation, [noise_sd] * len(data), settings.chosen_priors)
+    fits = fit_all(data, formulation, [noise_sd] * len(data), settings.chosen_priors, model.material)
     below: dict[str, list[float | None]] = {symbol: [None] * len(data) for symbol in model.symbols}
     for place, fit in fits:
         for symbol, uniform in zip(model.symbols, scores[place], strict=True):

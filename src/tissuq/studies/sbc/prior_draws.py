@@ -27,7 +27,8 @@ def draw_from_prior(model: StatisticalModel, generator: np.random.Generator) -> 
         raise ModelError(f"noise '{model.noise.name}' depends on the data, so nothing can be drawn before them.")
     values = {symbol: float(prior.quantile(generator.uniform())) for symbol, prior in model.priors.items()}
     stretch = model.experiment.stretch
-    stress = model.design @ [values[symbol] for symbol in model.column_symbols]
+    design = model.design_at([values[symbol] for symbol in model.bent_symbols])
+    stress = design @ [values[symbol] for symbol in model.column_symbols]
     if model.energy_symbols:
         stress = stress + _energy_stress(model, values, generator)
     if model.is_correlated:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.discrepancy import discrepancies, discrepancy_named
 from tissuq.errors import TissuqError
-from tissuq.mechanics import NeoHookean
+from tissuq.experiments.experiment import Experiment
+from tissuq.mechanics import material_named
 from tissuq.model import StatisticalModel
 from tissuq.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
+from tissuq.scales import default_prior
 from tissuq.studies.coverage.fitted import model_of
 from tissuq.studies.coverage.settings import Design
 
@@ -28,10 +31,12 @@ PRIORS: dict[str, Prior] = {
     "c2": HalfCauchy(0.1),
     "noise_sd": Uniform(0.05, 0.5),
 }
+POSITIVE, ABOUT_ZERO = Uniform(0.5, 1.5), Normal(0, 0.3)
+"""Priors of a material's linear parameters that have none above, MPa."""
 
 
 class SbcSettings(BaseModel):
-    """Formulations x noise x replicates; in each, parameters from the priors, data from the model, and a fit.
+    """Formulations x noise x replicates of a material; in each, parameters from the priors, data, and a fit.
 
     The priors (MPa; psi in stretch) are the same for every data set: none is taken from the data. Known noise is that
     of the design.
@@ -39,6 +44,7 @@ class SbcSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    material: str = "neo-hookean"
     formulations: tuple[str, ...] = Field(default_factory=lambda: tuple(discrepancies()), min_length=1)
     noise: tuple[Literal["known", "unknown"], ...] = Field(("known", "unknown"), min_length=1)
     design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
@@ -63,7 +69,7 @@ class SbcSettings(BaseModel):
         try:
             chosen = self.chosen_priors
             for formulation in self.formulations:
-                every = (*NeoHookean.parameters, *discrepancy_named(formulation).parameters)
+                every = (*material_named(self.material).parameters, *discrepancy_named(formulation).parameters)
                 missing = [p.symbol for p in every if isinstance(chosen.get(p.symbol, Flat()), Flat)]
                 if missing:
                     raise ValueError(f"'{formulation}' needs proper priors of {', '.join(missing)} to be drawn from")
@@ -75,10 +81,22 @@ class SbcSettings(BaseModel):
 
     @property
     def chosen_priors(self) -> dict[str, Prior]:
-        """The given priors, and ours for what is not given."""
-        return PRIORS | {symbol: prior_from(given) for symbol, given in self.priors.items()}
+        """The given priors, and ours for what is not given.
+
+        Those of a material's other parameters are positive about 1 MPa or normal about zero where they are linear, and
+        otherwise its default priors on this design.
+        """
+        given = PRIORS | {symbol: prior_from(given) for symbol, given in self.priors.items()}
+        stretch = self.design.stretch
+        scale = Experiment(self.design.mode, stretch, np.ones(len(stretch)))
+        for parameter in material_named(self.material).parameters:
+            if parameter.symbol not in given:
+                linear = POSITIVE if parameter.support[0] >= 0 else ABOUT_ZERO
+                given[parameter.symbol] = linear if parameter.is_linear else default_prior(parameter, scale)
+        return given
 
     def model(self, formulation: str, noise: str) -> StatisticalModel:
         """Return the model of a formulation, on data that do not matter."""
         noise_sd = self.design.noise_sd if noise == "known" else noise
-        return model_of(formulation, self.design.mode, self.design.stretch, noise_sd, self.chosen_priors)
+        law = material_named(self.material)
+        return model_of(formulation, self.design.mode, self.design.stretch, noise_sd, self.chosen_priors, law)
