@@ -35,6 +35,7 @@ bench: $(BENCH)/.installed  ## Time tissuq by itself and beside other libraries;
 	$(BENCH)/bin/python benchmarks/cold_start.py
 	$(BENCH)/bin/python benchmarks/engine.py
 	$(BENCH)/bin/python benchmarks/nonlinear.py
+	$(BENCH)/bin/python benchmarks/population.py
 	$(BENCH)/bin/python benchmarks/compare.py
 
 $(BENCH)/.installed: pyproject.toml benchmarks/constraints.txt

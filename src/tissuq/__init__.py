@@ -22,6 +22,7 @@ from tissuq.mechanics import (
 from tissuq.mechanics.material import materials
 from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, UnknownNoise
 from tissuq.parameters import Parameter
+from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 from tissuq.studies.held_out import held_out_tests
@@ -52,6 +53,7 @@ __all__ = [
     "Noise",
     "Normal",
     "Parameter",
+    "Population",
     "Posterior",
     "Prior",
     "ProportionalNoise",
@@ -68,6 +70,7 @@ __all__ = [
     "engineering_stress",
     "fit",
     "fit_many",
+    "fit_population",
     "held_out_tests",
     "initial_shear_modulus",
     "inspect",

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, fit, inspect, paper, show, study
+from tissuq.cli import catalogue, check, compare, fit, inspect, paper, population, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -25,6 +25,7 @@ app = typer.Typer(
 app.command("paper")(paper.paper)
 app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
+app.command("population")(population.population)
 app.command("compare")(compare.compare)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)

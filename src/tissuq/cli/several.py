@@ -10,14 +10,15 @@ from tissuq.cli.options import once_each
 from tissuq.cli.reading import resolve
 from tissuq.errors import InputError
 
-__all__ = ["files_of", "measured", "run_name", "tolerances"]
+__all__ = ["files_of", "measured", "one_noise", "run_name", "tolerances"]
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
 KINDS = ("stress", "length", "slack", "zero", "stretch")
 
 
 def files_of(given: Sequence[Path]) -> list[Path]:
     """Return the files that were given; of a folder those in it that may hold measurements."""
+    from tissuq.experiments.specimens import SUFFIXES
+
     found: list[Path] = []
     for path in given:
         if not path.is_dir():
@@ -72,6 +73,14 @@ def tolerances(texts: Sequence[str] | None) -> dict[str, float] | None:
     if list(texts) == ["none"]:
         return {}
     return once_each("--tolerance", map(_tolerance, texts))
+
+
+def one_noise(text: str | None) -> float | str | None:
+    """Return the standard deviation of the noise of all files: a number, or 'unknown'."""
+    found = _numbers(text)
+    if found and len(found) > 1:
+        raise InputError(f"--noise-sd is given {len(found)} times for a population; give it once for all specimens.")
+    return found[0] if found else None
 
 
 def run_name(given: Sequence[Path], config: Path | None, sources: Sequence[Path]) -> str:

@@ -21,6 +21,7 @@ __all__ = [
     "choose_columns",
     "columns_there_are",
     "declared_unit",
+    "find_column",
     "heading",
 ]
 
@@ -136,14 +137,14 @@ def choose_columns(
     quantities = _quantities(table, axis, mapping)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
-        stress = _find(table, load, mapping[load])
+        stress = find_column(table, load, mapping[load])
     else:
         load = "stress" if _fitting(quantities, ["stress"], stress_type) else "force"
         hint = _stress_hint(table, stress_type)
         stress = _recognise(table, quantities, "stress", [load], stress_type, "stress or force", hint)
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
-        deformation = _find(table, measure, mapping[measure])
+        deformation = find_column(table, measure, mapping[measure])
     else:
         first, second = (("shear",), ()) if is_shear else (("stretch", "strain"), ("displacement",))
         known = first if not second or _fitting(quantities, first) else second
@@ -196,7 +197,8 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
         )
 
 
-def _find(table: Table, role: str, wanted: str | int) -> int:
+def find_column(table: Table, role: str, wanted: str | int) -> int:
+    """Return the place of a column, by its name or its number from 1, that is asked for in a role."""
     text = str(wanted).strip()
     readings = (
         table.names,

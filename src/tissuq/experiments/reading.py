@@ -32,7 +32,7 @@ from tissuq.experiments.two_stresses import (
     told_steps,
 )
 
-__all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file"]
+__all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file", "read_rows"]
 
 STRESS_TYPES = ("engineering", "cauchy")
 AXES = ("x", "y")
@@ -188,11 +188,16 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
 
 def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
     """Read a file as :func:`read_experiment` does, and keep what was done on the way."""
-    mode = loading_mode(options.get("mode", "uniaxial"))
-    _check_options(mode, options)
+    _checked_mode(**options)
+    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
+    return read_rows(table, path, **options)
+
+
+def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
+    """Return what `read_file` does for the rows of a file that have been found already, all of them or some."""
+    mode = _checked_mode(**options)
     stress_type, every, name = options.get("stress_type", "engineering"), options.get("every", 1), options.get("name")
     is_positive = options.get("compression_positive", False)
-    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
     found = choose_every(table, mode, options.get("columns"), stress_type, options.get("axis"))
     labels, choices = list(found), list(found.values())
     dimensions = dimensions_of(table, options.get("dimensions"))
@@ -241,9 +246,10 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
     return replace(first, further=tuple(further))
 
 
-def _check_options(mode: LoadingMode, options: ReadingOptions) -> None:
-    stress_type, axis = options.get("stress_type", "engineering"), options.get("axis")
-    every = options.get("every", 1)
+def _checked_mode(**options: Unpack[ReadingOptions]) -> LoadingMode:
+    """Return the loading mode, once the options have been looked at that need no file."""
+    mode, stress_type = loading_mode(options.get("mode", "uniaxial")), options.get("stress_type", "engineering")
+    axis, every = options.get("axis"), options.get("every", 1)
     if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
         raise InputError(
             f"a file is read in loading modes with one stress or two, and '{mode.name}' has "
@@ -265,6 +271,7 @@ def _check_options(mode: LoadingMode, options: ReadingOptions) -> None:
         raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
     if not isinstance(every, int) or every < 1:
         raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
+    return mode
 
 
 def _measured(

@@ -19,20 +19,22 @@ def said_mode(file: Path) -> str | None:
     return _named(_in_comments(file))
 
 
-def told_mode(file: Path) -> str:
+def told_mode(file: Path, otherwise: str | None = None) -> str:
     """Return the mode that a comment line such as ``# mode: planar`` says, or else the name of the file.
+
+    One that says none is of another mode, where that is given.
 
     Raises
     ------
     InputError
-        When neither names one.
+        When neither names one, and no other is given.
 
     Examples
     --------
     >>> told_mode(Path("liver-7-planar.csv")), told_mode(Path("simple_shear.csv")), told_mode(Path("tension.csv"))
     ('planar', 'simple-shear', 'uniaxial')
     """
-    found = said_mode(file) or _named(file.stem)
+    found = said_mode(file) or _named(file.stem) or otherwise
     if found:
         return found
     raise InputError(

@@ -16,7 +16,7 @@ from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import stress_moments
 
-__all__ = ["Band", "predict_average", "predict_band", "share_inside"]
+__all__ = ["Band", "asked_for", "predict_average", "predict_band", "share_inside"]
 
 FloatArray = NDArray[np.float64]
 
@@ -90,17 +90,8 @@ def predict_average(
 
     All else is as for `predict_band`.
     """
-    asked = loading_mode(mode) if mode is not None else _only_mode(parts[0][1].model.experiment)
-    points = checked_points(asked, np.atleast_1d(stretch))
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    if not 0 <= channel < len(asked.stresses):
-        raise InputError(f"mode '{asked.name}' has the stresses {', '.join(asked.stresses)}: no number {channel}.")
-    for _, solution in parts:
-        if problem := solution.model.material.why_not(asked.channels[channel].moved(points[:1], 0.0)):
-            raise ModelError(problem)
-    for _, solution in parts if discrepancy else ():
-        _check_mode(solution, asked)
+    solutions = [solution for _, solution in parts]
+    asked, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
     count = FEW if len(points) > BLOCK else MANY
     mixture = [(weight, solution.model, solution.components.thinned(count)) for weight, solution in parts]
     weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
@@ -115,6 +106,36 @@ def predict_average(
         ends = [_mixture_quantile(tail, weights, mean, variance) for tail in tails]
         curves.append([weights @ mean, *ends])
     return Band(asked.channels[channel].abscissa(points), *np.concatenate(curves, axis=1))
+
+
+def asked_for(
+    solutions: Sequence[Solution],
+    stretch: ArrayLike,
+    *,
+    discrepancy: bool,
+    prob: float,
+    mode: str | LoadingMode | None,
+    channel: int,
+) -> tuple[LoadingMode, FloatArray]:
+    """Return the mode and the points (g,) or (g, c) of a prediction that posteriors of the same data can make.
+
+    Raises
+    ------
+    InputError, ModelError
+        When they cannot.
+    """
+    asked = loading_mode(mode) if mode is not None else _only_mode(solutions[0].model.experiment)
+    points = checked_points(asked, np.atleast_1d(stretch))
+    if not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    if not 0 <= channel < len(asked.stresses):
+        raise InputError(f"mode '{asked.name}' has the stresses {', '.join(asked.stresses)}: no number {channel}.")
+    for solution in solutions:
+        if problem := solution.model.material.why_not(asked.channels[channel].moved(points[:1], 0.0)):
+            raise ModelError(problem)
+    for solution in solutions if discrepancy else ():
+        _check_mode(solution, asked)
+    return asked, points
 
 
 def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:

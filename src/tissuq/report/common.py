@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.experiments.experiment import Experiment
+from tissuq.mechanics.user_law import LAW
 from tissuq.posterior import Posterior
-from tissuq.report.run_folder import RECIPE
+from tissuq.report.run_folder import INPUT, RECIPE
 from tissuq.report.tables import Row, parameter_rows, write_csv, write_json
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pydantic import BaseModel
 
-__all__ = ["write_data", "write_figures", "write_posteriors", "write_recipe", "write_tables"]
+__all__ = ["copied_laws", "write_data", "write_figures", "write_posteriors", "write_recipe", "write_tables"]
 
 
 def write_data(folder: Path, experiment: Experiment) -> None:
@@ -63,3 +65,14 @@ def write_recipe(folder: Path, command: str, settings: BaseModel, without: froze
     plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
     header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")
+
+
+def copied_laws(material: str, folder: Path) -> str:
+    """Return the name of a material with the laws in the user's files, of which copies go with the run."""
+    parts = material.split("+")
+    for place, match in enumerate(map(LAW.fullmatch, parts)):
+        if match:
+            law = Path(match["path"].strip())
+            shutil.copyfile(law, folder / INPUT / law.name)
+            parts[place] = f"{INPUT}/{law.name}:{match['name']}"
+    return "+".join(parts)

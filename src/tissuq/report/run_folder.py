@@ -11,10 +11,13 @@ from tempfile import mkdtemp
 
 from tissuq.errors import InputError
 
-__all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "RECIPE", "check_target", "run_folder"]
+__all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "INPUT", "RECIPE", "check_target", "run_folder"]
 
 RECIPE = "run.toml"
 """The file that says how a run is repeated."""
+
+INPUT = "input"
+"""The folder of a run that holds copies of the user's files, so that the run can be repeated."""
 
 ASSESSMENT = "assessment.json"
 """The file that says what each discrepancy does."""

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
 from tissuq.experiments.experiment import Experiment
-from tissuq.mechanics.user_law import LAW
-from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
+from tissuq.report.common import copied_laws, write_data, write_figures, write_posteriors, write_recipe, write_tables
 from tissuq.report.page import embedded_figure, render
 from tissuq.report.rows import (
     readable_held_out,
@@ -22,7 +21,7 @@ from tissuq.report.rows import (
     significant,
     tolerances_in_words,
 )
-from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, RECIPE
+from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, INPUT, RECIPE
 from tissuq.report.tables import Row, stability_cells, stability_rows, summary_row, write_csv, write_json
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenStudy
@@ -31,9 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["specimen_summary", "write_specimen_run"]
-
-INPUT = "input"
-"""The folder of a run that holds a copy of the user's file, so that the run can be repeated."""
 
 
 def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
@@ -50,7 +46,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
         Draw them, too.
     """
     (folder / INPUT).mkdir()
-    kept = _with_files(study, sources, folder) | {"material": _with_laws(study.settings.material, folder)}
+    kept = _with_files(study, sources, folder) | {"material": copied_laws(study.settings.material, folder)}
     named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
     command = f"fit{'' if figures else ' --no-figures'}{named}"
     of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
@@ -84,17 +80,6 @@ def _with_files(study: SpecimenStudy, sources: Sequence[Path], folder: Path) -> 
         return {"file": copies[0]}
     pairs = zip(study.settings.tests, study.experiment.parts, copies, strict=True)
     return {"tests": tuple(test.model_copy(update={"file": copy, "name": part.name}) for test, part, copy in pairs)}
-
-
-def _with_laws(material: str, folder: Path) -> str:
-    """Return the name of a material with the laws in the user's files, of which copies go with the run."""
-    parts = material.split("+")
-    for place, match in enumerate(map(LAW.fullmatch, parts)):
-        if match:
-            law = Path(match["path"].strip())
-            shutil.copyfile(law, folder / INPUT / law.name)
-            parts[place] = f"{INPUT}/{law.name}:{match['name']}"
-    return "+".join(parts)
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:

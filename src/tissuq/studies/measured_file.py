@@ -1,4 +1,4 @@
-"""A file of measurements and how to read it: what `tissuq fit` and `tissuq inspect` have in common."""
+"""Files of measurements and how to read them: what the commands that read them have in common."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import Reading, ReadingOptions, read_file
 
-__all__ = ["MeasuredFile", "MeasuredTest"]
+__all__ = ["MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
 
-class MeasuredFile(BaseModel):
-    """A file and the options of :func:`tissuq.read_experiment`."""
+class ReadingSettings(BaseModel):
+    """The options of :func:`tissuq.read_experiment`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    file: str
     mode: str = "uniaxial"
     columns: dict[str, str | int] = Field(default_factory=dict)
     stress_unit: str | None = None
@@ -39,8 +38,14 @@ class MeasuredFile(BaseModel):
 
     @property
     def reading_options(self) -> ReadingOptions:
-        """How to read the file."""
-        return cast(ReadingOptions, {name: getattr(self, name) for name in MeasuredFile.model_fields if name != "file"})
+        """How to read a file."""
+        return cast(ReadingOptions, {name: getattr(self, name) for name in ReadingSettings.model_fields})
+
+
+class MeasuredFile(ReadingSettings):
+    """A file, and how to read it."""
+
+    file: str
 
     def reading(self, folder: Path = Path()) -> Reading:
         """Read the file, a relative one in ``folder``, and keep what was done on the way."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal, Self
@@ -19,15 +18,16 @@ from tissuq.experiments.doubts import doubts
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.fitting import Method, fit
+from tissuq.fitting import fit
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.joint import joined
 from tissuq.noise import Noise, noise_named
 from tissuq.parameters import Parameter
 from tissuq.posterior import Posterior
 from tissuq.priors import Prior, prior_from
+from tissuq.studies.fitted import FittedSettings
 from tissuq.studies.held_out import held_out_tests
-from tissuq.studies.measured_file import MeasuredFile, MeasuredTest
+from tissuq.studies.measured_file import MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.tolerances import Tolerances
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
@@ -36,7 +36,7 @@ ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
 
 
-class SpecimenSettings(MeasuredFile):
+class SpecimenSettings(FittedSettings, MeasuredFile):
     """Everything that a fit depends on; stresses (noise, priors) in the unit of stress of the file, or the first one.
 
     It is of one ``file``, or of several ``tests`` together.
@@ -45,15 +45,10 @@ class SpecimenSettings(MeasuredFile):
     file: str = ""
     tests: tuple[MeasuredTest, ...] = ()
     tolerances: dict[Literal["stress", "length", "slack", "zero", "stretch"], float] | None = None
-    material: str = "neo-hookean"
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
-    noise_sd: float | Literal["unknown"] = "unknown"
-    noise: Literal["unknown", "proportional", "repeats", "autoregressive"] | None = None
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
-    method: Method = "auto"
     held_out: bool = False
     stable_in: tuple[str, ...] = ()
-    seed: int = Field(0, ge=0)
 
     @field_validator("discrepancies")
     @classmethod
@@ -62,28 +57,11 @@ class SpecimenSettings(MeasuredFile):
             raise ValueError(f"'{ALL}' stands alone; leave it out, or leave out the names beside it")
         return given
 
-    @field_validator("noise_sd", mode="before")
-    @classmethod
-    def _positive_or_unknown(cls, given: Any) -> Any:
-        is_number = isinstance(given, int | float) and not isinstance(given, bool)
-        if given != "unknown" and not (is_number and 0 < given < inf):
-            raise ValueError(
-                f"must be a positive number in the file's stress unit, or 'unknown', not {given!r}; noise of zero "
-                "would make every measurement exact"
-            )
-        return given
-
-    @model_validator(mode="after")
-    def _one_noise(self) -> Self:
-        if self.noise is not None and self.noise_sd != "unknown":
-            raise ValueError(f"give noise_sd or noise, not both (noise_sd is {self.noise_sd}, noise is '{self.noise}')")
-        return self
-
     @model_validator(mode="after")
     def _measured(self) -> Self:
         if bool(self.file) == bool(self.tests):
             raise ValueError("give one file, or several tests with a file each")
-        reading = set(MeasuredFile.model_fields) - {"file"}
+        reading = set(ReadingSettings.model_fields)
         if self.tests and self.model_fields_set & reading:
             where = ", ".join(sorted(self.model_fields_set & reading))
             raise ValueError(f"how files are read is said in each of the tests, not beside them ({where})")
@@ -114,9 +92,7 @@ class SpecimenSettings(MeasuredFile):
         every = [test.noise_sd for test in self.tests if test.noise_sd is not None]
         if every:
             return noise_named([each * unit.to_mpa for each in every])
-        if self.noise_sd == "unknown":
-            return noise_named(self.noise or "unknown")
-        return noise_named(self.noise_sd * unit.to_mpa)
+        return super().noise_in(unit)
 
 
 @dataclass(frozen=True)

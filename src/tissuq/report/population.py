@@ -1,0 +1,203 @@
+"""The run folder of a population: the converted data, tables, draws, figures and the report."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.errors import ModelError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import StressUnit
+from tissuq.report.common import copied_laws, write_figures, write_recipe
+from tissuq.report.page import embedded_figure, render
+from tissuq.report.population_figures import Bands, numbers_of, patient_figure, specimens_figure
+from tissuq.report.rows import interval, significant
+from tissuq.report.run_folder import INPUT, RECIPE
+from tissuq.report.tables import Row, write_csv
+from tissuq.studies.population import PopulationStudy
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["HEADERS", "readable_population", "write_population_run"]
+
+POINTS = 81
+"""Of the stress of a new patient."""
+HEADERS = ["parameter", "unit", "quantity", "median", "95 % HPD"]
+"""Of `readable_population`."""
+QUANTITIES = {
+    "median": "median of the population",
+    "spread": "spread between specimens",
+    "new patient": "a new patient",
+    "complete pooling": "complete pooling",
+}
+
+
+def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Path(), *, figures: bool = True) -> None:
+    """Write everything that a population leaves behind into an empty folder.
+
+    Parameters
+    ----------
+    study : PopulationStudy
+    folder : Path
+        Exists and is empty.
+    beside : Path
+        Where the files of the settings lie, unless they are absolute.
+    figures : bool
+        Draw them, too.
+    """
+    population, unit = study.population, study.unit
+    (folder / INPUT).mkdir()
+    kept = {"files": _copied(study, folder, beside), "material": copied_laws(study.settings.material, folder)}
+    named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
+    command = f"population{'' if figures else ' --no-figures'}{named}"
+    write_recipe(folder, command, study.settings.model_copy(update=kept))
+    several = len(study.modes) > 1
+    write_csv(folder / "data.csv", _data_rows(study, several))
+    tables = {"population": population.summary(), "specimens": population.specimen_summary()}
+    tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
+    bands, not_predicted, drawn = *_bands(study), {}
+    if bands:
+        tables["new_patient"] = _band_table(bands, several)
+        drawn = {"new_patient": patient_figure(population, bands, unit)} if figures else {}
+    for name, table in tables.items():
+        table.to_csv(folder / f"{name}.csv")
+    population.save(folder / "population.nc")
+    if figures:
+        write_figures(folder, drawn | {"specimens": specimens_figure(population, unit)})
+    page = render("population.html", **_context(study, folder), command=command, not_predicted=not_predicted)
+    (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
+    """Return the measurements, with their loading mode where there are several."""
+    rows: list[Row] = []
+    for name, tests in study.tests.items():
+        for test in tests:
+            own: Row = {"specimen": name} | ({"mode": test.mode.name} if several else {})
+            pairs = zip(test.stretch, test.stress, strict=True)
+            rows += [own | {"stretch": float(stretch), "stress": float(stress)} for stretch, stress in pairs]
+    return rows
+
+
+def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]:
+    """Return the stress of a new patient in every mode, with the model error and without; and why in some not."""
+    found, not_predicted = {}, []
+    for mode in study.modes:
+        own = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
+        reach = np.concatenate(own)
+        stretch = np.linspace(reach.min(), reach.max(), POINTS)
+        try:
+            band, alone = (study.population.new_patient(stretch, mode=mode, discrepancy=each) for each in (True, False))
+        except ModelError as error:  # some of the population's materials lock before the largest stretch
+            not_predicted.append(f"{mode.name}: {error}")
+        else:
+            found[mode] = (band, alone)
+    return found, not_predicted
+
+
+def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFrame:
+    """Return the stresses of new patients, indexed by stretch, and by mode where there are several."""
+    import pandas as pd
+
+    tables = {
+        mode.name: band.merge(alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
+        for mode, (band, alone) in bands.items()
+    }
+    return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
+
+
+def _copied(study: PopulationStudy, folder: Path, beside: Path) -> tuple[str, ...]:
+    """Copy the user's files, so that the run can be repeated, and return what names them there."""
+    for name, files in study.settings.sources(beside).items():
+        is_folder = len(files) > 1 or files[0].stem != name
+        place = folder / INPUT / name if is_folder else folder / INPUT
+        place.mkdir(exist_ok=True)
+        for file in files:
+            shutil.copyfile(file, place / file.name)
+    return (INPUT,) if study.settings.specimen is None else (f"{INPUT}/{Path(study.settings.files[0]).name}",)
+
+
+def readable_population(study: PopulationStudy) -> list[list[str]]:
+    """Return the rows of the summary as text, under `HEADERS`, in the unit of the files."""
+    population, rows = study.population, []
+    table = numbers_of(population.summary())
+    for symbol, is_log in zip(population.symbols, population.coordinates.is_log, strict=True):
+        factor, unit = _scale(study, symbol)
+        for quantity, words in QUANTITIES.items():
+            is_ratio = quantity == "spread" and is_log
+            own = _text(table[symbol, quantity], 1.0 if is_ratio else factor)
+            rows.append([symbol, "sd of the log" if is_ratio else unit, words, *own])
+    return rows
+
+
+def _readable_specimens(study: PopulationStudy) -> list[list[str]]:
+    rows, table = [], numbers_of(study.population.specimen_summary())
+    for name in study.population.names:
+        for symbol in study.population.symbols:
+            factor, unit = _scale(study, symbol)
+            numbers = table[name, symbol]
+            rows.append([name, symbol, unit, *_text(numbers, factor, "alone_"), *_text(numbers, factor)])
+    return rows
+
+
+def _scale(study: PopulationStudy, symbol: str) -> tuple[float, str]:
+    """Return what one unit of a parameter is in MPa, and the unit's name."""
+    parameter = next(p for p in study.population.complete.model.parameters if p.symbol == symbol)
+    unit: StressUnit = study.unit
+    return (unit.to_mpa, unit.name) if parameter.unit else (1.0, "")
+
+
+def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -> tuple[str, str]:
+    """Return a median and an interval with the decimals that its width supports."""
+    low, middle, high = (numbers[f"{prefix}{name}"] / factor for name in ("hdi_low", "median", "hdi_high"))
+    width = (high - low) / 4
+    return interval(middle, middle, width)[0], "[{}, {}]".format(*interval(low, high, width))
+
+
+def _context(study: PopulationStudy, folder: Path) -> dict[str, Any]:
+    population, found = study.population, study.population.diagnostics
+    logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
+    pairs = numbers_of(population.correlations())
+    return {
+        "settings": study.settings,
+        "count": len(study.tests),
+        "measurements": sum(len(test) for tests in study.tests.values() for test in tests),
+        "is_one": len(population.symbols) == 1,
+        "is_in_modes": len(study.modes) > 1,
+        "mode": ", ".join(mode.name for mode in study.modes),
+        "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
+        "lead": _lead(study),
+        "warnings": study.warnings,
+        "headers": HEADERS,
+        "summary": readable_population(study),
+        "correlations": [[name, *_text(numbers)] for name, numbers in pairs.items()],
+        "specimens": _readable_specimens(study),
+        "verdict": found.verdict,
+        "effective": f"{population.hierarchy.effective:.1%}",
+        "seconds": f"{study.seconds:.0f}",
+        "logs": logs,
+        "others": [symbol for symbol in population.symbols if symbol not in logs],
+        "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
+    }
+
+
+def _lead(study: PopulationStudy) -> str:
+    """Return the finding in two sentences."""
+    symbol = study.population.symbols[0]
+    factor, unit = _scale(study, symbol)
+    table = numbers_of(study.population.summary())
+    middle = significant(table[symbol, "median"]["median"] / factor)
+    new, complete = (
+        _text(table[symbol, name], factor)[1].strip("[]").replace(",", " to")
+        for name in ("new patient", "complete pooling")
+    )
+    return (
+        f"The median of {symbol} in the population is {middle} {unit}; for a patient who has not been measured it is "
+        f"{new} {unit} (95 %). Taking all measurements for those of one specimen would say {complete} {unit}, which is "
+        "no range of patients."
+    )

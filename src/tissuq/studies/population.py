@@ -1,0 +1,153 @@
+"""The study of several specimens: read, fitted by themselves, and put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from time import perf_counter
+
+from pydantic import Field
+
+from tissuq.errors import InputError
+from tissuq.experiments.doubts import doubts
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading import Reading
+from tissuq.experiments.specimens import find_tests, read_column
+from tissuq.experiments.told_mode import told_mode
+from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.mechanics import Material, material_named
+from tissuq.population import Population, fit_population
+from tissuq.studies.fitted import FittedSettings
+from tissuq.studies.measured_file import MeasuredTest, ReadingSettings
+
+__all__ = ["PopulationSettings", "PopulationStudy", "run_population"]
+
+USUAL_MODE = "uniaxial"
+MOST_DOUBTS = 8
+"""Different ones that are told."""
+
+
+class PopulationSettings(FittedSettings, ReadingSettings):
+    """Everything that a population depends on; the noise in the files' unit of stress.
+
+    Without a mode every file says its own, by a comment or by its name; one that says none is uniaxial.
+    """
+
+    files: tuple[str, ...] = Field(min_length=1)
+    mode: str = ""
+    specimen: str | None = None
+    discrepancy: str = "auto"
+    parameters: tuple[str, ...] | None = None
+    spread: float = Field(1.0, gt=0, lt=inf)
+
+    def sources(self, folder: Path = Path()) -> dict[str, list[Path]]:
+        """Return the files of every specimen; one file alone where a column in it names them."""
+        if self.specimen is None:
+            return find_tests([folder / file for file in self.files])
+        if len(self.files) > 1 or (folder / self.files[0]).is_dir():
+            raise InputError("a column names the specimens of one file: give one FILE, or leave --specimen out.")
+        return {Path(self.files[0]).stem: [folder / self.files[0]]}
+
+    def readings(self, folder: Path = Path()) -> dict[str, list[Reading]]:
+        """Read the tests of every specimen; relative files lie in ``folder``."""
+        sources = self.sources(folder)
+        if self.specimen is None:
+            return {name: [self._test(name, file).reading() for file in files] for name, files in sources.items()}
+        (file,) = next(iter(sources.values()))
+        found = read_column(file, self.specimen, **self._test("", file).reading_options)
+        return {name: [reading] for name, reading in found.items()}
+
+    def _test(self, specimen: str, file: Path) -> MeasuredTest:
+        own = {name: getattr(self, name) for name in ReadingSettings.model_fields}
+        mode = self.mode or told_mode(file, otherwise=USUAL_MODE)
+        return MeasuredTest(**own | {"mode": mode, "file": str(file), "name": specimen, "specimen": specimen})
+
+
+@dataclass(frozen=True)
+class PopulationStudy:
+    """What was found."""
+
+    settings: PopulationSettings
+    tests: dict[str, list[Experiment]]
+    population: Population
+    seconds: float
+    doubts: tuple[str, ...] = ()
+    """What is strange about the measurements."""
+
+    @property
+    def unit(self) -> StressUnit:
+        """The unit in which the files give stresses; MPa where they differ."""
+        return _unit(self.tests)
+
+    @property
+    def modes(self) -> tuple[LoadingMode, ...]:
+        """The different loading modes of the tests."""
+        return self.population.complete.model.experiment.modes
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must know."""
+        return [*self.doubts, *self.population.warnings]
+
+
+def run_population(
+    settings: PopulationSettings,
+    folder: Path = Path(),
+    step: Callable[[str], None] = lambda text: None,
+    law: Material | None = None,
+) -> PopulationStudy:
+    """Read the files and find the population of the specimens in them.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When files or settings cannot be used.
+    """
+    step("reading")
+    readings = settings.readings(folder)
+    tests = {name: [reading.experiment for reading in own] for name, own in readings.items()}
+    units = _units(tests)
+    if settings.noise_sd != "unknown" and len(units) > 1:
+        raise InputError(
+            f"the files give stresses in different units ({', '.join(sorted(units))}), so that it is not clear which "
+            "one the noise is in: leave --noise-sd out, or convert the files."
+        )
+    step(f"{len(tests)} specimens")
+    start = perf_counter()
+    population = fit_population(
+        tests,
+        parameters=settings.parameters,
+        spread=settings.spread,
+        material=law or material_named(settings.material),
+        discrepancy=settings.discrepancy,
+        noise=settings.noise_in(_unit(tests)),
+        method=settings.method,
+        seed=settings.seed,
+    )
+    return PopulationStudy(settings, tests, population, perf_counter() - start, _doubts(readings))
+
+
+def _units(tests: Mapping[str, Sequence[Experiment]]) -> set[str]:
+    return {each.stress_unit for own in tests.values() for each in own}
+
+
+def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
+    units = _units(tests)
+    return stress_unit(units.pop() if len(units) == 1 else "MPa")
+
+
+def _doubts(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]:
+    """Return what is strange about the files, each once with the specimens that it concerns."""
+    concerned: dict[str, list[str]] = {}
+    for name, own in readings.items():
+        for text in dict.fromkeys(text for reading in own for text in doubts(reading)):
+            concerned.setdefault(text, []).append(name)
+    found = [
+        f"{'all specimens' if len(names) == len(readings) else ', '.join(names)}: {text}"
+        for text, names in concerned.items()
+    ]
+    left = len(found) - MOST_DOUBTS
+    return (*found[:MOST_DOUBTS], *([f"{left} more of this kind; tissuq inspect FILE tells them."] if left > 0 else []))

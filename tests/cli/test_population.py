@@ -1,0 +1,141 @@
+"""`tissuq population`, as a user runs it."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+
+import numpy as np
+import pytest
+
+from .conftest import STRETCH, command
+
+MODULI_KPA = [40.0, 48.0, 52.0, 60.0, 75.0, 45.0]
+OPTIONS = ["--discrepancy", "none", "--noise-sd", 1]
+
+
+def rows_of(modulus, seed):
+    stretch = np.array(STRETCH)
+    stress = 2 * modulus * (stretch - stretch**-2) + np.random.default_rng(seed).standard_normal(len(stretch))
+    return [f"{a},{b:.3f}" for a, b in zip(stretch, stress, strict=True)]
+
+
+def write_all(folder):
+    """Six specimens, the last with two tests, as files; and the same in one file."""
+    (folder / "specimens" / "S5").mkdir(parents=True)
+    lines = []
+    for k, modulus in enumerate(MODULI_KPA):
+        names = [f"S{k}.csv"] if k < 5 else ["S5/first.csv", "S5/second.csv"]
+        for seed, name in enumerate(names):
+            rows = rows_of(modulus, 10 * k + seed)
+            (folder / "specimens" / name).write_text("\n".join(["stretch,stress_kPa", *rows]) + "\n")
+            lines += [f"S{k},{row}" for row in rows]
+    (folder / "all.csv").write_text("\n".join(["specimen,stretch,stress_kPa", *lines]) + "\n")
+
+
+@pytest.fixture(scope="session")
+def population_run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("population")
+    write_all(folder)
+    said = command("population", "specimens", *OPTIONS, "--out", "run", folder=folder)
+    assert said.status == 0, said.err
+    return folder, said
+
+
+def table(file):
+    with file.open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def test_a_run_leaves_the_promised_files(population_run):
+    folder, said = population_run
+    found = {path.relative_to(folder / "run").as_posix() for path in (folder / "run").rglob("*") if path.is_file()}
+    inputs = {f"input/S{k}.csv" for k in range(5)} | {"input/S5/first.csv", "input/S5/second.csv"}
+    figures = {f"figures/{name}.{kind}" for name in ("specimens", "new_patient") for kind in ("svg", "png")}
+    tables = {"data.csv", "population.csv", "specimens.csv", "new_patient.csv", "population.nc"}
+    assert found == inputs | figures | tables | {"report.html", "run.toml", "contents.txt"}
+    assert "A population of 6 specimens" in said.out
+    assert "is no range of patients" in said.out
+    page = (folder / "run" / "report.html").read_text()
+    assert all(f"<td>S{k}</td>" in page for k in range(6))
+    assert "kPa" in page
+
+
+def test_the_numbers_are_those_of_the_specimens(population_run):
+    folder, _ = population_run
+    found = {row["quantity"]: {key: float(row[key]) for key in ("median", "hdi_low", "hdi_high")}
+             for row in table(folder / "run" / "population.csv")}  # fmt: skip
+    assert found["median"]["median"] == pytest.approx(np.exp(np.mean(np.log(MODULI_KPA))) * 1e-3, rel=0.05)
+    assert found["new patient"]["hdi_low"] < 0.040
+    assert found["new patient"]["hdi_high"] > 0.075
+    own = [float(row["median"]) for row in table(folder / "run" / "specimens.csv")]
+    assert own == pytest.approx(np.array(MODULI_KPA) * 1e-3, rel=0.05)
+    assert len(table(folder / "run" / "data.csv")) == 7 * len(STRETCH)
+
+
+def test_a_run_is_repeated_from_its_own_folder_and_from_one_file(population_run):
+    folder, _ = population_run
+    expected = (folder / "run" / "population.csv").read_bytes()
+    options = ["--no-figures", "--out"]
+    again = command("population", "--config", "run/run.toml", *options, "again", folder=folder)
+    assert again.status == 0, again.err
+    assert (folder / "again" / "population.csv").read_bytes() == expected
+    one = command("population", "all.csv", "--specimen", "specimen", *OPTIONS, *options, "one", folder=folder)
+    assert one.status == 0, one.err
+    assert (folder / "one" / "population.csv").read_bytes() == expected
+    recipe = tomllib.loads((folder / "one" / "run.toml").read_text())
+    assert recipe["files"] == ["input/all.csv"]
+
+
+def test_specimens_may_be_tested_in_several_modes(cli, here):
+    """Files say their mode by a comment or by their name; a run folder keeps both."""
+    for k, modulus in enumerate(MODULI_KPA[:3]):
+        (here / "all" / f"S{k}").mkdir(parents=True)
+        (here / "all" / f"S{k}" / "first.csv").write_text(
+            "\n".join(["stretch,stress_kPa", *rows_of(modulus, k)]) + "\n"
+        )
+        lines = [f"{a},{2 * modulus * (a - a**-3):.3f}" for a in STRETCH]
+        (here / "all" / f"S{k}" / "planar.csv").write_text("\n".join(["stretch,stress_kPa", *lines]) + "\n")
+    lines = ["# mode: planar", "stretch,stress_kPa", *(f"{a},{100 * (a - a**-3):.3f}" for a in STRETCH)]
+    (here / "all" / "S3.csv").write_text("\n".join(lines) + "\n")
+    said = cli("population", "all", *OPTIONS, "--out", "run")
+    assert said.status == 0, said.err
+    assert {row["mode"] for row in table(here / "run" / "data.csv")} == {"uniaxial", "planar"}
+    assert {row["mode"] for row in table(here / "run" / "new_patient.csv")} == {"uniaxial", "planar"}
+    assert "4 specimens, uniaxial, planar, " in (here / "run" / "report.html").read_text()
+    own = [float(row["median"]) for row in table(here / "run" / "specimens.csv")]
+    assert own == pytest.approx(np.array([*MODULI_KPA[:3], 50]) * 1e-3, rel=0.05)
+    assert cli("population", "--config", "run/run.toml", "--no-figures", "--out", "again").status == 0
+    assert (here / "again" / "population.csv").read_bytes() == (here / "run" / "population.csv").read_bytes()
+
+
+def test_doubts_about_files_are_told_with_their_specimens(cli, here):
+    for k, modulus in enumerate(MODULI_KPA[:3]):
+        unit = "" if k else "_kPa"
+        (here / f"S{k}.csv").write_text("\n".join([f"stretch,stress{unit}", *rows_of(modulus, k)]) + "\n")
+    said = cli("population", "S0.csv", "S1.csv", "S2.csv", "--discrepancy", "none", "--no-figures")
+    assert said.status == 0, said.err
+    assert "S1, S2: the file states no unit of stress, so MPa was assumed" in " ".join(said.out.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "give the FILES"),
+        (["nowhere.csv"], "there is no such file"),
+        (["specimens/S0.csv", "specimens/S1.csv"], "needs 3 specimens or more; there are 2 (S0, S1)"),
+        (["specimens", "--specimen", "who"], "a column names the specimens of one file"),
+        (["specimens", "--parameter", "C99"], "found: C99"),
+        (["specimens", "--spread", "-1"], "spread"),
+        (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),
+        (["specimens", "--noise-sd", "1,2"], "give it once for all specimens"),
+        (["specimens", "--mode", "biaxial"], "a file is read in loading modes with one stress"),
+    ],
+)
+def test_bad_input_ends_with_one_message(cli, here, arguments, words):
+    write_all(here)
+    said = cli("population", *arguments)
+    assert said.status == 2
+    assert words in said.err
+    assert "Traceback" not in said.err
+    assert not (here / "runs").exists()

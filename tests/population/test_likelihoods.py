@@ -1,0 +1,161 @@
+"""The pieces of a population: mixtures on the line, few Gaussians for many, and integrals over a specimen."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal, norm
+
+import tissuq as tq
+from tissuq.population.coordinates import Coordinates, coordinates_of
+from tissuq.population.hierarchy import _population, _terms
+from tissuq.population.likelihoods import _split, likelihoods_of, mixtures_of
+from tissuq.population.mixture import Mixture, reduced
+
+STRETCH = np.linspace(0.8, 1.5, 12)
+
+
+def log_likelihood(found, theta):
+    """Evaluate one specimen's likelihood (n,) at places (n, d)."""
+    quadratic = np.einsum("ni,kij,nj->nk", theta, found.precision[0], theta)
+    return logsumexp(found.log_factor[0] + theta @ found.pull[0].T - 0.5 * quadratic, axis=1)
+
+
+def random_mixture(count=400, seed=1):
+    """Return Gaussians as posteriors have them: wider ones lie further away."""
+    generator = np.random.default_rng(seed)
+    score = generator.standard_normal(count)
+    root = np.array([[1.0, 0.0], [0.7, 0.3]]) * np.exp(0.7 * score)[:, None, None]
+    means = np.array([0.5, -0.2]) * score[:, None] + 0.1 * generator.standard_normal((count, 2))
+    return Mixture(generator.random(count), means, root @ root.swapaxes(1, 2))
+
+
+@pytest.mark.parametrize("count", [1, 16, 200])
+def test_few_gaussians_keep_the_moments_of_many(count):
+    many = random_mixture()
+    few = reduced(many, count)
+    assert len(few.weights) <= count
+    assert few.weights.sum() == pytest.approx(many.weights.sum())
+    for own, expected in zip(few.moments(), many.moments(), strict=True):
+        assert own == pytest.approx(expected, rel=1e-4, abs=1e-4)
+
+
+def test_more_gaussians_come_nearer_to_the_density():
+    many = random_mixture()
+    generator = np.random.default_rng(2)
+    chosen = generator.choice(len(many.weights), 500, p=many.weights / many.weights.sum())
+    points = np.array([generator.multivariate_normal(many.means[k], many.covariances[k]) for k in chosen])
+
+    def log_density(mixture):
+        each = [
+            multivariate_normal(m, c).logpdf(points) for m, c in zip(mixture.means, mixture.covariances, strict=True)
+        ]
+        return logsumexp(np.log(mixture.weights / mixture.weights.sum())[:, None] + each, axis=0)
+
+    errors = [np.std(log_density(reduced(many, count)) - log_density(many)) for count in (1, 8, 64)]
+    assert errors[0] > 2 * errors[1] > 2 * errors[2]
+    assert errors[2] < 0.2
+
+
+@pytest.mark.parametrize(("modulus", "noise_sd", "error"), [(0.5, 0.005, 0.05), (0.5, 0.1, 0.1), (0.05, 0.2, 0.5)])
+def test_the_likelihood_of_a_modulus_is_that_of_the_data(modulus, noise_sd, error):
+    """Known noise and no discrepancy: Gaussian in C10, and for the last one, which is drawn, level below.
+
+    The log likelihood is right up to a constant and the error that is given where it is within three of its top, from
+    a thirtieth of the middle on.
+    """
+    data = tq.simulate("neo-hookean", {"C10": modulus}, STRETCH, noise_sd, seed=3)
+    posterior = tq.fit(data, discrepancy="none", noise_sd=noise_sd)
+    coordinates = coordinates_of([posterior], ["C10"])
+    found = likelihoods_of(*mixtures_of([posterior], coordinates), 200)
+    theta = np.linspace(-3.4, 3.4, 2001)[:, None]
+    basis = 2 * (STRETCH - STRETCH**-2)
+    residual = data.stress - coordinates.from_line(theta) * basis
+    expected = norm.logpdf(residual, 0, noise_sd).sum(axis=1)
+    expected -= expected.max()
+    near = expected > -3
+    assert near[0] == (modulus < 0.1)
+    assert np.ptp((log_likelihood(found, theta) - expected)[near]) < error
+
+
+def test_a_gaussian_that_is_split_keeps_its_weight_and_its_moments_under_the_logarithm():
+    """Against quadrature of log b and its products with a correlated c over the Gaussian of both."""
+    mean, covariance = np.array([0.5, 1.0]), np.array([[0.0025, 0.003], [0.003, 0.01]])
+    coordinates = Coordinates(("C10", "C01"), np.array([True, False]), np.array([1.0, 2.0]), np.array([-0.5, 0.25]))
+    found = _split(Mixture(np.array([3.0]), mean[None], covariance[None]), coordinates)
+    score, weights = np.polynomial.hermite_e.hermegauss(20)
+    b, c = mean[0] + 0.05 * score, mean[1] + 0.06 * score
+    log_mean, c_mean = (weights @ each / weights.sum() for each in (np.log(b), c / 2))
+    expected = weights @ ((np.log(b) - log_mean) * (c / 2 - c_mean)) / weights.sum()
+    own_mean, own = found.moments()
+    assert found.weights.sum() == pytest.approx(3, rel=1e-4)
+    assert own_mean == pytest.approx([log_mean + 0.5, c_mean - 0.25], abs=1e-3)
+    assert own[0, 0] == pytest.approx(weights @ (np.log(b) - log_mean) ** 2 / weights.sum(), rel=0.02)
+    assert own[0, 1] == pytest.approx(expected, rel=0.02)
+    assert own[1, 1] == pytest.approx(0.01 / 4, rel=0.02)
+
+
+def test_two_parameters_under_an_energy_are_represented_jointly():
+    """Against the mixture that the fit gives, evaluated by itself: sd of the log ratio at its own draws below 0.1."""
+    truth = {"C10": 0.5, "C20": 0.05, "C30": 0.0}
+    data = tq.simulate("yeoh", truth, np.linspace(0.6, 2, 30), 0.02, seed=1)
+    posterior = tq.fit(data, material="yeoh", noise_sd=0.02)
+    coordinates = coordinates_of([posterior], ["C10", "C20"])
+    found = likelihoods_of(*mixtures_of([posterior], coordinates), 200)
+    draws = np.column_stack([posterior.solution.draws[s].ravel()[::20] for s in ("C10", "C20")])
+    parts = posterior.solution.components
+    own = parts.root[:, :2] @ parts.root[:, :2].swapaxes(1, 2)
+    is_wide = np.linalg.eigvalsh(own)[:, 0] > 0
+    assert parts.weights[is_wide].sum() > 0.999
+    each = [
+        multivariate_normal(mean[:2], covariance, allow_singular=True).logpdf(draws)
+        for mean, covariance in zip(parts.mean[is_wide], own[is_wide], strict=True)
+    ]
+    expected = logsumexp(np.log(parts.weights[is_wide])[:, None] + each, axis=0)
+    ratio = log_likelihood(found, coordinates.to_line(draws)) - expected
+    assert np.std(ratio) < 0.1
+
+
+def test_a_prior_that_was_given_is_divided_out():
+    """Up to its curvature within a Gaussian of the posterior, which is why it must be wide."""
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, 0.05, seed=3)
+    theta = np.log(0.5) + np.linspace(-0.2, 0.2, 41)[:, None]
+    curves = []
+    for priors in ({}, {"C10": tq.LogNormal(0.3, 0.7)}):
+        posterior = tq.fit(data, discrepancy="none", noise_sd=0.05, priors=priors)
+        coordinates = coordinates_of([posterior], ["C10"])
+        found = likelihoods_of(*mixtures_of([posterior], coordinates), 200)
+        values = log_likelihood(found, theta - coordinates.centre)
+        curves.append(values - values.max())
+    inside = curves[0] > -3
+    assert inside.sum() >= 5
+    assert curves[1][inside] == pytest.approx(curves[0][inside], abs=0.3)
+
+
+def test_specimens_are_integrated_over_as_multivariate_normals():
+    generator = np.random.default_rng(4)
+    root = np.tril(generator.standard_normal((3, 3))) + 2 * np.eye(3)
+    mean, middle = generator.standard_normal((2, 3))
+    side = generator.standard_normal((3, 3))
+    own = side @ side.T + 0.1 * np.eye(3)
+    precision = np.linalg.inv(own)
+    terms, _, _ = _terms(mean, root, np.zeros((1, 1)), (precision @ middle)[None, None], precision[None, None])
+    at_zero = multivariate_normal(middle, own).logpdf(np.zeros(3))
+    expected = multivariate_normal(mean, root @ root.T + own).logpdf(middle) - at_zero
+    assert float(terms[0, 0]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_partial_correlations_make_a_correlation_matrix():
+    """Against the recursion of Joe (2006) for three parameters, written out."""
+    tau, first, second, given = np.array([0.5, 1.0, 2.0]), 0.6, -0.4, 0.7
+    mean, root = _population(jnp.array([1.0, 2.0, 3.0, *tau, first, second, given]))
+    covariance = np.asarray(root @ root.T)
+    expected = first * second + given * np.sqrt((1 - first**2) * (1 - second**2))
+    assert np.asarray(mean).tolist() == [1, 2, 3]
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(tau)
+    correlation = covariance / np.outer(tau, tau)
+    assert correlation[1, 0] == pytest.approx(first)
+    assert correlation[2, 0] == pytest.approx(second)
+    assert correlation[2, 1] == pytest.approx(expected)
