@@ -129,7 +129,7 @@ def test_doubts_about_files_are_told_with_their_specimens(cli, here):
         (["specimens", "--spread", "-1"], "spread"),
         (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),
         (["specimens", "--noise-sd", "1,2"], "give it once for all specimens"),
-        (["specimens", "--mode", "biaxial"], "a file is read in loading modes with one stress"),
+        (["specimens", "--mode", "biaxial"], "loading mode 'biaxial' has engineering stress of axis 1"),
     ],
 )
 def test_bad_input_ends_with_one_message(cli, here, arguments, words):
