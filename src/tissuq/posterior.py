@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tissuq.assessment import Assessment, assess, known_evidence_changes
+from tissuq.assessment import Assessment, assess
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, calibrated_range, stability, stable_ranges
 from tissuq.cautions import warnings_about
@@ -20,10 +20,9 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading import STRESS_TYPES
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
+from tissuq.labelled import labelled_arrays, labels_of
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside
-from tissuq.prediction.densities import leave_one_out
-from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -311,56 +310,10 @@ class Posterior:
         exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the quadrature's points: for
         their intervals and densities use `summary` and ``solution.marginals``.
         """
-        import xarray as xr
-
-        solution, experiment = self.solution, self.model.experiment
-        point = {"measurement": np.arange(len(experiment))}
-        chains, draws = (np.arange(size) for size in solution.shape)
-        sample = {"chain": chains, "draw": draws}
-        some = {"chain": chains, "draw": draws[:: stride(solution)]}
-        parameters = {parameter.symbol: parameter for parameter in self.model.parameters}
-        stress, left_out = ("chain", "draw", "measurement"), leave_one_out(solution)
-        in_mpa = {"units": "MPa"}
-        groups = {
-            "posterior": xr.Dataset(
-                {
-                    symbol: (("chain", "draw"), values, {"units": parameters[symbol].unit or "1"})
-                    for symbol, values in self._draws().items()
-                },
-                sample,
-            ),
-            "posterior_predictive": xr.Dataset(
-                {"stress": (stress, replicate_data(solution, self.seed), in_mpa)}, some | point
-            ),
-            "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, some | point),
-            "leave_one_out": xr.Dataset(
-                {
-                    "log_density": ("measurement", left_out.log_density),
-                    "is_rough": ("measurement", left_out.is_rough.astype(np.int8)),
-                },
-                point,
-            ),
-            "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
-            "constant_data": xr.Dataset(
-                {
-                    "stretch": ("measurement", experiment.mode.abscissa(experiment.stretch), {"units": "1"}),
-                    "test": ("measurement", np.repeat([p.name for p in experiment.parts], _sizes(experiment))),
-                },
-                point,
-            ),
-        }
-        tree = xr.DataTree.from_dict(groups)
-        tree.attrs.update(self._labels())
+        headline = self.summary(parameters=[self.model.headline]).to_dict("records")[0]
+        tree = labelled_arrays(self.solution, self.seed)
+        tree.attrs.update(labels_of(self.solution, self.seed, headline))
         return tree
-
-    def _draws(self) -> dict[str, NDArray[np.float64]]:
-        """Return the draws of every parameter, those of stresses with the error that all tests have in common."""
-        model, drawn = self.model, self.solution.draws
-        if not model.common_error:
-            return drawn
-        score = np.random.default_rng([self.seed, 17]).standard_normal(self.solution.shape)
-        factor = 1 + model.common_error * score
-        return {symbol: each * (factor if symbol in model.scaled_symbols else 1.0) for symbol, each in drawn.items()}
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
@@ -368,42 +321,9 @@ class Posterior:
         content = bytes(self.data.to_netcdf(engine="h5netcdf"))
         Path(path).write_bytes(content)
 
-    def _labels(self) -> dict[str, str | float]:
-        model, solution = self.model, self.solution
-        labels: dict[str, str | float] = {
-            "inference_library": "tissuq",
-            "experiment": model.experiment.name,
-            "loading_mode": ", ".join(mode.name for mode in model.experiment.modes),
-            "material": model.material.name,
-            "discrepancy": model.discrepancy.name,
-            "noise": str(model.noise),
-            "method": solution.route,
-            "method_reason": solution.reason,
-            "seed": self.seed,
-        }
-        headline = self.summary(parameters=[model.headline]).to_dict("records")[0]
-        labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
-        labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
-        labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
-        labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
-        if solution.stable_in:
-            labels["stable_in"] = ", ".join(solution.stable_in)
-        if solution.diagnostics is not None:
-            found = solution.diagnostics
-            labels |= {"converged": str(found.converged), "verdict": found.verdict}
-            labels |= {} if found.divergences is None else {"divergences": found.divergences}
-            labels |= {} if found.least_bfmi is None else {"least_bfmi": found.least_bfmi}
-        evidence = {"log_evidence": solution.log_evidence, "log_evidence_error": solution.log_evidence_error}
-        return labels | {name: value for name, value in evidence.items() if value is not None}
-
     def __repr__(self) -> str:
         model = self.model
         return (
             f"<Posterior of {', '.join(model.symbols)}: {model.material.name}, discrepancy {model.discrepancy.name}, "
             f"{len(model.experiment)} measurements, {self.solution.route}>"
         )
-
-
-def _sizes(experiment: Experiment) -> list[int]:
-    """Return the number of measured stresses of each test."""
-    return [part.stress.size for part in experiment.parts]

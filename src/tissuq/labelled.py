@@ -1,0 +1,103 @@
+"""A posterior as labelled arrays, which ArviZ and xarray read."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment import known_evidence_changes
+from tissuq.inference.solution import Solution
+from tissuq.prediction.densities import leave_one_out
+from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["labelled_arrays", "labels_of"]
+
+
+def labelled_arrays(solution: Solution, seed: int) -> xr.DataTree:
+    """Return draws, replicated data, densities and measurements; the groups are those of `Posterior.data`."""
+    import xarray as xr
+
+    experiment = solution.model.experiment
+    point = {"measurement": np.arange(len(experiment))}
+    chains, draws = (np.arange(size) for size in solution.shape)
+    sample = {"chain": chains, "draw": draws}
+    some = {"chain": chains, "draw": draws[:: stride(solution)]}
+    parameters = {parameter.symbol: parameter for parameter in solution.model.parameters}
+    stress, left_out = ("chain", "draw", "measurement"), leave_one_out(solution)
+    in_mpa = {"units": "MPa"}
+    tests = [part.name for part in experiment.parts for _ in range(part.stress.size)]
+    groups = {
+        "posterior": xr.Dataset(
+            {
+                symbol: (("chain", "draw"), values, {"units": parameters[symbol].unit or "1"})
+                for symbol, values in _draws(solution, seed).items()
+            },
+            sample,
+        ),
+        "posterior_predictive": xr.Dataset({"stress": (stress, replicate_data(solution, seed), in_mpa)}, some | point),
+        "log_likelihood": xr.Dataset({"stress": (stress, pointwise_log_likelihood(solution))}, some | point),
+        "leave_one_out": xr.Dataset(
+            {
+                "log_density": ("measurement", left_out.log_density),
+                "is_rough": ("measurement", left_out.is_rough.astype(np.int8)),
+            },
+            point,
+        ),
+        "observed_data": xr.Dataset({"stress": ("measurement", experiment.stress, in_mpa)}, point),
+        "constant_data": xr.Dataset(
+            {
+                "stretch": ("measurement", experiment.mode.abscissa(experiment.stretch), {"units": "1"}),
+                "test": ("measurement", tests),
+            },
+            point,
+        ),
+    }
+    return xr.DataTree.from_dict(groups)
+
+
+def labels_of(solution: Solution, seed: int, headline: Mapping[Hashable, float]) -> dict[str, str | float]:
+    """Return what was fitted, how, and what came out, in short: the attributes of the arrays.
+
+    ``headline`` is the row of the headline parameter in the summary.
+    """
+    model = solution.model
+    labels: dict[str, str | float] = {
+        "inference_library": "tissuq",
+        "experiment": model.experiment.name,
+        "loading_mode": ", ".join(mode.name for mode in model.experiment.modes),
+        "material": model.material.name,
+        "discrepancy": model.discrepancy.name,
+        "noise": str(model.noise),
+        "method": solution.route,
+        "method_reason": solution.reason,
+        "seed": seed,
+    }
+    labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
+    labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
+    labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
+    labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
+    if solution.stable_in:
+        labels["stable_in"] = ", ".join(solution.stable_in)
+    if solution.diagnostics is not None:
+        found = solution.diagnostics
+        labels |= {"converged": str(found.converged), "verdict": found.verdict}
+        labels |= {} if found.divergences is None else {"divergences": found.divergences}
+        labels |= {} if found.least_bfmi is None else {"least_bfmi": found.least_bfmi}
+    evidence = {"log_evidence": solution.log_evidence, "log_evidence_error": solution.log_evidence_error}
+    return labels | {name: value for name, value in evidence.items() if value is not None}
+
+
+def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:
+    """Return the draws of every parameter, those of stresses with the error that all tests have in common."""
+    model, drawn = solution.model, solution.draws
+    if not model.common_error:
+        return drawn
+    score = np.random.default_rng([seed, 17]).standard_normal(solution.shape)
+    factor = 1 + model.common_error * score
+    return {symbol: each * (factor if symbol in model.scaled_symbols else 1.0) for symbol, each in drawn.items()}
