@@ -23,7 +23,7 @@ def two_tests(*specimens):
 
 
 def of(tolerances, *specimens, lag=0.0):
-    return whitening(two_tests(*specimens), NOISE_SD, 0.03, tolerances, CURVE, lag)
+    return whitening(two_tests(*specimens), NOISE_SD, 0.03, tolerances, CURVE, None, lag)
 
 
 def noise(size, lag):

@@ -22,7 +22,7 @@ from tissuq.mechanics.joint import joined
 from tissuq.model import StatisticalModel
 from tissuq.noise import Noise, noise_named
 from tissuq.posterior import Posterior
-from tissuq.prediction.moments import mean_curve
+from tissuq.prediction.moments import level_of_errors, mean_curve
 from tissuq.priors import Prior
 from tissuq.tolerances import BETWEEN_SPECIMENS, Tolerances, specimens_of
 
@@ -33,7 +33,7 @@ FACTORISED = 3
 """Parameters of the structure from which `auto` samples."""
 ENOUGH, SPREADS = 4, (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Specimens that tell how far they are apart, and the values that are tried, over the usual one."""
-ROUNDS = 2
+ROUNDS = 3
 """In which the curve is found along which whole tests err."""
 LAGS = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99)
 """Correlations of consecutive errors that are tried."""
@@ -170,6 +170,8 @@ def fit_many(
     >>> len(held)
     20
     """
+    if tolerances is not None and not isinstance(tolerances, Tolerances):
+        raise InputError(f"tolerances must be such as tissuq.Tolerances(stress=0.1), not {tolerances!r}.")
     if method not in METHODS:
         raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
     if not isinstance(seed, Integral) or seed < 0:
@@ -216,33 +218,44 @@ class _Recipe:
 
     def solved(self, models: Sequence[StatisticalModel]) -> list[Posterior]:
         """Return the posteriors of models on the same stretches."""
-        ready = [self._with_lag(self._with_curve(model)) for model in models]
+        ready = [self._prepared(model) for model in models]
         solutions = self._solve(ready)
         if self.stable_in:
             solutions = [StableSolution(solution, self.stable_in, self.seed) for solution in solutions]
         return [Posterior(solution, self.seed, self.solved) for solution in solutions]
 
+    def _prepared(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model with all that is found before it is solved: curve and level of its errors, and their lag."""
+        before = self._with_curve(model)
+        after = self._with_lag(before)
+        return after if after is before or not model.tolerances else self._with_curve(replace(after, curve=None))
+
     def _with_spread(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with the usual tolerances; where there are specimens enough, their spread as the data tell it.
 
-        The root of its posterior mean square over some values, under a half-Cauchy prior of the usual spread: what the
-        error in common needs of it. A plug-in, like the curve along which tests err.
+        Where there is an evidence to tell it: the root of its posterior mean square over some values, under a
+        half-Cauchy prior of the usual spread, which is what the error in common needs of it. A plug-in, like the curve
+        along which tests err.
         """
         usual = _usual_tolerances(model)
         model = replace(model, tolerances=usual)
-        if not usual or len(specimens_of(model.experiment)) < ENOUGH:
+        is_integrated = self.method in ("auto", "exact") and not why_not_exact(model)
+        if not usual or len(specimens_of(model.experiment)) < ENOUGH or not (is_integrated or model.energy_symbols):
             return model
         model = self._with_curve(model)
         spread = usual.stress * np.array(SPREADS)
         tried = [replace(model, tolerances=replace(usual, stress=float(each))) for each in spread]
-        evidence = np.array([self._evidence(each) for each in tried])
+        found = [self._solve([each])[0].log_evidence for each in tried]
+        if any(each is None for each in found):
+            return model
+        evidence = np.array(found, dtype=np.float64)
         weight = np.exp(evidence - evidence.max()) / (1 + np.array(SPREADS) ** 2) * spread  # even in the logarithm
         told = float(np.sqrt(weight @ spread**2 / weight.sum()))
-        return self._with_curve(replace(model, tolerances=replace(usual, stress=told), curve=None))
+        return self._with_curve(replace(model, tolerances=replace(usual, stress=told), curve=None, level=None))
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""
-        if not model.noise.is_consecutive or model.lag:
+        if not model.noise.is_consecutive or model.lag is not None:
             return model
         tried = [replace(model, lag=lag) for lag in LAGS]
         evidence = [self._evidence(each) for each in tried]
@@ -264,12 +277,16 @@ class _Recipe:
         return found
 
     def _with_curve(self, model: StatisticalModel) -> StatisticalModel:
-        """Return a model with tolerances along its own mean curve: as if there were none, and then with these."""
+        """Return a model with tolerances along its own mean curve, and at its own level of errors.
+
+        As they are found first as if there were no tolerances, and then with these.
+        """
         if not model.tolerances or model.curve is not None:
             return model
         pilot = replace(model, tolerances=Tolerances())
         for _ in range(ROUNDS):
-            pilot = replace(model, curve=mean_curve(self._solve([pilot])[0]))
+            found = self._solve([pilot])[0]
+            pilot = replace(model, curve=mean_curve(found), level=level_of_errors(found))
         return pilot
 
     def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:

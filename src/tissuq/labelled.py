@@ -98,6 +98,6 @@ def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:
     model, drawn = solution.model, solution.draws
     if not model.common_error:
         return drawn
-    score = np.random.default_rng([seed, 17]).standard_normal(solution.shape)
+    score = np.random.default_rng([seed, 19]).standard_normal(solution.shape)
     factor = 1 + model.common_error * score
     return {symbol: each * (factor if symbol in model.scaled_symbols else 1.0) for symbol, each in drawn.items()}

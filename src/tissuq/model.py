@@ -59,7 +59,10 @@ class StatisticalModel:
         By how much whole tests may be off; nothing, where nothing is said.
     curve : (n,) array, MPa, optional
         About what stress the measurements have without errors, along which tolerances act; `tissuq.fit` finds it.
-    lag : float
+    level : float, MPa, optional
+        About what the sd of all independent errors is (noise and S), by which tolerances are made relative, as
+        conjugate priors are; `tissuq.fit` finds it.
+    lag : float, optional
         Correlation of the noise of consecutive measurements; `tissuq.fit` finds it for noise that has one.
     known_statistics : Statistics, optional
         `statistics`, where they are known already.
@@ -79,7 +82,8 @@ class StatisticalModel:
     chosen_priors: Mapping[str, Prior] = field(default_factory=dict)
     tolerances: Tolerances = Tolerances()  # noqa: RUF009 (frozen)
     curve: FloatArray | None = None
-    lag: float = 0.0
+    level: float | None = None
+    lag: float | None = None
     known_statistics: Statistics | None = None
 
     def __post_init__(self) -> None:
@@ -171,11 +175,16 @@ class StatisticalModel:
         """What makes the errors of several tests independent and equal; None where they are so already."""
         if len(self.experiment.parts) == 1 and not self.tolerances and not self.lag:
             return None
+        noise_sd, usual = self._noise_of_tests
+        parts = self.tolerances, self.curve, self.level, self.lag or 0.0
+        return whitening(self.experiment, noise_sd, usual, *parts)
+
+    @cached_property
+    def _noise_of_tests(self) -> tuple[FloatArray, float]:
+        """The noise (tests,) of every test as known or about, MPa, and its geometric mean."""
         noise_sd = self.noise.of_tests(self.experiment)
         usual = float(np.exp(np.log(noise_sd).mean()))
-        if self.noise.depends_on_level:
-            noise_sd = np.full(len(noise_sd), usual)
-        return whitening(self.experiment, noise_sd, usual, self.tolerances, self.curve, self.lag)
+        return np.full(len(noise_sd), usual) if self.noise.depends_on_level else noise_sd, usual
 
     @property
     def common_error(self) -> float:
@@ -187,11 +196,8 @@ class StatisticalModel:
 
     @property
     def scaled_symbols(self) -> tuple[str, ...]:
-        """The parameters that an error of all stresses multiplies: all stresses and moduli but the noise."""
-        of_noise = [p.symbol for p in self.noise.parameters]
-        return tuple(
-            p.symbol for p in self.parameters if p.dimension in ("stress", "modulus") and p.symbol not in of_noise
-        )
+        """The parameters that an error of all stresses multiplies: those to which the stress is proportional."""
+        return self.column_symbols
 
     @property
     def is_joint(self) -> bool:
@@ -209,8 +215,9 @@ class StatisticalModel:
         """Return the noise over noise_sd at points (g,) or rows (g, 14): that of the test; one where there is none."""
         if self.whitening is None or len(self.experiment.parts) == 1:
             return 1.0
-        first = np.cumsum([0, *(len(stress) for _, _, stress in self.experiment.curves[:-1])])
-        return np.append(self.whitening.size[first], 1.0)[points[:, CURVE].astype(int)]
+        noise_sd, usual = self._noise_of_tests
+        of_curve = [own for part, own in zip(self.experiment.parts, noise_sd, strict=True) for _ in part.mode.channels]
+        return np.append(np.array(of_curve) / usual, 1.0)[points[:, CURVE].astype(int)]
 
     @property
     def log_whitening(self) -> float:
@@ -253,8 +260,8 @@ class StatisticalModel:
             When the further measurements are in another loading mode.
         """
         both = self.experiment.joined(experiment)
-        if self.is_joint:
-            return replace(self, experiment=both, curve=None)
+        if self.is_joint or self.tolerances or self.noise.is_consecutive:
+            return replace(self, experiment=both, known_statistics=None, curve=None, level=None, lag=None)
         rows = np.column_stack([self.basis(experiment.stretch, self.usual_bent), experiment.stress])
         return replace(self, experiment=both, known_statistics=self.statistics.joined(Statistics.of_rows([rows])))
 
@@ -389,8 +396,9 @@ class StatisticalModel:
                 f"experiment '{name}' has {n} measurements for {len(told)} parameters "
                 f"({', '.join(told)}): measure more, or choose a simpler material or discrepancy."
             )
-        if not self.experiment.stress.any():
-            raise InputError(f"experiment '{name}': every stress is zero, so there is nothing to identify.")
+        empty = next((part.name for part in self.experiment.parts if not part.stress.any()), None)
+        if empty is not None:
+            raise InputError(f"experiment '{empty}': every stress is zero, so there is nothing to identify.")
         if self.noise.shares_discrepancy and len(self.experiment.parts) > 1:
             raise InputError(f"noise '{self.noise}' is for one test: choose the noise 'unknown' for several.")
         if self.noise.shares_discrepancy and len(np.unique(self.experiment.stretch)) == n:

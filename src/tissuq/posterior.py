@@ -158,7 +158,10 @@ class Posterior:
         """
         import pandas as pd
 
-        asked = self.model.experiment.modes[0] if mode is None else loading_mode(mode)
+        own = [each for each in self.model.experiment.modes if len(each.controls) == len(each.stresses) == 1]
+        asked = (own or [loading_mode("uniaxial")])[0] if mode is None else loading_mode(mode)
+        if len(asked.controls) > 1:
+            raise InputError(f"stability is told in modes of one control, and '{asked.name}' has several.")
         ends = calibrated_range(self.model.experiment, asked)
         at = np.linspace(*ends, points) if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=np.float64))
         found = stability(self.solution, asked, at)
@@ -306,7 +309,8 @@ class Posterior:
         measurement), leave_one_out, observed_data and constant_data. With very many measurements the former two hold
         only some of the draws. The log likelihood of a draw is that of each measurement given the draw's parameters
         and, under a process, the other measurements; leave_one_out has each measurement's density given the others,
-        everything integrated, which is what `tissuq.compare` takes. On the
+        everything integrated, which is what `tissuq.compare` takes. Parameters in the posterior have the error that all
+        tests have in common; what is said of the measurements has not. On the
         exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the quadrature's points: for
         their intervals and densities use `summary` and ``solution.marginals``.
         """

@@ -74,9 +74,11 @@ class Tolerances:
         self, mode: LoadingMode, stretch: FloatArray, stress: FloatArray, slope: FloatArray | float
     ) -> FloatArray:
         """Return the variance (..., n) of the stress of a test at stretches (n,), where it would be ``stress``."""
-        strain, whole = _strains(mode, stretch)
-        moved = (self.length * strain * slope) ** 2 + (self.slack * whole * slope) ** 2
-        return np.asarray((self.stress * stress) ** 2 + self.zero**2 + moved + (self.stretch * slope) ** 2)
+        found = (self.stress * stress) ** 2 + self.zero**2
+        if self.need_slope:
+            strain, whole = _strains(mode, stretch)
+            found = found + slope**2 * ((self.length * strain) ** 2 + (self.slack * whole) ** 2 + self.stretch**2)
+        return np.asarray(found)
 
     def noise(self, test: Experiment, curve: FloatArray) -> FloatArray:
         """Return what the errors of every single stretch are as noise of the stress: sd (n,), MPa."""

@@ -96,6 +96,7 @@ def whitening(
     usual: float,
     tolerances: Tolerances,
     curve: FloatArray | None = None,
+    level: float | None = None,
     lag: float = 0.0,
 ) -> Whitening | None:
     """Return the whitening of tests, or None where their errors are independent and equal as they are.
@@ -111,16 +112,20 @@ def whitening(
     tolerances : Tolerances
     curve : (n,) array, MPa, optional
         About what stress the measurements have without errors, where there are tolerances.
+    level : float, MPa, optional
+        About what the sd of all independent errors is, where it is not noise_sd's: errors of whole tests are in
+        proportion to it.
     lag : float
         Correlation of the noise of consecutive measurements.
     """
+    level = level or usual
     parts = experiment.parts
     count = [part.stress.size for part in parts]
     size, every = np.repeat(noise_sd / usual, count), []
     if tolerances and curve is not None:
         curves = np.split(curve, np.cumsum(count)[:-1])
         pairs = list(zip(parts, curves, strict=True))
-        size = np.hypot(size, np.concatenate([tolerances.noise(part, own) for part, own in pairs]) / usual)
+        size = np.hypot(size, np.concatenate([tolerances.noise(part, own) for part, own in pairs]) / level)
         shares = [tolerances.columns(part, own) for part, own in pairs]
         names = specimens_of(experiment)
         specimens = [part.specimen or number for number, part in enumerate(parts)]
@@ -132,7 +137,7 @@ def whitening(
     starts = np.cumsum([0, *(len(stress) for _, _, stress in experiment.curves[:-1])])
     lags = np.where(np.isin(np.arange(len(size)), starts), 0.0, lag)
     bare = Whitening(size, lags, np.zeros((len(size), 0)), np.zeros(0))
-    columns = bare(np.column_stack([np.zeros((len(size), 0)), *every])) / usual
+    columns = bare(np.column_stack([np.zeros((len(size), 0)), *every])) / level
     along, singular, _ = np.linalg.svd(columns, full_matrices=False)
     kept = singular > 1e-8 * singular.max(initial=0.0)
     if not kept.any() and not lag and np.allclose(size, 1, rtol=1e-12):

@@ -9,6 +9,7 @@ from scipy.stats import halfcauchy, multivariate_normal
 import tissuq as tq
 from tissuq.experiments.reading import STRESS_TYPES
 from tissuq.prediction.densities import leave_one_out
+from tissuq.prediction.moments import level_of_errors
 
 UNIAXIAL, PLANAR = np.array([0.75, 0.85, 0.95, 1.05, 1.2, 1.35, 1.5]), np.array([1.05, 1.15, 1.25, 1.4, 1.5])
 STRETCH = np.concatenate([UNIAXIAL, PLANAR])
@@ -280,3 +281,65 @@ def test_cauchy_stress_is_the_engineering_stress_times_the_stretch_along_it():
     assert shear[0].equals(shear[1])
     with pytest.raises(tq.InputError, match="stress_type must be one of engineering, cauchy"):
         posterior.predict([1.1], mode="planar", stress_type="true")
+
+
+@pytest.mark.parametrize(("discrepancy", "noise_sd"), [("none", "unknown"), ("yeoh", "unknown"), ("constant", 0.01)])
+def test_tolerances_are_what_they_say_whatever_the_noise_turns_out_to_be(discrepancy, noise_sd):
+    """They enter relative to the level of the independent errors, which a wrong material or S may raise far."""
+    stretch = np.linspace(0.6, 2.0, 25)
+    truth = {"C10": 1.2, "C20": -0.1, "C30": 0.02}
+    parts = [tq.simulate("yeoh", truth, stretch, 0.01, seed=seed) for seed in range(3)]
+    posterior = tq.fit(parts, discrepancy=discrepancy, noise_sd=noise_sd, tolerances=tq.Tolerances(stress=0.1))
+    model = posterior.model
+    actual = level_of_errors(posterior.solution)
+    assert model.level == pytest.approx(actual, rel=0.03)
+    spread = model.whitening.spread * actual**2
+    expected = 0.1**2 * sum(float(own @ own) for own in np.split(model.curve, 3)) / 3
+    assert np.allclose(spread, expected, rtol=0.1)
+
+
+def test_a_discrepancy_in_stress_says_nothing_of_other_states():
+    posterior = fit("constant", tolerances=tq.Tolerances())
+    assert posterior.stability("equibiaxial")["stable"].min() > 0
+    assert all(isinstance(text, str) for text in posterior.warnings)
+    with pytest.raises(tq.InputError, match="says nothing about the equibiaxial one"):
+        posterior.predict([1.1], mode="equibiaxial")
+
+
+def test_modes_of_two_controls_are_predicted_with_the_errors_of_whole_tests():
+    points = np.array([[1.1, 1.0], [1.2, 1.1], [1.3, 1.2], [1.4, 1.2]])
+    sheet = tq.simulate("neo-hookean", {"C10": 0.6}, points, 0.02, mode="biaxial", seed=8)
+    posterior = tq.fit([experiments()[0], sheet], discrepancy="none", noise_sd=0.02)
+    found = posterior.predict(points, mode="biaxial", channel=1, noise=False)
+    unit = 2 * (points[:, 1] - 1 / (points[:, 0] ** 2 * points[:, 1] ** 3))
+    assert np.allclose(found["mean"], posterior.marginals["C10"].mean * unit, rtol=1e-6)
+    assert 0 <= posterior.predictive_coverage() <= 1
+    assert len(posterior.stability()) > 10
+
+
+def test_measurements_that_were_added_are_as_if_fitted_at_once():
+    first, more = (tq.simulate("neo-hookean", {"C10": 0.5}, at, 0.02, seed=3) for at in ([0.8, 1.1, 1.3], [0.9, 1.4]))
+    options = {"discrepancy": "none", "noise_sd": 0.02, "tolerances": tq.Tolerances(stress=0.1, zero=0.01)}
+    added, whole = tq.fit(first, **options).update(more), tq.fit(first.joined(more), **options)
+    assert np.allclose(added.summary(), whole.summary(), rtol=1e-6)
+
+
+def test_fits_of_several_tests_are_averaged():
+    found = tq.average({name: fit(name) for name in ("none", "taylor")})
+    assert sum(found.weights.values()) == pytest.approx(1)
+
+
+def test_intervals_of_amplitudes_stay_positive():
+    table = fit("auto").summary()
+    assert (table.loc[["c1", "c2"], "hdi_low"] >= 0).all()
+
+
+def test_the_same_measurements_do_not_count_twice_and_empty_tests_are_named():
+    parts = experiments()
+    with pytest.raises(tq.InputError, match="number 1 .* and 2 .* hold the same measurements"):
+        tq.fit([parts[0], parts[0]])
+    nothing = tq.Experiment("planar", PLANAR, np.zeros(5), name="nothing")
+    with pytest.raises(tq.InputError, match="experiment 'nothing': every stress is zero"):
+        tq.fit([parts[0], nothing])
+    with pytest.raises(tq.InputError, match="tolerances must be such as"):
+        tq.fit(parts, tolerances={"stress": 0.1})

@@ -153,7 +153,7 @@ def _check(fits: Mapping[str, Any]) -> None:
     for name, fit in fits.items():
         data, same = fit.model.experiment, first.model.experiment
         if data.mode != same.mode or not all(
-            np.array_equal(*pair) for pair in ((data.stretch, same.stretch), (data.stress, same.stress))
+            np.array_equal(*pair, equal_nan=True) for pair in ((data.stretch, same.stretch), (data.stress, same.stress))
         ):
             raise InputError(f"'{one}' and '{name}' are fits of different data: only those of the same average.")
         if fit.model.material != first.model.material:

@@ -13,6 +13,7 @@ __all__ = ["factors_of_tests"]
 def factors_of_tests(solution: Solution) -> dict[str, float]:
     """Return by what factor the stress of every test is larger than the common material says, by the tests' names.
 
+    Tests of one name are numbered.
     Posterior means, relative to all specimens' mean, which no data tell; empty where tests have no error of stress of
     their own, or consecutive errors are correlated.
     """
@@ -25,4 +26,6 @@ def factors_of_tests(solution: Solution) -> dict[str, float]:
     noise = white.size**2 * white.transposed(white(residual))
     ends = np.cumsum([part.stress.size for part in parts])[:-1]
     pairs = zip(np.split(residual - noise, ends), np.split(curve, ends), strict=True)
-    return {part.name: 1 + float(error @ own / (own @ own)) for part, (error, own) in zip(parts, pairs, strict=True)}
+    names = [part.name for part in parts]
+    labels = [f"{name} ({place})" if names.count(name) > 1 else name for place, name in enumerate(names, 1)]
+    return {label: 1 + float(error @ own / (own @ own)) for label, (error, own) in zip(labels, pairs, strict=True)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -257,7 +258,8 @@ def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
     kept = (*model.material_symbols, *(parameter.symbol for parameter in model.noise.parameters))
     own = {symbol: prior for symbol, prior in model.priors.items() if symbol in kept}
     try:
-        return solve([replace(model, discrepancy=nothing, chosen_priors=own, known_statistics=None, curve=None)])[0]
+        unknown: dict[str, Any] = dict.fromkeys(("known_statistics", "curve", "level", "lag"))
+        return solve([replace(model, discrepancy=nothing, chosen_priors=own, **unknown)])[0]
     except ModelError:  # a sampler that was asked for has nothing left to sample, or nothing is stable
         return None
 

@@ -99,7 +99,8 @@ def _tolerance(text: str) -> tuple[str, float]:
         value = float(number.strip().removesuffix("%")) * scale
     except ValueError:
         value = -1.0
-    if name.strip() not in KINDS or value < 0 or (name.strip() == "zero" and scale != 1.0):
+    is_share = name.strip() != "zero"
+    if name.strip() not in KINDS or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
         raise InputError(
             f"'{text}' is no tolerance; write stress=10%, length=2%, slack=0.01, zero=0.1 or stretch=0.001."
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -102,7 +103,7 @@ class JointExperiment(Experiment):
     def joined(self, other: Experiment) -> Experiment:
         """Refuse: further measurements of one test are no test of their own."""
         raise InputError(
-            f"experiment '{other.name}' cannot be added to a fit of several tests: fit all of them together again."
+            f"experiment '{other.name}' cannot be added to a fit of several tests or stresses: fit all together again."
         )
 
 
@@ -112,7 +113,7 @@ def joined(tests: Experiment | Sequence[Experiment]) -> Experiment:
     Raises
     ------
     InputError
-        When there is none.
+        When there is none, or the same measurements are there twice.
     """
     if isinstance(tests, JointExperiment):
         return tests
@@ -122,6 +123,13 @@ def joined(tests: Experiment | Sequence[Experiment]) -> Experiment:
     for number, part in enumerate(parts):
         if not isinstance(part, Experiment):
             raise InputError(f"experiment number {number + 1} is no tissuq.Experiment, but {part!r:.80}.")
+    for place, other in combinations(range(len(parts)), 2):
+        one, two = parts[place], parts[other]
+        if one.mode == two.mode and np.array_equal(one.stretch, two.stretch) and np.array_equal(one.stress, two.stress):
+            raise InputError(
+                f"experiments number {place + 1} ('{one.name}') and {other + 1} ('{two.name}') hold the same "
+                "measurements, which would count twice: leave one of them out."
+            )
     if len(parts) == 1 and parts[0].stress.ndim == 1 and parts[0].stretch.ndim == 1:
         return parts[0]
     return JointExperiment(parts)

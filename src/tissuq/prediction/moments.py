@@ -21,6 +21,7 @@ __all__ = [
     "coefficients",
     "correlated_parts",
     "drawn_curves",
+    "level_of_errors",
     "mean_curve",
     "mean_stress",
     "stress_moments",
@@ -209,6 +210,14 @@ def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
     components = solution.components if thinned is None else solution.components.thinned(thinned)
     mean, _ = stress_moments(model, components, model.experiment.stretch, discrepancy=True, noise=False)
     return np.asarray(components.weights @ mean)
+
+
+def level_of_errors(solution: Solution) -> float:
+    """Return the root of the posterior mean variance of all independent errors, whitened, MPa."""
+    model, components = solution.model, solution.components
+    values = dict(zip(model.nonlinear, components.settings.T, strict=True))
+    variance = np.broadcast_to(model.white_variance(values), len(components.weights))
+    return float(np.sqrt(components.weights @ variance))
 
 
 def drawn_curves(

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 __all__ = ["held_out_tests", "prediction_of"]
 
 
-def held_out_tests(tests: Sequence[Experiment], **options: Any) -> pd.DataFrame:
+def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> pd.DataFrame:
     """Predict every test from a fit of the others.
 
     Parameters
     ----------
-    tests : sequence of Experiment
+    tests : sequence of Experiment, or a JointExperiment
         Two or more, in any modes.
     options
         Those of `tissuq.fit`; noise of each test is not taken.
@@ -52,8 +52,11 @@ def held_out_tests(tests: Sequence[Experiment], **options: Any) -> pd.DataFrame:
     """
     import pandas as pd
 
+    tests = tests.parts if isinstance(tests, Experiment) else tests
     if len(tests) < 2:
         raise InputError("to predict a test from the others there must be two or more.")
+    if isinstance(options.get("noise_sd"), Sequence) and not isinstance(options["noise_sd"], str):
+        raise InputError("to predict a test from the others give one noise_sd for all tests, or none.")
     if options.get("tolerances") is None:  # those of all tests, of which one alone has none
         options["tolerances"] = fit(tests, **options).model.tolerances
     rows = []

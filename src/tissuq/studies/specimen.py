@@ -13,7 +13,7 @@ from pydantic import Field, field_validator, model_validator
 
 from tissuq.assessment import Assessment, design_warnings
 from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named, separated
-from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.doubts import doubts
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading import Reading
@@ -191,9 +191,16 @@ def run_specimen(
     held_out: list[dict[str, Any]] = []
     for name in posteriors if settings.held_out else ():
         step(f"{name}: each test from the others")
+        if separated(discrepancy_named(name), material, experiment).parameters != discrepancy_named(name).parameters:
+            skipped[f"{name}, each test from the others"] = "it is another error of the stress in each test."
+            continue
         options = _options(settings, material, priors, symbols[name], unit)
         options["tolerances"] = posteriors[name].model.tolerances
-        found = held_out_tests(experiment.parts, discrepancy=name, **options).to_dict("records")
+        try:
+            found = held_out_tests(experiment.parts, discrepancy=name, **options).to_dict("records")
+        except TissuqError as error:
+            skipped[f"{name}, each test from the others"] = str(error)
+            continue
         held_out += [{"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in found]
     parts = settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings)
     return SpecimenStudy(*parts, tuple(held_out))
