@@ -336,7 +336,7 @@ def test_intervals_of_amplitudes_stay_positive():
 
 def test_the_same_measurements_do_not_count_twice_and_empty_tests_are_named():
     parts = experiments()
-    with pytest.raises(tq.InputError, match="number 1 .* and 2 .* hold the same measurements"):
+    with pytest.raises(tq.InputError, match=r"number 1 .* and 2 .* hold the same measurements"):
         tq.fit([parts[0], parts[0]])
     nothing = tq.Experiment("planar", PLANAR, np.zeros(5), name="nothing")
     with pytest.raises(tq.InputError, match="experiment 'nothing': every stress is zero"):
