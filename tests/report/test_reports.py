@@ -55,7 +55,7 @@ def paper_folder(paper_study, tmp_path_factory):
 @pytest.fixture(scope="session")
 def specimen_folder(specimen_study, specimen_file, tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimen")
-    write_specimen_run(specimen_study, specimen_file, folder)
+    write_specimen_run(specimen_study, [specimen_file], folder)
     return folder
 
 
@@ -155,7 +155,7 @@ def test_cautions_of_the_discrepancies_are_told(specimen_folder, specimen_study)
 
 
 def test_a_page_without_figures_says_how_to_repeat_it_without(specimen_study, specimen_file, tmp_path):
-    write_specimen_run(specimen_study, specimen_file, tmp_path, figures=False)
+    write_specimen_run(specimen_study, [specimen_file], tmp_path, figures=False)
     text = (tmp_path / "report.html").read_text()
     assert "tissuq fit --no-figures --config run.toml" in words_of(text)
     assert "<img" not in text
