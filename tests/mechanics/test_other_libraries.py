@@ -20,7 +20,7 @@ PAIRS = [  # a name and values here, a function and its arguments there, and how
         "rivlin:C10,C01,C11,C20,C30", [0.7, 0.2, 0.03, -0.1, 0.02],
         "third_order_deformation", {"C10": 0.7, "C01": 0.2, "C11": 0.03, "C20": -0.1, "C30": 0.02}, 1e-10,
     ),
-    ("ogden-2", [0.7, 0.2, 3.1, -2.3], "ogden", {"mu": [0.7, 0.2], "alpha": [3.1, -2.3]}, 1e-6),  # shifts equal roots
+    ("ogden-2", [0.7, 0.2, 3.1, -2.3], "ogden", {"mu": [0.7, 0.2], "alpha": [3.1, -2.3]}, 2e-5),  # shifts equal roots
     (
         "extended-tube", [0.7, 0.2, LIMIT, 0.4],
         "extended_tube", {"Gc": 0.7, "Ge": 0.2, "delta": LIMIT**-0.5, "beta": 0.4}, 1e-6,
@@ -42,4 +42,5 @@ def test_felupe_has_the_same_stress(measured, name, values, function, arguments,
     inverse = np.linalg.inv(np.moveaxis(F, -1, 0))[:, column, row]
     expected = P[row, column] - P[2, 2] * F[2, 2] * inverse  # the free face gives the pressure
     found = engineering_stress(material_named(name), measured.path, measured.points, values)
-    np.testing.assert_allclose(found, expected, rtol=near, atol=near * np.abs(expected).max())
+    rounding = 1e-14 * np.abs(P).max()  # the normal stress of simple shear is zero for laws of I1
+    np.testing.assert_allclose(found, expected, rtol=near, atol=near * np.abs(expected).max() + rounding)
