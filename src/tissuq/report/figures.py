@@ -90,6 +90,7 @@ def predictive_figure(
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
             axis.plot(at, stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
             if len(curves) > 1:
+                axis.locator_params(axis="x", nbins=6)
                 axis.set_xlabel(test.mode.controls[0].name, fontsize=9)
         if len(curves) == 1:
             limits = _common_limits(curves[0][2], bands, unit)
