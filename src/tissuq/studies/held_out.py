@@ -47,7 +47,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     >>> modes = ["uniaxial", "planar", "equibiaxial"]
     >>> tests = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.01, mode=mode, seed=2) for mode in modes]
     >>> found = tq.held_out_tests(tests, discrepancy="none", noise_sd=0.01)
-    >>> found["inside"].min() > 0.8
+    >>> bool(found["inside"].min() > 0.8)
     True
     """
     import pandas as pd
