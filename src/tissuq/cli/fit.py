@@ -15,6 +15,7 @@ from tissuq.errors import InputError
 __all__ = ["fit"]
 
 
+@reading.reads_files
 def fit(
     file: Annotated[
         list[Path] | None,
@@ -67,25 +68,8 @@ def fit(
         list[str] | None,
         typer.Option(help="Loading mode [uniaxial]; once for each of several files [as they or their names say]."),
     ] = None,
-    column: reading.Column = None,
-    stress_unit: reading.StressUnit = None,
-    stress_type: reading.StressType = None,
-    strain_unit: reading.StrainUnit = None,
-    force_unit: reading.ForceUnit = None,
-    displacement_unit: reading.DisplacementUnit = None,
-    length: reading.Length = None,
-    area: reading.Area = None,
-    width: reading.Width = None,
-    thickness: reading.Thickness = None,
-    diameter: reading.Diameter = None,
-    compression_positive: reading.CompressionPositive = None,
-    cycle: reading.Cycle = None,
-    branch: reading.Branch = None,
-    preload: reading.Preload = None,
-    every: reading.Every = None,
-    axis: reading.Axis = None,
-    sheet: reading.Sheet = None,
-    skip_rows: reading.SkipRows = None,
+    *,
+    read_as: dict[str, Any],
     method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
     stable_in: Annotated[
         list[str] | None,
@@ -101,7 +85,6 @@ def fit(
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
-    given = reading.reading_options(locals())
     from tissuq.cli.tables import print_summary, print_warnings
     from tissuq.mechanics import material_named
     from tissuq.report.run_folder import check_target, run_folder
@@ -114,7 +97,7 @@ def fit(
         "tolerances": several.tolerances(tolerance), "stable_in": stable_in or None,
         "held_out": held_out,
     }  # fmt: skip
-    options |= several.measured([] if config else files, given, mode, specimen, noise_sd)
+    options |= several.measured([] if config else files, read_as, mode, specimen, noise_sd)
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))
     if not file and not config:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,33 +13,16 @@ from tissuq.cli.options import load_settings
 __all__ = ["inspect"]
 
 
+@reading.reads_files
 def inspect(
     file: Annotated[Path, typer.Argument(help="CSV or Excel file, or the name of a built-in data set.")],
     mode: reading.Mode = None,
-    column: reading.Column = None,
-    stress_unit: reading.StressUnit = None,
-    stress_type: reading.StressType = None,
-    strain_unit: reading.StrainUnit = None,
-    force_unit: reading.ForceUnit = None,
-    displacement_unit: reading.DisplacementUnit = None,
-    length: reading.Length = None,
-    area: reading.Area = None,
-    width: reading.Width = None,
-    thickness: reading.Thickness = None,
-    diameter: reading.Diameter = None,
-    compression_positive: reading.CompressionPositive = None,
-    cycle: reading.Cycle = None,
-    branch: reading.Branch = None,
-    preload: reading.Preload = None,
-    every: reading.Every = None,
-    axis: reading.Axis = None,
-    sheet: reading.Sheet = None,
-    skip_rows: reading.SkipRows = None,
+    *,
+    read_as: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="Folder for figure, converted data and what is printed.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the folder of an earlier inspection.")] = False,
 ) -> None:
     """Show what is understood of a file of measurements: columns, dimensions, cycles, rows, noise, doubts."""
-    given = reading.reading_options(locals())
     from tissuq.experiments.inspection import inspect as inspect_file
     from tissuq.report.run_folder import check_target, run_folder
     from tissuq.studies.measured_file import MeasuredFile
@@ -47,7 +30,7 @@ def inspect(
     if out is not None:
         check_target(out, force=force)
     source = reading.resolve(file)
-    settings = load_settings(MeasuredFile, None, given | {"mode": mode, "file": str(source)})
+    settings = load_settings(MeasuredFile, None, read_as | {"mode": mode, "file": str(source)})
     inspection = inspect_file(source, **settings.reading_options)
     print(inspection)
     if out is not None:

@@ -15,6 +15,7 @@ from tissuq.errors import InputError
 __all__ = ["population"]
 
 
+@reading.reads_files
 def population(
     files: Annotated[
         list[Path] | None,
@@ -42,25 +43,8 @@ def population(
     mode: Annotated[
         str | None, typer.Option(help="Loading mode of all files [as they or their names say, or uniaxial].")
     ] = None,
-    column: reading.Column = None,
-    stress_unit: reading.StressUnit = None,
-    stress_type: reading.StressType = None,
-    strain_unit: reading.StrainUnit = None,
-    force_unit: reading.ForceUnit = None,
-    displacement_unit: reading.DisplacementUnit = None,
-    length: reading.Length = None,
-    area: reading.Area = None,
-    width: reading.Width = None,
-    thickness: reading.Thickness = None,
-    diameter: reading.Diameter = None,
-    compression_positive: reading.CompressionPositive = None,
-    cycle: reading.Cycle = None,
-    branch: reading.Branch = None,
-    preload: reading.Preload = None,
-    every: reading.Every = None,
-    axis: reading.Axis = None,
-    sheet: reading.Sheet = None,
-    skip_rows: reading.SkipRows = None,
+    *,
+    read_as: dict[str, Any],
     method: Annotated[
         str | None, typer.Option(help="Of every specimen's fit: auto, exact, nuts, smc or joint [auto].")
     ] = None,
@@ -71,7 +55,6 @@ def population(
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
 ) -> None:
     """Identify a population from its specimens, every specimen within it, and what to expect of a new patient."""
-    given = reading.reading_options(locals())
     from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.mechanics import material_named
     from tissuq.report.population import HEADERS, readable_population, write_population_run
@@ -80,7 +63,7 @@ def population(
 
     if bool(files) == bool(config):
         raise InputError("give the FILES of several specimens or folders of them, or --config run.toml.")
-    options: dict[str, Any] = given | {
+    options: dict[str, Any] = read_as | {
         "files": tuple(map(str, files)) if files else None, "specimen": specimen, "material": material,
         "parameters": tuple(parameter) if parameter else None, "spread": spread, "discrepancy": discrepancy,
         "noise_sd": one_noise(noise_sd), "noise": noise, "mode": mode, "method": method, "seed": seed,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,77 +13,81 @@ import typer
 from tissuq.cli.options import once_each
 from tissuq.errors import InputError
 
-__all__ = [
-    "Area",
-    "Axis",
-    "Branch",
-    "Column",
-    "CompressionPositive",
-    "Cycle",
-    "Diameter",
-    "DisplacementUnit",
-    "Every",
-    "ForceUnit",
-    "Length",
-    "Mode",
-    "Preload",
-    "Sheet",
-    "SkipRows",
-    "StrainUnit",
-    "StressType",
-    "StressUnit",
-    "Thickness",
-    "Width",
-    "reading_options",
-    "resolve",
-]
+__all__ = ["Mode", "reads_files", "resolve"]
 
 Mode = Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")]
-Column = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="ROLE=COLUMN for stretch, strain or displacement, and stress or force, such as stretch=Strain; repeat. "
-        "Of a second axis or stress: stretch2 ... force2."
-    ),
-]
-StressUnit = Annotated[
-    str | None, typer.Option(help="Unit of the stress column [the file's, or MPa]; for forces, the unit shown [kPa].")
-]
-StressType = Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")]
-StrainUnit = Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")]
-ForceUnit = Annotated[str | None, typer.Option(help="Unit of a force column that states none, such as mN.")]
-DisplacementUnit = Annotated[str | None, typer.Option(help="Unit of a displacement column that states none.")]
-Length = Annotated[
-    str | None, typer.Option(help="Undeformed length, such as '20 mm' [the file's]; in mode biaxial that along x.")
-]
-Area = Annotated[str | None, typer.Option(help="Undeformed cross-section, such as '10 mm2' [the file's].")]
-Width = Annotated[
-    str | None, typer.Option(help="With --thickness, instead of --area; in mode biaxial the size along y.")
-]
-Thickness = Annotated[str | None, typer.Option(help="With --width, instead of --area.")]
-Diameter = Annotated[str | None, typer.Option(help="Of a round specimen, instead of --area.")]
-CompressionPositive = Annotated[
-    bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
-]
-Cycle = Annotated[str | None, typer.Option(help="Use only this cycle: first, last or its number [all].")]
-Branch = Annotated[str | None, typer.Option(help="Use only loading or unloading [both].")]
-Preload = Annotated[
-    str | None, typer.Option(help="Force or stress at which the specimen is taut ('0.05 N'): stretch 1 is there.")
-]
-Every = Annotated[int | None, typer.Option(help="Use only every N-th row [1].")]
-Axis = Annotated[str | None, typer.Option(help="x or y: the only axis to read from a biaxial machine's file.")]
-Sheet = Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")]
-SkipRows = Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")]
+OPTIONS: dict[str, Any] = {
+    "column": Annotated[
+        list[str] | None,
+        typer.Option(
+            help="ROLE=COLUMN for stretch, strain or displacement, and stress or force, such as stretch=Strain; "
+            "repeat. Of a second axis or stress: stretch2 ... force2."
+        ),
+    ],
+    "stress_unit": Annotated[
+        str | None,
+        typer.Option(help="Unit of the stress column [the file's, or MPa]; for forces, the unit shown [kPa]."),
+    ],
+    "stress_type": Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")],
+    "strain_unit": Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")],
+    "force_unit": Annotated[str | None, typer.Option(help="Unit of a force column that states none, such as mN.")],
+    "displacement_unit": Annotated[str | None, typer.Option(help="Unit of a displacement column that states none.")],
+    "length": Annotated[
+        str | None, typer.Option(help="Undeformed length, such as '20 mm' [the file's]; in mode biaxial that along x.")
+    ],
+    "area": Annotated[str | None, typer.Option(help="Undeformed cross-section, such as '10 mm2' [the file's].")],
+    "width": Annotated[
+        str | None, typer.Option(help="With --thickness, instead of --area; in mode biaxial the size along y.")
+    ],
+    "thickness": Annotated[str | None, typer.Option(help="With --width, instead of --area.")],
+    "diameter": Annotated[str | None, typer.Option(help="Of a round specimen, instead of --area.")],
+    "compression_positive": Annotated[
+        bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
+    ],
+    "cycle": Annotated[str | None, typer.Option(help="Use only this cycle: first, last or its number [all].")],
+    "branch": Annotated[str | None, typer.Option(help="Use only loading or unloading [both].")],
+    "preload": Annotated[
+        str | None, typer.Option(help="Force or stress at which the specimen is taut ('0.05 N'): stretch 1 is there.")
+    ],
+    "every": Annotated[int | None, typer.Option(help="Use only every N-th row [1].")],
+    "axis": Annotated[str | None, typer.Option(help="x or y: the only axis to read from a biaxial machine's file.")],
+    "sheet": Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")],
+    "skip_rows": Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")],
+}
+"""The options, in the order of the help, by the names of the settings that they are."""
+DIMENSIONS = ("length", "area", "width", "thickness", "diameter")
 
 
-def reading_options(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings of a file's reading from a command's arguments by name."""
-    names = ["stress_unit", "stress_type", "strain_unit", "force_unit", "displacement_unit", "cycle"]
-    names += ["compression_positive", "branch", "preload", "every", "axis", "sheet", "skip_rows"]
-    options = {name: given[name] for name in names}
-    dimensions = {name: given[name] for name in ("length", "area", "width", "thickness", "diameter") if given[name]}
-    columns = once_each("--column", map(_role, given["column"] or []))
-    return options | {"dimensions": dimensions or None, "columns": columns or None}
+def reads_files(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that say how files are read, in place of its parameter ``read_as``.
+
+    That gets them as the settings of a file's reading.
+    """
+    signature = inspect.signature(command, eval_str=True)
+    place = list(signature.parameters).index("read_as")
+    own = list(signature.parameters.values())
+    options = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
+        for name, option in OPTIONS.items()
+    ]
+
+    @wraps(command)
+    def reading(**arguments: Any) -> None:
+        given = {name: arguments.pop(name) for name in OPTIONS}
+        command(**arguments, read_as=_settings(given))
+
+    reading.__signature__ = signature.replace(  # type: ignore[attr-defined]  # what Typer reads
+        parameters=[*own[:place], *options, *own[place + 1 :]]
+    )
+    return reading
+
+
+def _settings(given: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings of a file's reading for the options' values by name."""
+    dimensions = {name: given.pop(name) for name in DIMENSIONS}
+    columns = once_each("--column", map(_role, given.pop("column") or []))
+    known = {name: value for name, value in dimensions.items() if value}
+    return given | {"dimensions": known or None, "columns": columns or None}
 
 
 def resolve(file: Path) -> Path:
