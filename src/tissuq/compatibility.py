@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy import Discrepancy
-from tissuq.errors import ModelError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Path
 from tissuq.mechanics import Material, engineering_stress, stress_basis
@@ -34,7 +34,7 @@ def check_parts(
         When the material does not deform as a mode says, it is no material by itself, the discrepancy has a parameter
         of it, or discrepancy, noise and tolerances take up the same errors.
     InputError
-        When there is not one known noise for each test.
+        When there is not one known noise for each test, or the noise needs one test, with repeats.
     """
     _check_modes(material, experiment)
     _check_parameters(material, discrepancy)
@@ -65,6 +65,13 @@ def _check_parameters(material: Material, discrepancy: Discrepancy) -> None:
 def _check_errors(discrepancy: Discrepancy, noise: Noise, tolerances: Tolerances, experiment: Experiment) -> None:
     if not noise.parameters:
         noise.of_tests(experiment)  # says where there is not one for each test
+    if noise.shares_discrepancy and len(experiment.parts) > 1:
+        raise InputError(f"noise '{noise}' is for one test: choose the noise 'unknown' for several.")
+    if noise.shares_discrepancy and len(np.unique(experiment.stretch)) == len(experiment):
+        raise InputError(
+            f"experiment '{experiment.name}' has no two measurements at the same stretch, so nothing tells the noise "
+            "by itself: choose the noise 'unknown', or round the stretches to the steps of the test."
+        )
     if noise.is_consecutive and discrepancy.is_correlated:
         raise ModelError(
             f"discrepancy '{discrepancy.name}' takes up correlated noise itself: choose the noise 'unknown', "

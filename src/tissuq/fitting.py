@@ -238,9 +238,10 @@ class _Recipe:
         along which tests err.
         """
         usual = _usual_tolerances(model)
+        if not usual:
+            return model
         model = replace(model, tolerances=usual)
-        is_integrated = self.method in ("auto", "exact") and not why_not_exact(model)
-        if not usual or len(specimens_of(model.experiment)) < ENOUGH or not (is_integrated or model.energy_symbols):
+        if specimens_of(model.experiment).shape[1] < ENOUGH or not self._is_integrated(model):
             return model
         model = self._with_curve(model)
         spread = usual.stress * np.array(SPREADS)
@@ -252,6 +253,10 @@ class _Recipe:
         weight = np.exp(evidence - evidence.max()) / (1 + np.array(SPREADS) ** 2) * spread  # even in the logarithm
         told = float(np.sqrt(weight @ spread**2 / weight.sum()))
         return self._with_curve(replace(model, tolerances=replace(usual, stress=told), curve=None, level=None))
+
+    def _is_integrated(self, model: StatisticalModel) -> bool:
+        """Return whether there is an evidence without sampling."""
+        return self.method in ("auto", "exact") and (bool(model.energy_symbols) or not why_not_exact(model))
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""
@@ -328,7 +333,7 @@ class _Recipe:
 def _usual_tolerances(model: StatisticalModel) -> Tolerances:
     """Return the tolerances where nothing is said: none within a specimen, or where something else takes them up."""
     is_plain = not (model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy)
-    return BETWEEN_SPECIMENS if len(specimens_of(model.experiment)) > 1 and is_plain else Tolerances()
+    return BETWEEN_SPECIMENS if specimens_of(model.experiment).shape[1] > 1 and is_plain else Tolerances()
 
 
 def _why_not_soon(model: StatisticalModel) -> str:

@@ -100,4 +100,4 @@ def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:
         return drawn
     score = np.random.default_rng([seed, 19]).standard_normal(solution.shape)
     factor = 1 + model.common_error * score
-    return {symbol: each * (factor if symbol in model.scaled_symbols else 1.0) for symbol, each in drawn.items()}
+    return {symbol: each * (factor if symbol in model.column_symbols else 1.0) for symbol, each in drawn.items()}

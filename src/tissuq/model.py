@@ -19,8 +19,8 @@ from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.joint import CURVE, joined
 from tissuq.noise import Noise, noise_named, stress_level
 from tissuq.parameters import Parameter
-from tissuq.priors import Flat, Prior, Uniform
-from tissuq.scales import default_prior, support
+from tissuq.priors import Flat, Prior
+from tissuq.scales import default_boxes, default_prior, off_zero, support
 from tissuq.statistics import CHUNK, Statistics
 from tissuq.tolerances import Tolerances
 from tissuq.whitening import Whitening, whitening
@@ -31,8 +31,6 @@ FloatArray = NDArray[np.float64]
 
 BENT_QUANTILES = (0.001, 0.1, 0.5, 0.9, 0.999)
 """Probabilities of the exponents' priors at which the size of a box is judged."""
-BOX_MARGIN = 10.0
-"""Default boxes of linear parameters reach this many times further than least squares could."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,14 +188,9 @@ class StatisticalModel:
     def common_error(self) -> float:
         """The relative standard deviation of the error of stress that all measurements have in common.
 
-        It is not in the data: everything that is inferred is the tissue's stress times it.
+        It is not in the data: everything that is inferred is the tissue's stress times it, and so are `column_symbols`.
         """
         return self.tolerances.in_common(self.experiment)
-
-    @property
-    def scaled_symbols(self) -> tuple[str, ...]:
-        """The parameters that an error of all stresses multiplies: those to which the stress is proportional."""
-        return self.column_symbols
 
     @property
     def is_joint(self) -> bool:
@@ -331,7 +324,7 @@ class StatisticalModel:
     @cached_property
     def usual_bent(self) -> tuple[float, ...]:
         """The medians of the priors of `bent_symbols`; off zero, where a law may divide by it."""
-        return tuple(_off_zero(prior, 0.5) for prior in self._bent_priors())
+        return tuple(off_zero(prior, 0.5) for prior in self._bent_priors())
 
     def _bent_priors(self) -> list[Prior]:
         own = {p.symbol: p for p in self.material.parameters}
@@ -341,7 +334,7 @@ class StatisticalModel:
         """Return the least lengths of the material's columns over the priors of `bent_symbols`, for this many data."""
         stretch = self.experiment.stretch
         some = stretch if self.is_joint else stretch[:: max(1, len(stretch) // CHUNK)]
-        bent = np.array([[_off_zero(prior, q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
+        bent = np.array([[off_zero(prior, q) for prior in self._bent_priors()] for q in BENT_QUANTILES])
         bases = stress_basis(self.material, self.experiment.mode, some, bent)
         columns = np.array([self.white(basis) for basis in bases])
         return np.asarray(np.linalg.norm(columns, axis=1).min(axis=0) * np.sqrt(len(stretch) / len(some)))
@@ -358,26 +351,9 @@ class StatisticalModel:
             raise InputError(f"{parameter.symbol}: {error}") from error
 
     def _default_boxes(self) -> dict[str, Prior]:
-        """Return uniform priors that hold the least-squares solution with a margin, whatever the units.
-
-        |b_j| <= ||row j of pinv(X)|| ||y|| bounds every least-squares coefficient. The material's boxes come from
-        its own columns alone, so that they are the same for every discrepancy. Where these depend on exponents, the
-        shortest column over the prior of the exponents takes the place of the row: 1 / ||x_j|| is its length when
-        the columns are orthogonal, and exponents that nearly agree would make it infinite.
-        """
-        triangle = self.statistics.triangle
         own = sum(p.is_linear for p in self.material.parameters)
-        of_material, of_all = (np.linalg.inv(triangle[:k, :k]) for k in (own, len(self.column_symbols)))
-        lengths = np.array([np.linalg.norm(row) for row in (*of_material, *of_all[own:])])
-        if self.bent_symbols:
-            lengths[:own] = 1 / self._shortest_columns()
-        size = float(np.linalg.norm(triangle[:, -1]))
-        boxes: dict[str, Prior] = {}
-        for parameter, length in zip((p for p in self.parameters if p.is_linear), lengths, strict=True):
-            reach = BOX_MARGIN * float(length) * size
-            low, high = parameter.support
-            boxes[parameter.symbol] = Uniform(max(low, -reach), min(high, reach))
-        return boxes
+        shortest = self._shortest_columns() if self.bent_symbols else None
+        return default_boxes([p for p in self.parameters if p.is_linear], own, self.statistics.triangle, shortest)
 
     def _check_priors(self) -> None:
         for symbol in self.chosen_priors:
@@ -399,23 +375,11 @@ class StatisticalModel:
         empty = next((part.name for part in self.experiment.parts if not part.stress.any()), None)
         if empty is not None:
             raise InputError(f"experiment '{empty}': every stress is zero, so there is nothing to identify.")
-        if self.noise.shares_discrepancy and len(self.experiment.parts) > 1:
-            raise InputError(f"noise '{self.noise}' is for one test: choose the noise 'unknown' for several.")
-        if self.noise.shares_discrepancy and len(np.unique(self.experiment.stretch)) == n:
-            raise InputError(
-                f"experiment '{name}' has no two measurements at the same stretch, so nothing tells the noise by "
-                "itself: choose the noise 'unknown', or round the stretches to the steps of the test."
-            )
         for part in self.experiment.parts:
             for path in part.mode.channels:
                 ends = np.array([part.stretch.min(axis=0), part.stretch.max(axis=0)])
                 check_linearity(self.material, path, ends.tobytes(), ends.shape, self.usual_bent)
         check_separable(self.statistics.triangle[:, :-1], name, self.column_symbols)
-
-
-def _off_zero(prior: Prior, probability: float) -> float:
-    """Return a quantile, or where that is zero, by which laws may divide, one nearby."""
-    return float(prior.quantile(probability)) or float(prior.quantile(probability + 0.005))
 
 
 @lru_cache(maxsize=256)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from numbers import Real
@@ -208,9 +208,7 @@ def stress_level(experiment: Experiment) -> FloatArray:
 def _level_of(test: Experiment) -> FloatArray:
     if test.stretch.ndim > 1:
         return np.asarray(np.abs(test.stress.T.ravel()))
-    stresses = test.stress.reshape(len(test.stress), -1).T
-    pairs = zip(test.mode.channels, stresses, strict=True)
-    return np.concatenate([np.abs(smoothed(path.abscissa(test.stretch), stress).stress) for path, stress in pairs])
+    return np.concatenate([np.abs(smoothed(place, stress).stress) for place, stress in _curves(test)])
 
 
 def _scatter_of(test: Experiment) -> float:
@@ -218,6 +216,10 @@ def _scatter_of(test: Experiment) -> float:
     least = LEAST_SCATTER * float(np.sqrt((test.stress**2).mean()))
     if test.stretch.ndim > 1:
         return least
-    stresses = test.stress.reshape(len(test.stress), -1).T
-    pairs = zip(test.mode.channels, stresses, strict=True)
-    return max(least, *(scatter(path.abscissa(test.stretch), stress) or least for path, stress in pairs))
+    return max(least, *(scatter(place, stress) or least for place, stress in _curves(test)))
+
+
+def _curves(test: Experiment) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield every measured stress (n,) of a test with one control, after what it is drawn against."""
+    for _, channel, stress in test.curves:
+        yield test.mode.channels[channel].abscissa(test.stretch), stress

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics.path import invariant_rates, invariants
 from tissuq.parameters import Parameter
-from tissuq.priors import Prior
+from tissuq.priors import Prior, Uniform
 
-__all__ = ["default_prior", "support"]
+__all__ = ["default_boxes", "default_prior", "off_zero", "support"]
+
+FloatArray = NDArray[np.float64]
+
+BOX_MARGIN = 10.0
+"""Default boxes of linear parameters reach this many times further than least squares could."""
 
 
 def default_prior(parameter: Parameter, data: Experiment) -> Prior:
@@ -26,6 +33,45 @@ def default_prior(parameter: Parameter, data: Experiment) -> Prior:
     if parameter.relative_prior is None:
         raise ModelError(f"parameter {parameter.symbol} has no default prior: give one.")
     return parameter.relative_prior.scaled(_unit(parameter, data))
+
+
+def default_boxes(
+    parameters: Sequence[Parameter], own: int, triangle: FloatArray, shortest: FloatArray | None
+) -> dict[str, Prior]:
+    """Return uniform priors of linear parameters that hold the least-squares solution with a margin, in any unit.
+
+    |b_j| <= ||row j of pinv(X)|| ||y|| bounds every least-squares coefficient. The material's boxes come from its own
+    columns alone, so that they are the same for every discrepancy. Where these depend on exponents, the shortest column
+    over the prior of the exponents takes the place of the row: 1 / ||x_j|| is its length when the columns are
+    orthogonal, and exponents that nearly agree would make it infinite.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        All k linear ones, those of the material first.
+    own : int
+        How many are the material's.
+    triangle : (k + 1, k + 1) array
+        Of the columns and the stress.
+    shortest : (own,) array, optional
+        Least lengths of the material's columns, where these depend on exponents.
+    """
+    of_material, of_all = (np.linalg.inv(triangle[:k, :k]) for k in (own, len(parameters)))
+    lengths = np.array([np.linalg.norm(row) for row in (*of_material, *of_all[own:])])
+    if shortest is not None:
+        lengths[:own] = 1 / shortest
+    size = float(np.linalg.norm(triangle[:, -1]))
+    boxes: dict[str, Prior] = {}
+    for parameter, length in zip(parameters, lengths, strict=True):
+        reach = BOX_MARGIN * float(length) * size
+        low, high = parameter.support
+        boxes[parameter.symbol] = Uniform(max(low, -reach), min(high, reach))
+    return boxes
+
+
+def off_zero(prior: Prior, probability: float) -> float:
+    """Return a quantile, or where that is zero, by which laws may divide, one nearby."""
+    return float(prior.quantile(probability)) or float(prior.quantile(probability + 0.005))
 
 
 def support(parameter: Parameter, data: Experiment) -> tuple[float, float]:

@@ -63,7 +63,7 @@ class Tolerances:
 
     def in_common(self, experiment: Experiment) -> float:
         """Return the standard deviation of the relative error of stress that all specimens have in common."""
-        return float(self.stress / np.sqrt(len(specimens_of(experiment))))
+        return float(self.stress / np.sqrt(specimens_of(experiment).shape[1]))
 
     @property
     def need_slope(self) -> bool:
@@ -126,6 +126,7 @@ BETWEEN_SPECIMENS = Tolerances(stress=0.18)
 """For tests of different specimens, where nothing is said: their stresses agree to 18 %."""
 
 
-def specimens_of(experiment: Experiment) -> list[str | int]:
-    """Return the different specimens of an experiment: their names, or the numbers of tests without one."""
-    return list(dict.fromkeys(part.specimen or number for number, part in enumerate(experiment.parts)))
+def specimens_of(experiment: Experiment) -> NDArray[np.bool_]:
+    """Return which tests (tests, specimens) are of which specimen; a test without a name is of one of its own."""
+    every = [part.specimen or number for number, part in enumerate(experiment.parts)]
+    return np.array([[each == specimen for specimen in dict.fromkeys(every)] for each in every])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,27 +120,33 @@ def whitening(
         Correlation of the noise of consecutive measurements.
     """
     level = level or usual
-    parts = experiment.parts
-    count = [part.stress.size for part in parts]
-    size, every = np.repeat(noise_sd / usual, count), []
+    count = [part.stress.size for part in experiment.parts]
+    size, whole = np.repeat(noise_sd / usual, count), np.zeros((sum(count), 0))
     if tolerances and curve is not None:
-        curves = np.split(curve, np.cumsum(count)[:-1])
-        pairs = list(zip(parts, curves, strict=True))
-        size = np.hypot(size, np.concatenate([tolerances.noise(part, own) for part, own in pairs]) / level)
-        shares = [tolerances.columns(part, own) for part, own in pairs]
-        names = specimens_of(experiment)
-        specimens = [part.specimen or number for number, part in enumerate(parts)]
-        of = np.array([[each == name for name in names] for each in specimens], dtype=np.float64)
-        between = of - of.mean(axis=1, keepdims=True)
-        for number in range(len(names)):
-            weights = np.where(np.arange(4) == 0, between[:, number, None], of[:, number, None])
-            every.append(np.concatenate([share * own for share, own in zip(shares, weights, strict=True)]))
+        pairs = list(zip(experiment.parts, np.split(curve, np.cumsum(count)[:-1]), strict=True))
+        size = np.hypot(size, np.concatenate([tolerances.noise(*pair) for pair in pairs]) / level)
+        whole = _errors_of_tests(specimens_of(experiment), [tolerances.columns(*pair) for pair in pairs])
     starts = np.cumsum([0, *(len(stress) for _, _, stress in experiment.curves[:-1])])
     lags = np.where(np.isin(np.arange(len(size)), starts), 0.0, lag)
     bare = Whitening(size, lags, np.zeros((len(size), 0)), np.zeros(0))
-    columns = bare(np.column_stack([np.zeros((len(size), 0)), *every])) / level
+    columns = bare(whole) / level
     along, singular, _ = np.linalg.svd(columns, full_matrices=False)
     kept = singular > 1e-8 * singular.max(initial=0.0)
     if not kept.any() and not lag and np.allclose(size, 1, rtol=1e-12):
         return None
     return Whitening(size, lags, along[:, kept], singular[kept] ** 2)
+
+
+def _errors_of_tests(specimens: NDArray[np.bool_], columns: Sequence[FloatArray]) -> FloatArray:
+    """Return what errors of whole specimens do to all measurements (n, q), from what they do to those of each test.
+
+    Of the stress, in the first column, only the specimens' differences from their mean.
+    """
+    shared = specimens.astype(np.float64)
+    between = shared - shared.mean(axis=1, keepdims=True)
+    return np.concatenate(
+        [
+            np.column_stack([np.outer(own[:, 0], apart), *(np.outer(column, same) for column in own[:, 1:].T)])
+            for own, apart, same in zip(columns, between, shared, strict=True)
+        ]
+    )

@@ -10,7 +10,7 @@ from tissuq.experiments.modes import loading_modes
 
 __all__ = ["said_mode", "told_mode"]
 
-OTHER_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "shear": "simple-shear", "biaxial": "biaxial"}
+OTHER_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "shear": "simple-shear"}
 LINES = 20
 
 

@@ -174,7 +174,7 @@ class Solution(ABC):
         return Marginals(self.model.symbols, self._widened_marginal)
 
     def _widened_marginal(self, symbol: str) -> Marginal:
-        return widened(self._marginal(symbol), self.model.common_error if symbol in self.model.scaled_symbols else 0.0)
+        return widened(self._marginal(symbol), self.model.common_error if symbol in self.model.column_symbols else 0.0)
 
     @abstractmethod
     def _marginal(self, symbol: str) -> Marginal:

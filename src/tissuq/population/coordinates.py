@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.solution import Components
-from tissuq.model import StatisticalModel
 from tissuq.posterior import Posterior
 
-__all__ = ["Coordinates", "coordinates_of", "values_of"]
+__all__ = ["Coordinates", "coordinates_of"]
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -63,16 +61,3 @@ def coordinates_of(posteriors: Sequence[Posterior], symbols: Sequence[str]) -> C
     scale = np.where(is_log, 1.0, np.median(sizes, axis=0))
     start = Coordinates(tuple(symbols), is_log, scale, np.zeros(len(symbols)))
     return Coordinates(tuple(symbols), is_log, scale, np.median(start.to_line(medians), axis=0))
-
-
-def values_of(model: StatisticalModel, components: Components, symbols: Sequence[str]) -> tuple[FloatArray, FloatArray]:
-    """Return means (M, d) and roots (M, d, p) of parameters in every component of a posterior."""
-    mean = np.empty((len(components.weights), len(symbols)))
-    root = np.zeros((*mean.shape, components.root.shape[2]))
-    for place, symbol in enumerate(symbols):
-        if symbol in model.linear:
-            column = model.linear.index(symbol)
-            mean[:, place], root[:, place] = components.mean[:, column], components.root[:, column]
-        else:
-            mean[:, place] = components.settings[:, model.nonlinear.index(symbol)]
-    return mean, root

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from tissuq.inference.kronecker import quasi_random
 from tissuq.inference.solution import Solution
-from tissuq.population.coordinates import Coordinates, values_of
+from tissuq.population.coordinates import Coordinates
 from tissuq.population.mixture import Mixture, reduced
 from tissuq.posterior import Posterior
+from tissuq.prediction.moments import values_of
 
 __all__ = ["Likelihoods", "likelihoods_of", "mixtures_of"]
 

@@ -11,9 +11,9 @@ from tissuq.assessment.stability import calibrated_range
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.solution import Components
 from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus
-from tissuq.population.coordinates import Coordinates, values_of
+from tissuq.population.coordinates import Coordinates
 from tissuq.posterior import Posterior
-from tissuq.prediction.moments import drawn_curves
+from tissuq.prediction.moments import drawn_curves, values_of
 
 __all__ = ["matching_draws", "patient_curves"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ __all__ = [
     "mean_curve",
     "mean_stress",
     "stress_moments",
+    "values_of",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -80,17 +81,22 @@ class CorrelatedPart:
         return np.asarray(inside + (n - r) * np.log(self.white) + 2 * np.log(self.scale).sum())
 
 
-def coefficients(model: StatisticalModel, components: Components) -> tuple[FloatArray, FloatArray]:
-    """Return means (M, k) and roots (M, k, p) of the parameters in which the mean stress is linear."""
-    mean = np.empty((len(components.weights), len(model.column_symbols)))
+def values_of(model: StatisticalModel, components: Components, symbols: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return means (M, k) and roots (M, k, p) of parameters in every component of a posterior."""
+    mean = np.empty((len(components.weights), len(symbols)))
     root = np.zeros((*mean.shape, components.root.shape[2]))
-    for column, symbol in enumerate(model.column_symbols):
+    for column, symbol in enumerate(symbols):
         if symbol in model.linear:
             mean[:, column] = components.mean[:, model.linear.index(symbol)]
             root[:, column] = components.root[:, model.linear.index(symbol)]
         else:
             mean[:, column] = components.settings[:, model.nonlinear.index(symbol)]
     return mean, root
+
+
+def coefficients(model: StatisticalModel, components: Components) -> tuple[FloatArray, FloatArray]:
+    """Return means (M, k) and roots (M, k, p) of the parameters in which the mean stress is linear."""
+    return values_of(model, components, model.column_symbols)
 
 
 def basis_of(

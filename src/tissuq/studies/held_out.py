@@ -81,7 +81,7 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
     """
     data, rows = posterior.model.experiment, []
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
-    for number, stress in enumerate(test.stress.reshape(len(test), -1).T):
+    for _, number, stress in test.curves:
         points, measured = test.stretch[stress != 0], stress[stress != 0]
         band = posterior.predict(points, mode=test.mode, channel=number, prob=prob)
         low, high, mean = (band[name].to_numpy() for name in ("low", "high", "mean"))
