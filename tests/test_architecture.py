@@ -16,7 +16,8 @@ ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "gaussian", "priors", "parameters", "smoothing", "experiments", "mechanics", "discrepancy",
     "noise", "statistics", "scales", "tolerances", "whitening", "compatibility", "model", "inference", "prediction",
-    "assessment", "cautions", "labelled", "posterior", "fitting", "population", "studies", "report", "cli", "__main__",
+    "assessment", "cautions", "labelled", "ensemble", "posterior", "fitting", "population", "export",
+    "finite_elements", "emulation", "studies", "report", "cli", "__main__",
 ]  # fmt: skip
 
 

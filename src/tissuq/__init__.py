@@ -2,6 +2,7 @@
 
 from tissuq.assessment import Assessment, Average, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
+from tissuq.ensemble import EnergyDraw, Ensemble
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments import datasets
 from tissuq.experiments.experiment import Experiment
@@ -25,6 +26,7 @@ from tissuq.parameters import Parameter
 from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
 from tissuq.tolerances import Tolerances
 
@@ -35,6 +37,8 @@ __all__ = [
     "Average",
     "ConvergenceError",
     "Discrepancy",
+    "EnergyDraw",
+    "Ensemble",
     "Experiment",
     "Exponential",
     "FibreMaterial",
@@ -75,6 +79,7 @@ __all__ = [
     "initial_shear_modulus",
     "inspect",
     "load_material",
+    "load_run",
     "loading_modes",
     "materials",
     "read_experiment",

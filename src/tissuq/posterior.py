@@ -14,6 +14,7 @@ from tissuq.assessment import Assessment, assess
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, calibrated_range, stability, stable_ranges
 from tissuq.cautions import warnings_about
+from tissuq.ensemble import Ensemble, Sampling, drawn_ensemble
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -293,6 +294,45 @@ class Posterior:
             ratio = asked.channels[channel].cauchy_ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
             found[["mean", "low", "high"]] *= np.asarray(ratio)[:, None]
         return found
+
+    def ensemble(self, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True) -> Ensemble:
+        """Return equally probable draws as complete materials, with the discrepancy in their energy.
+
+        They are for other programs and other loading modes: finite elements, material cards. Over all states whose
+        invariants were measured they carry the posterior's whole uncertainty; beyond, a discrepancy that is an energy
+        keeps the slopes dW/dI1, dW/dI2 and l dw/dl that it has at the end. Scatter of the stress (S, noise) is no
+        energy, and left out.
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        seed : int
+            From which the draws follow.
+        sampling : str
+            How they spread over the posterior: ``"sobol"`` (quasi-random), ``"latin"`` (Latin hypercube) or
+            ``"random"``.
+        admissible : bool
+            Leave out draws that are not stable in every loading mode over the range that was measured.
+
+        Raises
+        ------
+        InputError, ModelError
+            When the material has fibres, the discrepancy is an error of the stress, or hardly any draw is stable.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, stretch, noise_sd=0.02, seed=1)
+        >>> draws = tq.fit(data, noise_sd=0.02).ensemble(8)
+        >>> planar = tq.loading_modes()["planar"]()
+        >>> draws.stress(planar, [1.5]).shape
+        (8, 1)
+        >>> bool(abs(tq.engineering_stress(draws[0], planar, [1.5], ()) - draws.stress(planar, [1.5])[0])[0] < 1e-9)
+        True
+        """
+        return drawn_ensemble(self.solution, count, seed, sampling, admissible=admissible)
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,10 +19,21 @@ from tissuq.mechanics.path import farthest_stretch, invariants
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["LOST", "Loss", "Stability", "StableRange", "are_stable", "calibrated_range", "stability", "stable_ranges"]
+__all__ = [
+    "LOST",
+    "Loss",
+    "Stability",
+    "StableRange",
+    "are_stable",
+    "calibrated_range",
+    "stability",
+    "stable_draws",
+    "stable_ranges",
+]
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Curves = Callable[[FloatArray, LoadingMode], FloatArray]
 
 DRAWS, POINTS = 500, 31
 """Draws, and stretches on either side of the reference, to whose distance it is known where stability is lost."""
@@ -116,7 +127,7 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     ModelError
         When the material has directions, or its energy cannot be differentiated at many states at once.
     """
-    found = _criteria(solution.model, _some(solution), mode, stretch)
+    found = _criteria(_curves(solution.model, _some(solution)), mode, stretch)
     stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(found))
     shares = (each.mean(axis=0) for each in (*found, stable))
     return Stability(mode.name, stretch, *shares)
@@ -134,7 +145,7 @@ def stable_ranges(solution: Solution) -> dict[str, StableRange]:
             continue
         stretch = _measured(solution.model.experiment, mode)
         try:
-            criteria = _criteria(solution.model, _some(solution), mode, stretch)
+            criteria = _criteria(_curves(solution.model, _some(solution)), mode, stretch)
         except ModelError:
             return {}
         stable = _from_reference(stretch - 1, np.logical_and.reduce(criteria))
@@ -159,14 +170,30 @@ def are_stable(model: StatisticalModel, points: Components, modes: Sequence[Load
     ModelError
         As `stability` does.
     """
-    stable = np.ones(len(points.weights), dtype=bool)
-    paths = [(mode, _measured(model.experiment, mode)) for mode in modes]
+    return stable_draws(lambda left: _curves(model, points[left]), len(points.weights), model.experiment, modes)
+
+
+def stable_draws(
+    curves_of: Callable[[NDArray[np.intp]], Curves], count: int, data: Experiment, modes: Sequence[LoadingMode]
+) -> Flags:
+    """Return whether draws (count,) are stable over the range that data measured, of all of some loading modes.
+
+    Parameters
+    ----------
+    curves_of : callable
+        From places of M draws, the function of points (n,) and a mode that gives their stresses (M, n).
+    count : int
+    data : Experiment
+    modes : sequence of LoadingMode
+    """
+    stable = np.ones(count, dtype=bool)
+    paths = [(mode, _measured(data, mode)) for mode in modes]
     first, whole = paths[0]
     at_few = first, np.unique([whole[0], 1.0, whole[-1]])  # where most draws fail that do, at little cost
     for mode, stretch in (at_few, *paths):
         left = np.flatnonzero(stable)
         if len(left):
-            stable[left] = np.logical_and.reduce(_criteria(model, points[left], mode, stretch)).all(axis=1)
+            stable[left] = np.logical_and.reduce(_criteria(curves_of(left), mode, stretch)).all(axis=1)
     return stable
 
 
@@ -181,37 +208,41 @@ def _some(solution: Solution) -> Components:
     return parts[systematic(parts.weights[None], DRAWS)[0]]
 
 
-def _criteria(
-    model: StatisticalModel, parts: Components, mode: LoadingMode, stretch: FloatArray
-) -> tuple[Flags, Flags, Flags]:
-    """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each.
-
-    For one draw of every component.
-    """
+def _curves(model: StatisticalModel, parts: Components) -> Curves:
+    """Return the function that gives the stresses (M, n) of one draw of every component at points of a mode."""
     if not model.material.is_isotropic:
         raise ModelError(
             f"the stability of material '{model.material.name}' is not known: the criteria are those of isotropic "
             "materials, and it has fibres."
         )
-    draws = len(parts.weights)
-    count = MOST_VALUES // (10 * len(stretch) * len(model.column_symbols)) if model.bent_symbols else AT_ONCE
-    blocks = [parts[block] for block in np.array_split(np.arange(draws), -(-draws // max(1, count)))]
 
-    def drawn(points: FloatArray, path: LoadingMode) -> FloatArray:
-        curves = [drawn_curves(model, block, points, seed, path) for seed, block in enumerate(blocks)]
+    def stresses(points: FloatArray, path: LoadingMode) -> FloatArray:
+        usual = 20 * POINTS * len(model.column_symbols)  # the same blocks, and so the same draws, at any points
+        count = MOST_VALUES // usual if model.bent_symbols else AT_ONCE
+        blocks = np.array_split(np.arange(len(parts.weights)), -(-len(parts.weights) // max(1, count)))
+        curves = [drawn_curves(model, parts[block], points, seed, path) for seed, block in enumerate(blocks)]
         return np.concatenate([alone + other for alone, other in curves])
 
+    def explained(points: FloatArray, path: LoadingMode) -> FloatArray:
+        try:
+            return stresses(points, path)
+        except TypeError as error:
+            raise ModelError(
+                f"the stability of material '{model.material.name}' is not known, because its energy is not plain "
+                "arithmetic of arrays: write it without jax.numpy and branches."
+            ) from error
+
+    return explained
+
+
+def _criteria(curves: Curves, mode: LoadingMode, stretch: FloatArray) -> tuple[Flags, Flags, Flags]:
+    """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each."""
     base = np.array([np.broadcast_to(each, len(stretch)) for each in mode.principal_stretches(stretch)])
     nudges = [np.zeros(3), *(sign * STEP * each for each in DIRECTIONS for sign in (1, -1))]
     paths = [_Path(base * np.exp(nudge)[:, None], direction) for nudge in nudges for direction in DIRECTIONS]
     whole = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
-    try:
-        stress = drawn(np.ones(whole.base.shape[1]), whole).reshape(draws, 5, 2, len(stretch))
-    except TypeError as error:
-        raise ModelError(
-            f"the stability of material '{model.material.name}' is not known, because its energy is not plain "
-            "arithmetic of arrays: write it without jax.numpy and branches."
-        ) from error
+    every = curves(np.ones(whole.base.shape[1]), whole)
+    stress = every.reshape(len(every), 5, 2, len(stretch))
     own, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * STEP)
     change = stretch - mode.reference
     size = np.abs(np.trace(tangent[..., np.abs(change).argmin()], axis1=1, axis2=2))[:, None]
@@ -221,7 +252,7 @@ def _criteria(
     determinant = tangent[:, 0, 0] * tangent[:, 1, 1] - tangent[:, 0, 1] * tangent[:, 1, 0]
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
     near = np.concatenate([stretch - STEP, stretch + STEP])
-    rising = np.diff(drawn(near, mode).reshape(draws, 2, -1), axis=1)[:, 0] > 0
+    rising = np.diff(curves(near, mode).reshape(len(every), 2, -1), axis=1)[:, 0] > 0
     return baker, drucker, rising
 
 

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli import reading, several
-from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
+from tissuq.cli.options import not_converged, once_each, parse_prior, progress
 from tissuq.errors import InputError
+from tissuq.studies.settings import load_settings
 
 __all__ = ["fit"]
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli import reading
-from tissuq.cli.options import load_settings
+from tissuq.studies.settings import load_settings
 
 __all__ = ["inspect"]
 

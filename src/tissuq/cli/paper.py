@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import load_settings, not_converged, once_each, parse_prior, progress
+from tissuq.cli.options import not_converged, once_each, parse_prior, progress
+from tissuq.studies.settings import load_settings
 
 __all__ = ["paper"]
 

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli import reading
-from tissuq.cli.options import load_settings, not_converged, progress
+from tissuq.cli.options import not_converged, progress
 from tissuq.cli.several import one_noise
 from tissuq.errors import InputError
+from tissuq.studies.settings import load_settings
 
 __all__ = ["population"]
 

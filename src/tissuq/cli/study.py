@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import campaign_progress, load_settings
+from tissuq.cli.options import campaign_progress
 from tissuq.errors import InputError
+from tissuq.studies.settings import load_settings
 
 __all__ = ["study"]
 

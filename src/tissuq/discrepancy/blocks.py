@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from tissuq.experiments.modes import Path
 from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 
 __all__ = [
+    "Coordinates",
     "EnergyBlock",
     "HenckyBlock",
     "LogBlock",
@@ -31,6 +32,18 @@ LARGEST_EXPONENT = 200.0
 """So far beyond the data that nothing is known there."""
 GRID = 400
 """Points over the data's range among which the pivots of a process are chosen."""
+
+
+class Coordinates(NamedTuple):
+    """What belongs to I1 - 3, to I2 - 3 and to the logarithms of the stretches."""
+
+    first: FloatArray
+    second: FloatArray
+    logarithm: FloatArray
+
+    def nothing(self, terms: int) -> Coordinates:
+        """Return zeros for so many terms at each of these coordinates."""
+        return Coordinates(*(np.zeros((len(each), terms)) for each in self))
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,18 @@ class EnergyBlock(ABC):
     def stress_variance(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         """Return the variance (n,) of the stress for c = 1."""
 
+    @abstractmethod
+    def count(self, reach: tuple[float, float], length: float) -> int:
+        """Return the number r of the terms that serve the data."""
+
+    @abstractmethod
+    def slopes(self, at: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        """Return A'(x) (a, q), B'(y) (b, q) and w'(e) (c, q) of the terms dW_k = A(I1 - 3) + B(I2 - 3) + sum w(ln l_i).
+
+        For c = 1, at x = I1 - 3 (a,), y = I2 - 3 (b,) and e = ln l (c,). Where these lie beyond the reach, the r terms
+        that serve the data are followed by others, of which the data know nothing.
+        """
+
 
 class ZeroModulusBlock(EnergyBlock):
     """dW = c u ((I2 - 3) - (I1 - 3)): the Mooney-Rivlin term with its initial modulus taken out."""
@@ -77,6 +102,13 @@ class ZeroModulusBlock(EnergyBlock):
 
     def stress_variance(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         return self.stress_features(mode, stretch, reach, length)[:, 0] ** 2
+
+    def count(self, reach: tuple[float, float], length: float) -> int:
+        return 1
+
+    def slopes(self, at: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        one = [np.ones((len(each), 1)) for each in at]
+        return Coordinates(-one[0], one[1], 0 * one[2])
 
 
 class ProcessBlock(EnergyBlock):
@@ -101,11 +133,20 @@ class ProcessBlock(EnergyBlock):
         return min(0.0, float(z.min())), max(0.0, float(z.max()))
 
     def stress_features(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
-        scale = length * (reach[1] - reach[0])
-        pivots, triangle = _pivots(self, reach, scale)
         z, v = self.coordinates(mode, stretch)
-        values = np.linalg.solve(triangle, self.covariance(pivots[:, None], z.ravel()[None], scale))
-        return np.asarray(np.einsum("rnm,nm->nr", values.reshape(len(pivots), *z.shape), v))
+        values = self.terms(z.ravel(), reach, length)
+        return np.asarray(np.einsum("nmr,nm->nr", values.reshape(*z.shape, -1), v))
+
+    def count(self, reach: tuple[float, float], length: float) -> int:
+        return len(_pivots(self, reach, length * (reach[1] - reach[0]))[0])
+
+    def terms(
+        self, z: FloatArray, reach: tuple[float, float], length: float, wider: tuple[float, float] | None = None
+    ) -> FloatArray:
+        """Return the directions (n, q) of the process at coordinates (n,): those within a wider reach come last."""
+        scale = length * (reach[1] - reach[0])
+        pivots, triangle = _pivots(self, reach, scale, wider)
+        return np.asarray(np.linalg.solve(triangle, self.covariance(pivots[:, None], z[None], scale)).T)
 
     def stress_variance(self, mode: Path, stretch: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
         z, v = self.coordinates(mode, stretch)
@@ -115,16 +156,22 @@ class ProcessBlock(EnergyBlock):
 
 
 @lru_cache(maxsize=256)
-def _pivots(block: ProcessBlock, reach: tuple[float, float], scale: float) -> tuple[FloatArray, FloatArray]:
-    """Return r pivots and the lower triangle (r, r) of their covariance's Cholesky decomposition.
+def _pivots(
+    block: ProcessBlock, reach: tuple[float, float], scale: float, wider: tuple[float, float] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return q pivots and the lower triangle (q, q) of their covariance's Cholesky decomposition.
 
-    Remembered, because every sum of which the block is a part asks for the same.
+    Those of the reach come first, where there is a wider one. Remembered, because every sum of which the block is a
+    part asks for the same.
     """
-    grid = reach[0] + (reach[1] - reach[0]) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))
-    remaining = block.covariance(grid, grid, scale)
-    least = block.tolerance * remaining.max()
-    chosen: list[int] = []
-    columns = np.zeros((GRID, 0))
+    before, triangle = (np.zeros(0), np.zeros((0, 0))) if wider is None else _pivots(block, reach, scale)
+    low, high = wider or reach
+    grid = np.concatenate([before, low + (high - low) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID)))])
+    columns = np.linalg.solve(triangle, block.covariance(before[:, None], grid[None], scale)).T
+    variance = block.covariance(grid, grid, scale)
+    remaining, least = variance - (columns**2).sum(axis=1), block.tolerance * variance.max()
+    remaining[: len(before)] = 0.0
+    chosen = list(range(len(before)))
     while (pivot := int(remaining.argmax())) not in chosen and remaining[pivot] > least:
         own = block.covariance(grid, grid[pivot], scale) - columns @ columns[pivot]
         columns = np.column_stack([columns, own / np.sqrt(remaining[pivot])])
@@ -140,6 +187,11 @@ class InvariantBlock(ProcessBlock):
         x, _ = invariants(mode, stretch)
         first, _ = invariant_rates(mode, stretch)
         return self.coordinate(np.maximum(x, 0.0))[:, None], first[:, None]
+
+    def slopes(self, at: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        z = self.coordinate(at.first)
+        values = self.terms(z, reach, length, _joined(reach, z))
+        return at.nothing(values.shape[1])._replace(first=values)
 
     @abstractmethod
     def coordinate(self, x: FloatArray) -> FloatArray:
@@ -205,6 +257,12 @@ class SecondInvariantBlock(ProcessBlock):
         first, second = invariant_rates(mode, stretch)
         return np.stack([np.maximum(y, 0.0), np.zeros_like(y)], axis=1), np.stack([second, -first], axis=1)
 
+    def slopes(self, at: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        wider = _joined(reach, at.second)
+        values, start = (self.terms(y, reach, length, wider) for y in (at.second, np.zeros(1)))
+        nothing = at.nothing(values.shape[1])
+        return nothing._replace(first=nothing.first - start, second=values)
+
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
         return np.asarray(np.exp(np.minimum(first * second / length**2, LARGEST_EXPONENT)))
 
@@ -214,6 +272,10 @@ class SeparableBlock(ProcessBlock):
 
     def coordinates(self, mode: Path, stretch: FloatArray) -> tuple[FloatArray, FloatArray]:
         return log_stretches(mode, stretch)
+
+    def slopes(self, at: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        values = self.terms(at.logarithm, reach, length, _joined(reach, at.logarithm))
+        return at.nothing(values.shape[1])._replace(logarithm=values)
 
 
 class HenckyBlock(SeparableBlock):
@@ -237,6 +299,11 @@ class ValanisLandelBlock(SeparableBlock):
 
     def covariance(self, first: FloatArray, second: FloatArray, length: float) -> FloatArray:
         return np.asarray(pinned_squared_exponential(first / length, second / length, 1))
+
+
+def _joined(reach: tuple[float, float], z: FloatArray) -> tuple[float, float]:
+    """Return the range of a reach and of coordinates (n,) together."""
+    return min(reach[0], float(z.min())), max(reach[1], float(z.max()))
 
 
 def _series(exponent: FloatArray) -> FloatArray:

@@ -51,6 +51,10 @@ class Discrepancy(ABC):
         """Return the (n, k) mean stresses of unit linear parameters, in their order."""
         return np.zeros((len(stretch), 0))
 
+    def material_part(self, values: Mapping[str, float]) -> tuple[Material, tuple[float, ...]] | None:
+        """Return the material whose stress the mean is, with its parameters, where it is that of one."""
+        return None
+
     def independent_variance(self, values: Mapping[str, Any]) -> Any:
         """Return the variance (MPa^2) that the discrepancy adds to every point by itself."""
         return 0.0

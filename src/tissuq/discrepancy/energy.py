@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.discrepancy.blocks import (
+    Coordinates,
     EnergyBlock,
     HenckyBlock,
     LogBlock,
@@ -79,6 +80,11 @@ class Member:
         """Return the variance (n,) of the stress of each block at unit amplitude."""
         parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
         return [block.stress_variance(mode, stretch, reach, length) for block, reach, length in parts]
+
+    def slopes(self, at: Coordinates) -> list[tuple[Coordinates, int]]:
+        """Return of each block the slopes of its terms, as `EnergyBlock.slopes`, and how many serve the data."""
+        parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
+        return [(block.slopes(at, reach, length), block.count(reach, length)) for block, reach, length in parts]
 
 
 def side_by_side(features: list[FloatArray], count: int) -> FloatArray:

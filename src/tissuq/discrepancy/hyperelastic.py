@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -27,6 +28,9 @@ class HyperelasticTerms(IndependentError):
     def mean_basis(self, mode: Path, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         columns = [self.material.parameters.index(term) for term in self.terms]
         return stress_basis(self.material, mode, stretch)[:, columns]
+
+    def material_part(self, values: Mapping[str, float]) -> tuple[Material, tuple[float, ...]]:
+        return self.material, tuple(values[p.symbol] if p in self.terms else 0.0 for p in self.material.parameters)
 
 
 class MooneyRivlinTerm(HyperelasticTerms):

@@ -10,11 +10,9 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from tissuq.errors import InputError
+from tissuq.studies.settings import RECIPE
 
 __all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "INPUT", "RECIPE", "check_target", "run_folder"]
-
-RECIPE = "run.toml"
-"""The file that says how a run is repeated."""
 
 INPUT = "input"
 """The folder of a run that holds copies of the user's files, so that the run can be repeated."""

@@ -30,7 +30,7 @@ from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.measured_file import MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.tolerances import Tolerances
 
-__all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "run_specimen"]
+__all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "fitted", "run_specimen"]
 
 ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
@@ -204,6 +204,24 @@ def run_specimen(
         held_out += [{"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in found]
     parts = settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings)
     return SpecimenStudy(*parts, tuple(held_out))
+
+
+def fitted(
+    settings: SpecimenSettings, discrepancy: str, folder: Path = Path(), law: Material | None = None
+) -> Posterior:
+    """Return the posterior under one discrepancy of the measurements and the material of a study.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        As `run_specimen`.
+    """
+    experiment = settings.experiment(folder)
+    material, unit = law or material_named(settings.material), stress_unit(experiment.stress_unit)
+    own = _parameters(settings, material, discrepancy, experiment)
+    chosen = {symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in own]}
+    priors = _priors(settings.model_copy(update={"priors": chosen}), {discrepancy: own}, unit)
+    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, own, unit))
 
 
 def _known(value: Any) -> Any:

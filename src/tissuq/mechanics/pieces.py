@@ -1,0 +1,79 @@
+"""A strain energy known by its slopes along the invariants and the logarithms of the stretches, in smooth pieces."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.mechanics.arithmetic import library, log
+
+__all__ = ["Pieces", "PiecewiseEnergy", "pieces"]
+
+FloatArray = NDArray[np.float64]
+
+
+class Pieces(NamedTuple):
+    """A function in quartic pieces between knots at equal distances, continued with the slope it has at its ends.
+
+    Its slope is a cubic spline, so that its second derivative is smooth, too. Arrays of NumPy (also complex ones) and
+    of JAX pass through, which may trace the fields.
+
+    Attributes
+    ----------
+    start, step : float
+        The first knot, and the distance between knots.
+    coefficients : (5, g) array
+        Of every piece, the highest power of the distance from its first knot first.
+    """
+
+    start: Any
+    step: Any
+    coefficients: Any
+
+    def __call__(self, place: Any) -> Any:
+        """Return the function's values."""
+        own, count = library(place), self.coefficients.shape[-1]
+        end = self.start + count * self.step
+        inside = own.where(place.real < self.start, self.start, own.where(place.real > end, end, place))
+        piece = own.clip(own.floor((inside.real - self.start) / self.step), 0, count - 1).astype(int)
+        u = inside - (self.start + piece * self.step)
+        a, b, c, d, e = (own.asarray(each)[piece] for each in self.coefficients)
+        value = (((a * u + b) * u + c) * u + d) * u + e
+        slope = ((4 * a * u + 3 * b) * u + 2 * c) * u + d
+        return value + slope * (place - inside)
+
+    def slope(self, place: FloatArray) -> FloatArray:
+        """Return the function's slope at places (n,)."""
+        count = self.coefficients.shape[-1]
+        inside = np.clip((place - self.start) / self.step, 0, count)
+        piece = np.minimum(inside.astype(int), count - 1)
+        u = (inside - piece) * self.step
+        a, b, c, d, _ = self.coefficients[:, piece]
+        return np.asarray(((4 * a * u + 3 * b) * u + 2 * c) * u + d)
+
+
+def pieces(knots: FloatArray, slopes: FloatArray) -> list[Pieces]:
+    """Return functions that vanish at zero from their slopes (g, N) at knots (g,) of equal distances around zero."""
+    from scipy.interpolate import CubicSpline
+
+    every = CubicSpline(knots, slopes).antiderivative()
+    coefficients = every.c.copy()
+    coefficients[-1] -= every(0.0)
+    step = float(knots[-1] - knots[0]) / (len(knots) - 1)
+    return [Pieces(float(knots[0]), step, coefficients[..., n]) for n in range(slopes.shape[1])]
+
+
+class PiecewiseEnergy(NamedTuple):
+    """W = A(I1 - 3) + B(I2 - 3) + w(ln l1) + w(ln l2) + w(ln l3)."""
+
+    first: Pieces
+    second: Pieces
+    logarithm: Pieces
+
+    def __call__(self, stretches: tuple[Any, Any, Any]) -> Any:
+        """Return the energy (MPa) of principal stretches whose product is one."""
+        one, two, three = (stretch * stretch for stretch in stretches)
+        of_invariants = self.first(one + two + three - 3) + self.second(one * two + two * three + three * one - 3)
+        return of_invariants + sum(self.logarithm(log(stretch)) for stretch in stretches)

@@ -1,0 +1,77 @@
+"""The posterior of an earlier run, fitted again as its recipe says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from warnings import warn
+
+from tissuq.discrepancy import Auto
+from tissuq.errors import InputError
+from tissuq.mechanics import Material
+from tissuq.posterior import Posterior
+from tissuq.studies.settings import RECIPE, load_settings
+from tissuq.studies.specimen import SpecimenSettings, fitted
+
+__all__ = ["load_run"]
+
+AGREEMENT = 1e-6
+"""Relative difference between the headline parameter's means in the run and fitted again that needs no word."""
+
+
+def load_run(folder: str | Path, discrepancy: str | None = None, material: Material | None = None) -> Posterior:
+    """Return a posterior of a run of ``tissuq fit``.
+
+    The run's measurements are fitted again as its ``run.toml`` says, from the copies in the run folder, with the same
+    seed: a posterior is more than its draws. A warning tells where the result is not that of the run.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The run folder.
+    discrepancy : str, optional
+        Which of the run's discrepancies; unless given, ``"auto"`` where the run has it, or the only one.
+    material : Material, optional
+        The material, where the run's is a law in a file of the user's own, which is not run unasked.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When the folder is no such run, or the discrepancy is not one of the run's; and as `tissuq.fit`.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> posterior = tq.load_run("runs/brain", discrepancy="auto")  # doctest: +SKIP
+    """
+    run = Path(folder)
+    rows = _summary(run)
+    settings = load_settings(SpecimenSettings, run / RECIPE, {})
+    names = list(rows)
+    name = discrepancy or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
+    if name not in names:
+        known = ", ".join(names)
+        what = f"has no discrepancy '{name}'" if name else "has several discrepancies"
+        raise InputError(f"run '{folder}' {what}: choose one of {known}.")
+    posterior = fitted(settings, name, run, material)
+    headline = posterior.model.headline
+    before, now = rows[name].get(f"{headline}_mean"), float(posterior.summary(parameters=[headline])["mean"].iloc[0])
+    if before is not None and abs(now - before) > AGREEMENT * abs(before):
+        warn(
+            f"fitted again, run '{folder}' gives {headline} = {now:.6g} MPa, and it gave {before:.6g} MPa: its files "
+            "or tissuq have changed since.",
+            stacklevel=2,
+        )
+    return posterior
+
+
+def _summary(run: Path) -> dict[str, dict[str, float]]:
+    """Return the rows of a run's summary by discrepancy."""
+    recipe, summary = run / RECIPE, run / "summary.json"
+    if not run.is_dir():
+        raise InputError(f"there is no run folder '{run}'.")
+    if not recipe.is_file() or not summary.is_file():
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE} or summary.json.")
+    if " tissuq fit " not in recipe.read_text(encoding="utf-8").partition("\n")[0]:
+        raise InputError(f"run '{run}' is not one of tissuq fit, and only these have a posterior to go on with.")
+    return {row["formulation"]: row for row in json.loads(summary.read_text(encoding="utf-8"))}
