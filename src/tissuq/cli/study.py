@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.options import campaign_progress
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
@@ -107,41 +108,8 @@ def _carry_out(
     """Carry out a campaign in its folder; nothing is written before its workers are there."""
     from tissuq.studies.stream import open_pool
 
-    _check_folder(folder, settings)
+    check_folder(folder, settings)
     with open_pool(workers, scheduler) as pool, campaign_progress(total) as step:
-        _write_recipe(folder, settings)
+        write_campaign_recipe(folder, settings)
         results: list[dict[str, Any]] = run(settings, folder, pool=pool, step=step)
     return results
-
-
-def _check_folder(folder: Path, settings: Any) -> None:
-    """Refuse a folder that is not empty, unless it is that of the same campaign."""
-    from tissuq.report.run_folder import RECIPE
-
-    recipe = folder / RECIPE
-    if not folder.exists() or (folder.is_dir() and {path.name for path in folder.iterdir()} <= {_unfinished(recipe)}):
-        return
-    if not recipe.exists():
-        raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    if recipe.read_text(encoding="utf-8") != _recipe(settings):
-        raise InputError(f"'{folder}' holds a campaign with other settings; choose another folder with --out.")
-
-
-def _write_recipe(folder: Path, settings: Any) -> None:
-    """Write it whole or not at all, so that a campaign goes on from a kill at any point."""
-    from tissuq.report.run_folder import RECIPE
-
-    folder.mkdir(parents=True, exist_ok=True)
-    scratch = folder / _unfinished(folder / RECIPE)
-    scratch.write_text(_recipe(settings), encoding="utf-8")
-    scratch.replace(folder / RECIPE)
-
-
-def _unfinished(recipe: Path) -> str:
-    return f"{recipe.name}.new"
-
-
-def _recipe(settings: Any) -> str:
-    import tomli_w
-
-    return tomli_w.dumps(settings.model_dump(mode="json"))

@@ -6,18 +6,27 @@ from tissuq.finite_elements.forces import bar_force, case_forces, indentation_fo
 from tissuq.finite_elements.indentation import Indentation
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.finite_elements.response import Response, respond
+from tissuq.finite_elements.simulation import Failure, Simulation, simulate
+from tissuq.finite_elements.spread import Band, Shares, band_of, shares_of
 
 __all__ = [
+    "Band",
     "Case",
     "ClampedBar",
     "FElupeMaterial",
+    "Failure",
     "Indentation",
     "Mesh",
     "Response",
+    "Shares",
+    "Simulation",
     "Supports",
+    "band_of",
     "bar_force",
     "case_forces",
     "cases",
     "indentation_force",
     "respond",
+    "shares_of",
+    "simulate",
 ]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.registry import variants
 
-__all__ = ["AXIAL", "RADIAL", "Case", "Mesh", "Supports", "cases", "length"]
+__all__ = ["AXIAL", "RADIAL", "Case", "Mesh", "Supports", "cases"]
 
 FloatArray = NDArray[np.float64]
 
@@ -58,8 +58,9 @@ class Supports(NamedTuple):
 class Case(ABC):
     """A body of revolution that something moves along its axis, and the force that this needs.
 
-    A new case is one subclass in one file: its sizes as fields, a mesh, and its supports. It then is in the command
-    line, the Python interface and the report. All lengths are in mm and positive, forces in N.
+    A new case is one subclass in one file: its sizes as fields, a mesh, and its supports. Everything that takes a case,
+    figures and report included, then takes it. All lengths are in mm and positive, forces in N.
+    Where a size is called ``fineness``, twice as much of it halves all cells.
     """
 
     name: ClassVar[str]
@@ -70,7 +71,7 @@ class Case(ABC):
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, bool) and not 0 < value < inf:
+            if not isinstance(value, str) and not 0 < value < inf:
                 raise InputError(f"case '{self.name}': {field.name} must be a positive number, not {value!r}.")
 
     @property
@@ -89,14 +90,6 @@ class Case(ABC):
     def steps(self, count: int) -> FloatArray:
         """Return travels (count,) at equal distances, the last one all of it."""
         return np.linspace(0, self.travel, count + 1)[1:]
-
-
-def length(default: float, help: str) -> float:
-    """Return the field of a length in mm; ``help`` says which one."""
-    from dataclasses import field
-
-    found: float = field(default=default, metadata={"help": help, "unit": "mm"})
-    return found
 
 
 def cases() -> dict[str, type[Case]]:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports, length
+from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports
 from tissuq.finite_elements.grading import graded, grid
 
 __all__ = ["ClampedBar"]
@@ -35,9 +35,9 @@ class ClampedBar(Case):
     description: ClassVar[str] = "a round bar glued to two plates, in tension"
     travel_name: ClassVar[str] = "elongation"
 
-    elongation: float = length(1.5, "How much longer the bar becomes.")
-    bar_length: float = length(10.0, "Length of the bar between the plates.")
-    bar_radius: float = length(2.5, "Radius of the bar.")
+    elongation: float = 1.5
+    bar_length: float = 10.0
+    bar_radius: float = 2.5
     fineness: float = 1.0
 
     @property

@@ -41,9 +41,13 @@ class DistortionalEnergy:
     values: tuple[tuple[float, ...], ...]
     discrepancy: PiecewiseEnergy | None = None
 
+    def slopes(self, stretches: FloatArray) -> FloatArray:
+        """Return the gradient (3, n), MPa, at principal stretches (3, n)."""
+        return np.asarray(_compiled(self.materials)[0](self.values, self.discrepancy, stretches))
+
     def derivatives(self, stretches: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the gradient (3, n) and the Hessian (3, 3, n), MPa, at principal stretches (3, n)."""
-        gradient, hessian = _derivatives(self.materials)(self.values, self.discrepancy, stretches)
+        gradient, hessian = _compiled(self.materials)[1](self.values, self.discrepancy, stretches)
         return np.asarray(gradient), np.asarray(hessian)
 
     def __call__(self, stretches: FloatArray) -> FloatArray:
@@ -83,8 +87,8 @@ def distortional_energy(material: Material, values: ArrayLike | None = None) -> 
 
 
 @lru_cache(maxsize=64)
-def _derivatives(materials: tuple[Material, ...]) -> Any:
-    """Return the compiled function of numbers and stretches (3, n) that gives gradients and Hessians."""
+def _compiled(materials: tuple[Material, ...]) -> tuple[Any, Any]:
+    """Return two compiled functions of numbers and stretches (3, n): the gradients, and these with the Hessians."""
     jax = differentiator()
 
     def energy(point: Any, values: Sequence[Sequence[Any]], discrepancy: PiecewiseEnergy | None) -> Any:
@@ -92,5 +96,10 @@ def _derivatives(materials: tuple[Material, ...]) -> Any:
         found = sum(each.energy(own, given) for each, given in zip(materials, values, strict=True))
         return found if discrepancy is None else found + discrepancy(own)
 
-    both = jax.vmap(lambda *given: (jax.grad(energy)(*given), jax.hessian(energy)(*given)), (1, None, None), (-1, -1))
-    return jax.jit(lambda values, discrepancy, stretches: both(stretches, values, discrepancy))
+    slopes, curvature = jax.grad(energy), jax.hessian(energy)
+    first = jax.vmap(slopes, (1, None, None), -1)
+    both = jax.vmap(lambda *given: (slopes(*given), curvature(*given)), (1, None, None), (-1, -1))
+    return tuple(
+        jax.jit(lambda values, discrepancy, stretches, own=own: own(stretches, values, discrepancy))
+        for own in (first, both)
+    )

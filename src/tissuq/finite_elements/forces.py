@@ -56,7 +56,7 @@ def indentation_force(
         Its parameters in their order; MPa where they are moduli.
     depths : (n,) array, mm
     **sizes
-        Of `Indentation`: punch_radius, height, radius (mm), is_bonded, fineness.
+        Of `Indentation`: punch_radius, height, radius (mm), contact, fineness.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def indentation_force(
     >>> import tissuq as tq
     >>> force = tq.finite_elements.indentation_force("neo-hookean", [0.0005], [0.05, 0.1], fineness=0.5)
     >>> [round(1000 * float(each), 3) for each in force]  # mN
-    [0.387, 0.773]
+    [0.371, 0.74]
     """
     at = np.atleast_1d(np.asarray(depths, dtype=np.float64))
     return case_forces(Indentation(depth=float(at[-1]), **sizes), material, values, at)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports, length
+from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports
 from tissuq.finite_elements.grading import graded, grid
 
 __all__ = ["Indentation"]
 
 FloatArray = NDArray[np.float64]
 
-SMALLEST, GROWTH = 0.05, 1.5
+Contact = Literal["bonded", "frictionless"]
+
+SMALLEST, GROWTH = 0.05, 1.3
 """Of the cells at the punch's edge with fineness 1: their size in punch radii, and how much larger each next one is."""
 
 
@@ -24,15 +26,15 @@ SMALLEST, GROWTH = 0.05, 1.5
 class Indentation(Case):
     """Indentation by a flat rigid punch along the axis of a disc that is glued to a rigid base.
 
-    The tissue under the punch is glued to it, or slides on it without friction (``is_bonded``); which points touch the
-    punch does not change, and the rest of the surface is free.
+    The tissue under the punch sticks to it, or slides on it without friction, but not from under its edge. The rest of
+    the surface is free. Strains are singular at the edge, as under any sharp punch: a finer mesh goes less deep.
 
     Attributes
     ----------
     depth, punch_radius, height, radius : float
         In mm. The usual ones are those of tests of brain slices: a punch 1.5 mm wide, a slice 5 mm thick.
-    is_bonded : bool
-        Whether the tissue sticks to the punch.
+    contact : str
+        ``"bonded"`` or ``"frictionless"``.
     fineness : float
         Twice as fine halves all cells.
     """
@@ -41,15 +43,18 @@ class Indentation(Case):
     description: ClassVar[str] = "a flat rigid punch in a disc of tissue on a rigid base"
     travel_name: ClassVar[str] = "depth"
 
-    depth: float = length(0.4, "How deep the punch goes.")
-    punch_radius: float = length(0.75, "Radius of the punch.")
-    height: float = length(5.0, "Height of the disc.")
-    radius: float = length(7.5, "Radius of the disc.")
-    is_bonded: bool = True
+    depth: float = 0.4
+    punch_radius: float = 0.75
+    height: float = 5.0
+    radius: float = 7.5
+    contact: Contact = "bonded"
     fineness: float = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.contact not in get_args(Contact):
+            known = " or ".join(get_args(Contact))
+            raise InputError(f"case '{self.name}': contact must be {known}, not {self.contact!r}.")
         if self.depth >= self.height or self.punch_radius >= self.radius:
             raise InputError(
                 f"case '{self.name}': the depth ({self.depth:g} mm) must be less than the height ({self.height:g} mm), "
@@ -75,5 +80,6 @@ class Indentation(Case):
         near = 1e-9 * self.radius
         base = axial < near
         punch = (axial > self.height - near) & (radial < self.punch_radius + near)
-        fixed = np.stack([base, base | (radial < near) | (punch & self.is_bonded)], axis=-1)
+        sticks = punch if self.contact == "bonded" else punch & (radial > self.punch_radius - near)
+        fixed = np.stack([base, base | (radial < near) | sticks], axis=-1)
         return Supports(fixed, punch, -1.0)

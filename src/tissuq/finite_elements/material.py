@@ -67,7 +67,7 @@ class FElupeMaterial:
     def gradient(self, x: Sequence[Any]) -> list[Any]:
         """Return [P, state variables], the first Piola-Kirchhoff stress (3, 3, ...) at [F, state variables]."""
         F, shape = _points(x[0])
-        found = first_piola_kirchhoff(self.energy.derivatives, F)
+        found = first_piola_kirchhoff(self.energy.slopes, F)
         if self.bulk_modulus:
             found += volumetric_stress(self.bulk_modulus, F)
         return [(found / self.unit).reshape(3, 3, *shape), x[-1]]
@@ -83,7 +83,7 @@ class FElupeMaterial:
     def function(self, x: Sequence[Any]) -> list[Any]:
         """Return [W], the energy (...) at [F, state variables]."""
         F, shape = _points(x[0])
-        stretches = np.linalg.svd(np.moveaxis(F, -1, 0), compute_uv=False).T
+        stretches = np.asarray(np.linalg.svd(np.moveaxis(F, -1, 0), compute_uv=False).T, dtype=np.float64)
         found = self.energy(stretches) + self.bulk_modulus / 2 * (stretches.prod(axis=0) - 1) ** 2
         return [(found / self.unit).reshape(shape)]
 

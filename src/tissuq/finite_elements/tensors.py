@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 __all__ = ["first_piola_kirchhoff", "principal", "tangent", "volumetric_stress", "volumetric_tangent"]
 
 FloatArray = NDArray[np.float64]
+Slopes = Callable[[FloatArray], FloatArray]
 Derivatives = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 NEAR = 1e-5
@@ -22,16 +23,18 @@ def principal(F: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
     They are not numbers where the volume is not positive, so that a solver sees that a step was too large.
     """
-    left, stretches, right = np.linalg.svd(np.moveaxis(F, -1, 0))
-    inverted = np.linalg.det(np.moveaxis(F, -1, 0)) <= 0
-    return np.where(inverted, np.nan, stretches.T), left, np.swapaxes(right, 1, 2)
+    matrices = np.moveaxis(F, -1, 0)
+    squares, right = np.linalg.eigh(np.swapaxes(matrices, 1, 2) @ matrices)
+    with np.errstate(invalid="ignore"):
+        stretches = np.where(np.linalg.det(matrices)[:, None] > 0, np.sqrt(squares), np.nan)
+    return stretches.T, matrices @ right / stretches[:, None, :], right
 
 
-def first_piola_kirchhoff(derivatives: Derivatives, F: FloatArray) -> FloatArray:
+def first_piola_kirchhoff(slopes: Slopes, F: FloatArray) -> FloatArray:
     """Return P = sum_i w_i n_i x N_i, (3, 3, n), with w_i = dW/dl_i."""
     stretches, left, right = principal(F)
-    slopes, _ = derivatives(stretches)
-    return np.asarray(np.einsum("nai,in,nbi->abn", left, slopes, right, optimize=True))
+    found = (left * slopes(stretches).T[:, None, :]) @ np.swapaxes(right, 1, 2)
+    return np.moveaxis(found, 0, -1)
 
 
 def tangent(derivatives: Derivatives, F: FloatArray) -> FloatArray:
@@ -58,7 +61,7 @@ def tangent(derivatives: Derivatives, F: FloatArray) -> FloatArray:
             components[i, j, j, i] = components[j, i, i, j] = (a - b) / 2
     axes = np.einsum("nai,nbj->nabij", left, right).reshape(-1, 9, 9)
     full = axes @ np.moveaxis(components.reshape(9, 9, -1), -1, 0) @ np.swapaxes(axes, 1, 2)
-    return np.moveaxis(full, 0, -1).reshape(components.shape)
+    return np.asarray(np.moveaxis(full, 0, -1).reshape(components.shape))
 
 
 def _quotient(stretches: FloatArray, slopes: FloatArray, curvature: FloatArray) -> FloatArray:
@@ -66,7 +69,7 @@ def _quotient(stretches: FloatArray, slopes: FloatArray, curvature: FloatArray) 
     difference = stretches[0] - stretches[1]
     is_near = np.abs(difference) < NEAR * stretches[0]
     limit = (curvature[0, 0] + curvature[1, 1] - 2 * curvature[0, 1]) / 2
-    return np.where(is_near, limit, (slopes[0] - slopes[1]) / np.where(is_near, 1.0, difference))
+    return np.asarray(np.where(is_near, limit, (slopes[0] - slopes[1]) / np.where(is_near, 1.0, difference)))
 
 
 def volumetric_stress(bulk: float, F: FloatArray) -> FloatArray:

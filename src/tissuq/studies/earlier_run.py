@@ -13,7 +13,7 @@ from tissuq.posterior import Posterior
 from tissuq.studies.settings import RECIPE, load_settings
 from tissuq.studies.specimen import SpecimenSettings, fitted
 
-__all__ = ["load_run"]
+__all__ = ["load_run", "load_run_without"]
 
 AGREEMENT = 1e-6
 """Relative difference between the headline parameter's means in the run and fitted again that needs no word."""
@@ -63,6 +63,16 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
             stacklevel=2,
         )
     return posterior
+
+
+def load_run_without(folder: str | Path, material: Material | None = None) -> Posterior:
+    """Return the posterior without discrepancy of the measurements of a run, whether the run has one or not.
+
+    Parameters and exceptions are those of `load_run`.
+    """
+    run = Path(folder)
+    _summary(run)
+    return fitted(load_settings(SpecimenSettings, run / RECIPE, {}), "none", run, material)
 
 
 def _summary(run: Path) -> dict[str, dict[str, float]]:

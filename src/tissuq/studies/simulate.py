@@ -1,0 +1,185 @@
+"""The study of a case of finite elements with the posterior of a run: many draws at a time, and none done twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, fields
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tissuq.discrepancy import NoDiscrepancy
+from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.finite_elements.case import Case
+from tissuq.finite_elements.optional import felupe
+from tissuq.finite_elements.response import BULK_RATIO
+from tissuq.finite_elements.simulation import Simulation, simulate
+from tissuq.finite_elements.tasks import Solve, solved
+from tissuq.mechanics import Material
+from tissuq.posterior import Posterior
+from tissuq.registry import find
+from tissuq.studies.earlier_run import load_run, load_run_without
+from tissuq.studies.stream import Step, run_tasks, silent
+
+__all__ = ["Posteriors", "SimulationSettings", "SimulationStudy", "load_posteriors", "run_simulation"]
+
+
+class SimulationSettings(BaseModel):
+    """Everything that a simulation depends on.
+
+    ``sizes`` are fields of the case (mm); ``force_noise`` is in N.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    run: str
+    case: str = "indentation"
+    discrepancy: str | None = None
+    sizes: dict[str, float | str] = Field(default_factory=dict)
+    draws: int = Field(64, ge=2)
+    steps: int = Field(8, ge=1)
+    seed: int = Field(0, ge=0)
+    force_noise: float | None = Field(None, ge=0, lt=inf)
+    bulk_ratio: float = Field(BULK_RATIO, gt=0, lt=inf)
+
+    def sized_case(self) -> Case:
+        """Return the case with its sizes.
+
+        Raises
+        ------
+        InputError
+            When there is no such case or size, or a size is not possible.
+        """
+        kind = find(Case, "case", self.case, InputError)
+        known = {field.name: field.default for field in fields(kind)}
+        for name, value in self.sizes.items():
+            if name not in known:
+                usual = ", ".join(f"{each}={default}" for each, default in known.items())
+                raise InputError(f"case '{self.case}' has no size '{name}'; its sizes are {usual}.")
+            if isinstance(value, str) != isinstance(known[name], str):
+                wanted = "a word" if isinstance(known[name], str) else "a number"
+                raise InputError(f"case '{self.case}': {name} must be {wanted} like {known[name]}, not '{value}'.")
+        return kind(**self.sizes)
+
+
+@dataclass(frozen=True)
+class Posteriors:
+    """What a simulation starts from.
+
+    Attributes
+    ----------
+    given : Posterior
+        Of the run.
+    without : Posterior or None
+        Of the same measurements, fitted without discrepancy; None where the run's is without one, or this failed.
+    reason : str
+        Why it failed.
+    """
+
+    given: Posterior
+    without: Posterior | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class SimulationStudy:
+    """What was found."""
+
+    settings: SimulationSettings
+    posteriors: Posteriors
+    simulation: Simulation
+
+    @property
+    def unit(self) -> StressUnit:
+        """The unit in which the run's measurements give stresses."""
+        return stress_unit(self.posteriors.given.model.experiment.stress_unit)
+
+
+def load_posteriors(
+    settings: SimulationSettings,
+    beside: Path = Path(),
+    law: Material | None = None,
+    step: Callable[[str], None] = lambda text: None,
+) -> Posteriors:
+    """Return the posterior of the run, and that of the same measurements without discrepancy.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    beside : Path
+        Where the run folder lies, unless it is absolute.
+    law : Material, optional
+        The material, where the run's is a law in a file.
+    step : callable
+        Told what is being done.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When the run cannot be used.
+    """
+    run = beside / settings.run
+    step("the posterior of the run")
+    given = load_run(run, settings.discrepancy, law)
+    if given.model.discrepancy.name == NoDiscrepancy.name:
+        return Posteriors(given)
+    step("the fit without discrepancy")
+    try:
+        return Posteriors(given, load_run_without(run, law))
+    except (ConvergenceError, ModelError) as error:
+        return Posteriors(given, reason=f"Without discrepancy the run's measurements cannot be fitted: {error}")
+
+
+def run_simulation(
+    settings: SimulationSettings,
+    posteriors: Posteriors,
+    folder: Path,
+    *,
+    prepare: Callable[[], None] = lambda: None,
+    pool: Executor | None = None,
+    progress: Callable[[int], AbstractContextManager[Step]] = lambda total: nullcontext(silent),
+) -> SimulationStudy:
+    """Compute the case with draws of a posterior; those in ``folder`` are not computed again.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    posteriors : Posteriors
+    folder : Path
+        Exists, or `prepare` makes it; holds the results so far, if any.
+    prepare : callable
+        Called when it is certain that there is something to compute.
+    pool : Executor, optional
+        From `tissuq.studies.stream.open_pool`.
+    progress : callable
+        Gives, for a number of tasks, a context with the function that is told of each.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When the settings cannot be used, FElupe is not installed, or hardly any draw gets anywhere.
+    """
+    felupe()
+
+    def carried_out(tasks: Sequence[Solve]) -> Sequence[dict[str, Any]]:
+        prepare()
+        with progress(len(tasks)) as step:
+            return run_tasks(tasks, solved, folder, pool=pool, step=step)
+
+    simulation = simulate(
+        posteriors.given,
+        settings.sized_case(),
+        settings.draws,
+        without=posteriors.without,
+        steps=settings.steps,
+        seed=settings.seed,
+        force_noise=settings.force_noise,
+        bulk_ratio=settings.bulk_ratio,
+        run=carried_out,
+    )
+    return SimulationStudy(settings, posteriors, simulation)
