@@ -20,13 +20,13 @@ def simulate(
     run: Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")] = None,
     case: Annotated[
         str | None,
-        typer.Option(help="indentation (a flat punch in a disc) or bar (clamped, in tension) [indentation]."),
+        typer.Option(help="indentation (flat punch, disc) or bar (clamped, in tension) [indentation]."),
     ] = None,
     size: Annotated[
         list[str] | None,
         typer.Option(
-            help="Size of the case in mm, NAME=VALUE; repeat for more. Indentation: depth, punch_radius, height, radius, "
-            "contact=bonded|frictionless, fineness; bar: elongation, bar_length, bar_radius, fineness."
+            help="Size of the case in mm, NAME=VALUE; repeat for more. Indentation: depth, punch_radius, height, "
+            "radius, contact=bonded|frictionless, fineness; bar: elongation, bar_length, bar_radius, fineness."
         ),
     ] = None,
     discrepancy: Annotated[
@@ -36,9 +36,7 @@ def simulate(
     steps: Annotated[int | None, typer.Option(help="Steps at which the force is told [8].")] = None,
     force_noise: Annotated[
         float | None,
-        typer.Option(
-            help="Sd of a new measurement of the force, N [as large a share of it as the test's of its stress]."
-        ),
+        typer.Option(help="Sd of a new measurement of the force, N [the share that the test's has in its stress]."),
     ] = None,
     bulk_ratio: Annotated[float | None, typer.Option(help="Bulk modulus in initial shear moduli [2000].")] = None,
     material: Annotated[

@@ -35,7 +35,7 @@ class ClampedBar(Case):
     description: ClassVar[str] = "a round bar glued to two plates, in tension"
     travel_name: ClassVar[str] = "elongation"
 
-    elongation: float = 1.5
+    elongation: float = 1.0
     bar_length: float = 10.0
     bar_radius: float = 2.5
     fineness: float = 1.0

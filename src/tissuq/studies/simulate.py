@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tissuq.discrepancy import NoDiscrepancy
 from tissuq.errors import ConvergenceError, InputError, ModelError
-from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.finite_elements.case import Case
+from tissuq.finite_elements.cautions import simulation_warnings
 from tissuq.finite_elements.optional import felupe
 from tissuq.finite_elements.response import BULK_RATIO
 from tissuq.finite_elements.simulation import Simulation, simulate
@@ -95,9 +95,9 @@ class SimulationStudy:
     simulation: Simulation
 
     @property
-    def unit(self) -> StressUnit:
-        """The unit in which the run's measurements give stresses."""
-        return stress_unit(self.posteriors.given.model.experiment.stress_unit)
+    def warnings(self) -> list[str]:
+        """What a reader must know of the result."""
+        return simulation_warnings(self.simulation) + [self.posteriors.reason] * bool(self.posteriors.reason)
 
 
 def load_posteriors(
