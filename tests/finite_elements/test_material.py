@@ -10,7 +10,7 @@ from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements import FElupeMaterial
 from tissuq.finite_elements.distortional import distortional_energy
-from tissuq.mechanics import Material, engineering_stress, material_named
+from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus, material_named
 from tissuq.parameters import Parameter
 
 BULK = 3.0
@@ -122,8 +122,6 @@ def test_arrays_have_the_shape_of_quadrature_points_and_cells():
 
 def test_the_initial_shear_modulus_is_that_of_the_material(draws):
     for name, values in LAWS.items():
-        from tissuq.mechanics import initial_shear_modulus
-
         law = material_named(name)
         assert distortional_energy(law, values).initial_shear_modulus == pytest.approx(
             initial_shear_modulus(law, values), rel=1e-10
@@ -179,7 +177,13 @@ PAIRS = [  # a name and values here, a function and its arguments in FElupe, and
     ("neo-hookean", [0.7], "neo_hooke", {"mu": 1.4}, 1e-12),
     ("mooney-rivlin", [0.7, 0.2], "mooney_rivlin", {"C10": 0.7, "C01": 0.2}, 1e-12),
     ("yeoh", [0.7, -0.1, 0.02], "yeoh", {"C10": 0.7, "C20": -0.1, "C30": 0.02}, 1e-12),
-    ("ogden-2", [0.7, 0.2, 3.1, -2.3], "ogden", {"mu": [0.7, 0.2], "alpha": [3.1, -2.3]}, 1e-6),  # FElupe shifts equal roots
+    (
+        "ogden-2",
+        [0.7, 0.2, 3.1, -2.3],
+        "ogden",
+        {"mu": [0.7, 0.2], "alpha": [3.1, -2.3]},
+        1e-6,
+    ),  # FElupe shifts equal roots
 ]
 
 
@@ -203,10 +207,10 @@ def test_the_volumetric_part_is_that_of_felupe():
 
 
 def cube(felupe, make, stretch):
-    """A cube pulled along x in FElupe: the field, the solid, and the load case."""
+    """A cube pulled along x in FElupe: the solid, its boundaries, and the load case."""
     field = felupe.FieldContainer([felupe.Field(felupe.RegionHexahedron(felupe.Cube(n=2)), dim=3)])
     boundaries, case = felupe.dof.uniaxial(field, move=stretch - 1, clamped=False, return_loadcase=True)
-    return field, make(field), boundaries, case
+    return make(field), boundaries, case
 
 
 def test_a_cube_under_tension_has_the_engineering_stress_of_its_draw(draws):
@@ -214,7 +218,7 @@ def test_a_cube_under_tension_has_the_engineering_stress_of_its_draw(draws):
     modulus = distortional_energy(draws[0]).initial_shear_modulus
     for stretch in (0.85, 1.2):
         umat = FElupeMaterial(draws[0], 1e5 * modulus, unit=modulus)
-        field, solid, boundaries, case = cube(felupe, lambda field, umat=umat: felupe.SolidBody(umat, field), stretch)
+        solid, boundaries, case = cube(felupe, lambda field, umat=umat: felupe.SolidBody(umat, field), stretch)
         felupe.newtonraphson(items=[solid], verbose=0, **case)
         force = felupe.tools.force(solid.field, solid.results.force, boundaries["move"])[0] * modulus
         expected = engineering_stress(draws[0], loading_mode("uniaxial"), [stretch], ())[0]

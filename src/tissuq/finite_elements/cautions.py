@@ -41,7 +41,7 @@ def _failed(found: Simulation) -> list[str]:
         texts.append(
             f"{count} of {len(found.forces[family])} {FAMILIES[family]} did not get to the full {name} of "
             f"{found.case.travel:.3g} mm ({named}{more}; first reason: {own[0].problem}). Every step is told of the "
-            "draws that got there, which are no longer a fair sample: softening draws tend to end first."
+            "draws that got there, which may no longer be a fair sample."
         )
     return texts
 

@@ -26,8 +26,9 @@ SMALLEST, GROWTH = 0.05, 1.3
 class Indentation(Case):
     """Indentation by a flat rigid punch along the axis of a disc that is glued to a rigid base.
 
-    The tissue under the punch sticks to it, or slides on it without friction, but not from under its edge. The rest of
-    the surface is free. Strains are singular at the edge, as under any sharp punch: a finer mesh goes less deep.
+    The tissue under the punch sticks to it, or slides on it without friction; which points touch it does not change, so
+    that without friction the punch must not go deep. The rest of the surface is free. Strains are singular at the edge,
+    as under any sharp punch: a finer mesh goes less deep.
 
     Attributes
     ----------
@@ -80,6 +81,6 @@ class Indentation(Case):
         near = 1e-9 * self.radius
         base = axial < near
         punch = (axial > self.height - near) & (radial < self.punch_radius + near)
-        sticks = punch if self.contact == "bonded" else punch & (radial > self.punch_radius - near)
+        sticks = punch & (self.contact == "bonded")
         fixed = np.stack([base, base | (radial < near) | sticks], axis=-1)
         return Supports(fixed, punch, -1.0)

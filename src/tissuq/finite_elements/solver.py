@@ -22,10 +22,12 @@ HALVINGS = 6
 """How often a load step is halved before a material is given up."""
 TOLERANCE = 1e-8
 """Of the residual, relative to the reaction forces."""
+ROUNDED = 1e-6
+"""The same, where rounding keeps it from becoming smaller: of a small load on a nearly incompressible body."""
 ITERATIONS = 20
 SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
 """Of a Newton step, the largest of which is taken that is not too bad."""
-GROWN = 5.0
+GROWN = 1.5
 """How much larger the residual may become in a step: on the way to a solution it need not always fall."""
 
 
@@ -91,12 +93,9 @@ class Solver:
         whole = step = target - self.reached
         while self.reached < target:
             goal = min(self.reached + step, target) if step < whole else target
-            state = self._state()
-            found, problem = self._equilibrium(self._guess(goal), goal)
-            if found is not None:
-                self._path = [self._path[-1], (goal, found)]
+            problem = self._attempt(goal)
+            if not problem:
                 continue
-            self._restore(state)
             if step <= whole / 2**HALVINGS:
                 return f"{problem}, also with load steps of {step:.2g} mm"
             step /= 2
@@ -139,7 +138,18 @@ class Solver:
         J = np.linalg.det(matrices)
         return F, J, (np.linalg.svd(matrices, compute_uv=False) / J[..., None] ** (1 / 3)) ** 2
 
-    def _guess(self, goal: float) -> FloatArray:
+    def _attempt(self, goal: float) -> str:
+        """Add the equilibrium at a travel to the path, from the last one or from where the last two point."""
+        state, problem = self._state(), ""
+        for guess in (self._path[-1][1], self._further(goal)):
+            found, problem = self._equilibrium(guess, goal)
+            if found is not None:
+                self._path = [self._path[-1], (goal, found)]
+                return ""
+            self._restore(state)
+        return problem
+
+    def _further(self, goal: float) -> FloatArray:
         """Return displacements on the straight line through the last two equilibria."""
         now, u = self._path[-1]
         before, earlier = self._path[0]
@@ -161,11 +171,19 @@ class Solver:
             right = -residual[self._free] - tangent[:, self._held] @ change[self._held]
             change[self._free] = spsolve(tangent[:, self._free].tocsc(), right)
             self.iterations += 1
+            before = residual
             u, residual = self._step(u, residual, change.reshape(u.shape), shares)
             shares = SHARES
-            if np.linalg.norm(residual[self._free]) < TOLERANCE * np.linalg.norm(residual[self._held]):
+            if self._is_balanced(residual, before):
                 return u, ""
         return None, f"Newton's method did not converge in {ITERATIONS} iterations"
+
+    def _is_balanced(self, residual: FloatArray, before: FloatArray) -> bool:
+        """Whether a residual is small, or nearly so and, by rounding, no smaller than the one before."""
+        free, held, last = (
+            float(np.linalg.norm(each)) for each in (residual[self._free], residual[self._held], before[self._free])
+        )
+        return free < TOLERANCE * held or last / 2 < free < ROUNDED * held
 
     def _step(
         self, u: FloatArray, residual: FloatArray, change: FloatArray, shares: Sequence[float]
