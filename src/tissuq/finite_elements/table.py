@@ -45,7 +45,8 @@ def force_table(
     -------
     pandas.DataFrame
         The travel; draws that got there; mean, sd, low and high (N); the shares of the variance of a new measurement;
-        the same of the draws alone and of the fit without discrepancy, with the prefixes ``alone_``, ``without_``.
+        the sd of what the discrepancy adds (``discrepancy_sd``); and the band of the draws alone and of the fit without
+        discrepancy, with the prefixes ``alone_`` and ``without_``.
     """
     import pandas as pd
 
@@ -56,6 +57,7 @@ def force_table(
         row["draws"] = int(there.sum())
         if row["draws"] > 1:
             row |= _with_errors(complete[there, place], alone[there, place], noise_sd)
+            row["discrepancy_sd"] = float((complete - alone)[there, place].std(ddof=1))
         for name, values in (("alone", alone[there, place]), ("without", _there(without, place))):
             if len(values) > 1:
                 row |= {f"{name}_{key}": float(getattr(band_of(values[:, None]), key)[0]) for key in BAND}

@@ -98,20 +98,33 @@ def _from_zero(values: Any) -> FloatArray:
 
 
 def _shares(found: Simulation, table: pd.DataFrame) -> Figure:
+    """Draw the shares of the variance, and the standard deviations of the parts that they are made of."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.4, 3.7))
-    axis = figure.subplots()
+    figure = Figure(figsize=(9.6, 3.9))
+    axis, parts = figure.subplots(1, 2)
     at = table[f"{found.case.travel_name}_mm"].to_numpy()
     axis.axhline(0, color=INK, lw=0.8)
     for name, color in SHARES.items():
         share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
         axis.fill_between(at, share - error, share + error, color=color, alpha=0.2, lw=0)
         axis.plot(at, share, "o-", color=color, lw=1.6, ms=3.5, label=name)
-    axis.set_xlim(0, found.case.travel * 1.02)
-    axis.set_xlabel(f"{found.case.travel_name} [mm]")
-    axis.set_ylabel("share of the variance of the force [%]")
-    axis.legend(fontsize=9, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    axis.set_title("Share of the variance [%]")
+    unit, factor = force_unit(table)
+    sizes = {
+        "force of a draw": (table["sd"], INK, "-"),
+        "of its parameters alone": (table["alone_sd"], BAND, "--"),
+        "what the discrepancy adds": (table["discrepancy_sd"], TRUTH, "--"),
+        "noise": (np.full(len(at), found.noise_sd), BASE, "--"),
+    }
+    for label, (sd, color, line) in sizes.items():
+        parts.plot(at, factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
+    parts.set_title(f"Standard deviation between draws [{unit}]")
+    parts.set_ylim(0)
+    for panel in (axis, parts):
+        panel.set_xlim(0, found.case.travel * 1.02)
+        panel.set_xlabel(f"{found.case.travel_name} [mm]")
+        panel.legend(fontsize=9)
     return figure
 
 
