@@ -136,7 +136,7 @@ def _fields(found: Simulation) -> Figure:
     deformed = mesh.points + found.fields["displacement"].mean(axis=0)
     corners = deformed[mesh.cells]
     limits = _limits(corners, largest.mean(axis=0) - 1)
-    height = 4.6 * min(1.1, max(0.3, limits[3] - limits[2]) / (limits[1] - limits[0])) + 1.3
+    height = 3.8 * min(1.1, max(0.3, limits[3] - limits[2]) / (limits[1] - limits[0])) + 1.3
     figure = Figure(figsize=(10.4, height))
     for axis, values, title, colors in zip(
         figure.subplots(1, 2), (largest.mean(axis=0), largest.std(axis=0, ddof=1)),
