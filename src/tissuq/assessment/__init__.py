@@ -1,6 +1,7 @@
 """To what extent a model is wrong, and what the answer rests on."""
 
 from tissuq.assessment.averaging import Average, average
+from tissuq.assessment.candidates import Candidate
 from tissuq.assessment.comparison import compare
 from tissuq.assessment.design import design_warnings
 from tissuq.assessment.extent import Assessment, assess
@@ -9,6 +10,7 @@ from tissuq.assessment.sensitivity import PowerScaling, known_evidence_changes
 __all__ = [
     "Assessment",
     "Average",
+    "Candidate",
     "PowerScaling",
     "assess",
     "average",
