@@ -87,7 +87,12 @@ def simulated(case: Case, count: int, seed: int) -> tuple[float, float, float, f
     variances = np.array([_sd(posterior, case.target) ** 2 for posterior in after]) / asked.now[0] ** 2
     error = variances.std(ddof=1) / np.sqrt(count)
     found = np.sqrt(variances.mean())
-    return float(expected.after[0] / expected.now[0]), float(expected.error[0]), float(found), float(error / (2 * found))
+    return (
+        float(expected.after[0] / expected.now[0]),
+        float(expected.error[0]),
+        float(found),
+        float(error / (2 * found)),
+    )
 
 
 def _sd(posterior: tq.Posterior, target: str) -> float:

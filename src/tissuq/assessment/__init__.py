@@ -5,6 +5,7 @@ from tissuq.assessment.candidates import Candidate
 from tissuq.assessment.comparison import compare
 from tissuq.assessment.design import design_warnings
 from tissuq.assessment.extent import Assessment, assess
+from tissuq.assessment.ranking import rank_tests
 from tissuq.assessment.sensitivity import PowerScaling, known_evidence_changes
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "compare",
     "design_warnings",
     "known_evidence_changes",
+    "rank_tests",
 ]

@@ -14,7 +14,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.mechanics import Material
 from tissuq.mechanics.path import farthest_stretch, invariants
 
-__all__ = ["BEYOND", "Candidate", "candidate_named", "reach_of", "usual_candidates"]
+__all__ = ["BEYOND", "Candidate", "candidate_named", "farthest_range", "reach_of", "usual_candidates"]
 
 FloatArray = NDArray[np.float64]
 
@@ -65,8 +65,7 @@ class Candidate:
                 f"mode '{mode.name}' sets {len(mode.controls)} controls; a test to come has one: choose another mode."
             )
         points = checked_points(mode, stretch)
-        low, high = points.min(), points.max()
-        usual = f"{mode.name} {low:.4g} to {high:.4g}, {len(points)} point{'s' * (len(points) > 1)}"
+        usual = _name(mode, float(points.min()), float(points.max()), len(points))
         for field, value in (("mode", mode), ("stretch", points), ("name", name or usual), ("is_repeat", is_repeat)):
             object.__setattr__(self, field, value)
 
@@ -88,7 +87,8 @@ def candidate_named(text: str) -> Candidate:
         low, high, count = 0.0, 0.0, 0
     if count < 1 or not -np.inf < low < high < np.inf:
         raise InputError(
-            f"'{text}' is no test; write MODE LOW:HIGH POINTS, as in 'planar 1:1.5 20' (stretches, or amounts of shear)."
+            f"'{text}' is no test; write MODE LOW:HIGH POINTS, as in 'planar 1:1.5 20' (stretches, or amounts of "
+            "shear)."
         )
     return Candidate(mode, np.linspace(low, high, count) if count > 1 else [high])
 
@@ -118,7 +118,7 @@ def usual_candidates(
         if len(mode.controls) == len(mode.stresses) == 1 and is_known and not _why_not(material, mode):
             for low, high in _ranges(data, mode):
                 for count in counts:
-                    yield Candidate(mode, _spread(mode, low, high, count))
+                    yield Candidate(mode, _spread(mode, low, high, count), _name(mode, low, high, count))
 
 
 def reach_of(data: Experiment, mode: LoadingMode, points: FloatArray) -> FloatArray:
@@ -128,20 +128,31 @@ def reach_of(data: Experiment, mode: LoadingMode, points: FloatArray) -> FloatAr
     return np.asarray(np.max([own / end for each in reached for own, end in zip(each, most, strict=True)], axis=0))
 
 
+def _name(mode: LoadingMode, low: float, high: float, count: int) -> str:
+    return f"{mode.name} {low:.4g} to {high:.4g}, {count} point{'s' * (count > 1)}"
+
+
+def farthest_range(data: Experiment, mode: LoadingMode, factor: float) -> tuple[float, float]:
+    """Return the range of a mode's control in which I1 - 3 and I2 - 3 are at most so many times what was measured."""
+    most, rest = [factor * float(each.max()) for each in invariants(data.mode, data.stretch)], float(mode.reference)
+    low, high = (_rounded(farthest_stretch(mode, most, sign), rest) for sign in (-1, 1))
+    return low, high
+
+
 def _repeats(data: Experiment) -> Iterator[Candidate]:
     parts = [part for part in data.parts if len(part.mode.controls) == 1]
     for part in parts:
         for times, words in REPEATS.items():
-            which = f": {part.name}" if len(parts) > 1 else ""
-            yield Candidate(part.mode, np.tile(part.stretch, times), words + which, is_repeat=True)
+            which = f" ({part.name})" if len(parts) > 1 else ""
+            name = f"{words}{which}, {times * len(part)} points"
+            yield Candidate(part.mode, np.tile(part.stretch, times), name, is_repeat=True)
 
 
 def _ranges(data: Experiment, mode: LoadingMode) -> Iterator[tuple[float, float]]:
     """Yield ranges of a mode's control; of shear on one side only, as the other one is the same."""
-    most, rest = [float(each.max()) for each in invariants(data.mode, data.stretch)], float(mode.reference)
+    rest = float(mode.reference)
     for factor in (1.0, BEYOND):
-        low, high = (farthest_stretch(mode, [factor * each for each in most], sign) for sign in (-1, 1))
-        low, high = _rounded(low, rest), _rounded(high, rest)
+        low, high = farthest_range(data, mode, factor)
         yield rest, high
         if rest:
             yield low, rest

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.candidates import Candidate, reach_of
+from tissuq.assessment.candidates import Candidate, farthest_range, reach_of
 from tissuq.assessment.expected_variance import GaussianMixture, expected_variances
 from tissuq.assessment.targets import Target
 from tissuq.errors import InputError, ModelError
@@ -30,7 +30,7 @@ Specimen = Literal["same", "other"]
 """Of which specimen a test to come is: the one of the data, or another one."""
 BATCHES, COMPONENTS, OUTCOMES = 8, 400, 7
 """Independent batches, whose spread tells the error; components of each, and the power of two of its outcomes."""
-FEW = 20.0
+FEW = 10.0
 """Effective number of components after the test below which what is expected is rough."""
 FARTHEST = 2.0
 """Times as far as the data, in I1 - 3 and I2 - 3, beyond which an energy discrepancy has no size to reckon with."""
@@ -221,7 +221,7 @@ class NextTest:
         _, rows = points_together(model, [(candidate.mode, points)])
         variance = model.noise_variance(values, np.abs(curve)) * model.relative_noise(rows) ** 2
         found = variance + _scatter(model, parts)[:, None] ** 2
-        return np.sqrt(np.broadcast_to(found, (len(parts.weights), len(curve))))
+        return np.asarray(np.sqrt(np.broadcast_to(found, (len(parts.weights), len(curve)))))
 
     def _errors_of_specimen(
         self, test: Experiment, curve: FloatArray, mean: FloatArray, target_mean: FloatArray
@@ -248,15 +248,17 @@ class NextTest:
         if (not is_known or model.is_correlated) and candidate.mode not in data.modes:
             names = ", ".join(mode.name for mode in data.modes)
             raise InputError(
-                f"{what}: discrepancy '{model.discrepancy.name}' is an error of the {names} stress and another, unknown "
-                f"one of the {candidate.mode.name} stress: choose mode {names}, or a posterior with an energy, such as "
-                "'auto'."
+                f"{what}: discrepancy '{model.discrepancy.name}' is an error of the {names} stress and another, "
+                f"unknown one of the {candidate.mode.name} stress: choose mode {names}, or a posterior with an energy, "
+                "such as 'auto'."
             )
         reach = float(reach_of(data, candidate.mode, candidate.stretch).max())
         if model.energy_symbols and reach > FARTHEST:
+            low, high = farthest_range(data, candidate.mode, FARTHEST)
             raise InputError(
-                f"{what} reaches {reach:.2g} times as far as the data in I1 - 3 or I2 - 3; beyond {FARTHEST:g} times the "
-                "discrepancy may be of any size, so that nothing can be expected: choose a narrower range."
+                f"{what} reaches {reach:.2g} times as far as the data in I1 - 3 or I2 - 3; beyond {FARTHEST:g} times "
+                "the discrepancy may be of any size, so that nothing can be expected: choose a range within "
+                f"{low:g} to {high:g}."
             )
 
 
@@ -293,12 +295,12 @@ def _scatter(model: StatisticalModel, parts: Components) -> FloatArray:
     if model.is_repeated:
         return np.zeros(len(parts.weights))
     values: Mapping[str, FloatArray] = dict(zip(model.nonlinear, parts.settings.T, strict=True))
-    return np.sqrt(np.broadcast_to(model.discrepancy.independent_variance(values), len(parts.weights)))
+    return np.asarray(np.sqrt(np.broadcast_to(model.discrepancy.independent_variance(values), len(parts.weights))))
 
 
 def _few(points: FloatArray) -> tuple[FloatArray, float]:
     """Return few points (n,) that stand for many, and their number over that of all."""
     if len(points) <= MOST_POINTS:
         return points, 1.0
-    chosen = np.sort(points)[np.linspace(0, len(points) - 1, MOST_POINTS).round().astype(int)]
+    chosen = np.sort(points)[((np.arange(MOST_POINTS) + 0.5) / MOST_POINTS * len(points)).astype(int)]
     return chosen, MOST_POINTS / len(points)

@@ -35,22 +35,37 @@ def rank_tests(
     seed: int = 0,
     step: Callable[[str], None] = lambda text: None,
 ) -> pd.DataFrame:
-    """Return candidates for the next test, best first for each target; `Posterior.design` says what the columns are.
+    """Return candidates for the next test, best first for each target.
 
     Parameters
     ----------
     solution : Solution
     candidates : sequence of str or Candidate
-        The usual ones (`usual_candidates`) where there are none; those of the data again are always among them.
+        The usual ones (`usual_candidates`) where there are none; the tests of the data again are always among them.
     targets : sequence of str or Target
         The initial shear modulus where there are none.
     points : sequence of int
-        Numbers of measurements of the usual candidates.
+        Numbers of measurements of the usual candidates; one like that of the data where there are none.
     specimen : str, optional
-        ``"same"`` or ``"other"``.
+        ``"same"`` or ``"other"``: a test of the specimen of the data, or of another one whose stresses differ as the
+        posterior's tolerances say, or by 18 %. The same, unless the data are of several specimens.
     seed : int
+        Of the outcomes that are drawn.
     step : callable
         Told the name of each candidate when its turn comes.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each target and candidate.
+
+        - target, unit (MPa or nothing), candidate, mode, low, high (the range of stretches), points.
+        - sd_now, sd_after: standard deviation of the target now, and the root of the expected variance after the test.
+        - reduction: 1 - sd_after / sd_now; error: its standard error by simulation, zero in closed form.
+        - beyond: share of the measurements at which I1 or I2 is larger than in the data.
+        - stable: probability that the material is stable over the range; nan where that is not told.
+        - is_repeat: whether it is a test of the data again; is_rough: whether few components of the posterior would be
+          left, so that the numbers are not to be trusted; note: all this in words, or why there are no numbers.
 
     Raises
     ------
@@ -90,8 +105,8 @@ def _rows(asked: NextTest, candidate: Candidate, stable: float, *, is_asked: boo
         found, problem = None, str(error)
     model = asked.model
     beyond = float((reach_of(model.experiment, candidate.mode, candidate.stretch) > WITHIN).mean())
-    notes = [f"{beyond:.0%} of it beyond the data"] * (beyond > 0)
-    notes += [f"stable so far with {stable:.0%}"] * (stable < 1 - LOST)
+    notes = [f"{beyond:.0%} beyond the data"] * (beyond > 0)
+    notes += [f"stable up to there: {stable:.0%}"] * (stable < 1 - LOST)
     notes += [ROUGH] * (found is not None and found.is_rough) + [problem] * bool(problem)
     rows = []
     for place, target in enumerate(asked.targets):

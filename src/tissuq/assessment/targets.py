@@ -148,5 +148,7 @@ def target_named(text: str | Target, model: StatisticalModel) -> Target:
     try:
         value = float(stretch)
     except ValueError:
-        raise InputError(f"target '{text}': '{stretch}' is no stretch; write MODE:STRETCH, such as planar:1.5.") from None
+        raise InputError(
+            f"target '{text}': '{stretch}' is no stretch; write MODE:STRETCH, such as planar:1.5."
+        ) from None
     return StressTarget(mode, float(checked_points(mode, [value])[0]))

@@ -83,12 +83,12 @@ class Member:
         return [block.stress_variance(mode, stretch, reach, length) for block, reach, length in parts]
 
     def wide_features(self, mode: Path, stretch: FloatArray) -> list[tuple[FloatArray, int]]:
-        """Return of each block the stresses (n, q) of its terms at any stretches, and how many r of them serve the data.
+        """Return of each block the stresses (n, q) of its terms at any stretches, and how many of them serve the data.
 
-        The first r are the `stress_features`; the others are what beyond the data nothing is known of.
+        The latter come first and are the `stress_features`; the others are what beyond the data nothing is known of.
         """
         (first, second), (logs, rates) = invariant_rates(mode, stretch), log_stretches(mode, stretch)
-        at = Coordinates(*(np.maximum(each, 0.0) for each in invariants(mode, stretch)), logs.ravel())
+        at = Coordinates(*invariants(mode, stretch), logs.ravel())
         return [
             (
                 own.first * first[:, None]

@@ -37,9 +37,7 @@ def points_together(
     if not isinstance(data, JointExperiment) and all(mode == data.mode for mode, _ in every):
         return data.mode, np.concatenate([points for _, points in every])
     rows = [
-        data.along(mode, points, channel)[1]
-        if isinstance(data, JointExperiment)
-        else rows_along(path, points, -1)
+        data.along(mode, points, channel)[1] if isinstance(data, JointExperiment) else rows_along(path, points, -1)
         for mode, points in every
         for channel, path in enumerate(mode.channels)
     ]
