@@ -47,8 +47,8 @@ def test_two_parameters_have_the_closed_form_of_least_squares():
     data = tq.simulate("mooney-rivlin", truth, STRETCH, NOISE, seed=1)
     posterior = tq.fit(data, material="mooney-rivlin", discrepancy="none", noise_sd=NOISE)
 
-    def design(l):  # uniaxial: closed forms of C10 = 1 and C01 = 1
-        return np.column_stack([2 * (l - l**-2), 2 * (1 - l**-3)])
+    def design(stretch):  # uniaxial: closed forms of C10 = 1 and C01 = 1
+        return np.column_stack([2 * (stretch - stretch**-2), 2 * (1 - stretch**-3)])
 
     new = np.array([0.6, 0.7, 0.8])
     X, Z, sums = design(STRETCH), design(new), np.array([2.0, 2.0])
@@ -59,21 +59,21 @@ def test_two_parameters_have_the_closed_form_of_least_squares():
 
 
 def test_many_measurements_are_stood_for_by_few(known):
-    l = np.linspace(0.8, 1.3, 3000)
-    x, z = neo_hooke("uniaxial", STRETCH), neo_hooke("uniaxial", l)
-    found = asked_of(known, "C10").expected(tq.Candidate("uniaxial", l))
+    many = np.linspace(0.8, 1.3, 3000)
+    x, z = neo_hooke("uniaxial", STRETCH), neo_hooke("uniaxial", many)
+    found = asked_of(known, "C10").expected(tq.Candidate("uniaxial", many))
     assert found.after[0] == pytest.approx(NOISE / np.sqrt(x @ x + z @ z), rel=2e-3)
 
 
 @pytest.mark.parametrize("zero", [0.0, 0.05])
 def test_another_specimen_has_errors_of_its_own(zero):
     # y = (1 + e) C10 x + z + noise, e of 18 % and z of some MPa for each specimen; the tissue's C10 is wanted.
-    l, share = np.array([1.1, 1.3]), 0.18
+    new, share = np.array([1.1, 1.3]), 0.18
     tolerances = tq.Tolerances(stress=share, zero=zero)
     posterior = tq.fit(data_of()[0], discrepancy="none", noise_sd=NOISE, tolerances=tolerances)
-    first, second = 0.5 * neo_hooke("uniaxial", STRETCH), 0.5 * neo_hooke("planar", l)
-    found = asked_of(posterior, "C10").expected(tq.Candidate("planar", l))
-    X = np.zeros((len(STRETCH) + len(l), 5))  # C10, e and z of the first specimen, of the second, to first order
+    first, second = 0.5 * neo_hooke("uniaxial", STRETCH), 0.5 * neo_hooke("planar", new)
+    found = asked_of(posterior, "C10").expected(tq.Candidate("planar", new))
+    X = np.zeros((len(STRETCH) + len(new), 5))  # C10, e and z of the first specimen, of the second, to first order
     X[: len(STRETCH), :3] = np.column_stack([2 * first, first, np.ones(len(first))])
     X[len(STRETCH) :, [0, 3, 4]] = np.column_stack([2 * second, second, np.ones(2)])
     prior = np.diag([0, *[share**-2, max(zero, 1e-9) ** -2] * 2])

@@ -136,7 +136,8 @@ def _lead(study: DesignStudy) -> list[str]:
         if not len(best):
             continue
         row = best.iloc[0]
-        words = f"{target.title(study.posterior.model)}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}"
+        title = target.title(study.posterior.model)
+        words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}"
         if len(again):
             usual = again.iloc[-1]
             words += f"; {usual['candidate']}, by {usual['reduction']:.0%}"
