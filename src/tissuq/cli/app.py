@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, fit, inspect, paper, population, show, study
+from tissuq.cli import catalogue, check, compare, export, fit, inspect, paper, population, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -27,6 +27,7 @@ app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
 app.command("population")(population.population)
 app.command("compare")(compare.compare)
+app.command("export")(export.export)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)
 app.command("modes")(catalogue.modes)
