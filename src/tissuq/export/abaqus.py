@@ -21,15 +21,13 @@ PER_LINE = 8
 
 def _forms(highest: int, most: int) -> tuple[Form, ...]:
     """Return the forms of polynomials up to an order and of Ogden sums up to a number of terms."""
-    named = (
+    orders = range(2, highest + 1)
+    reduced = [PolynomialForm(f"REDUCED POLYNOMIAL, N={n}", "sum of C_i0 (I1 - 3)^i", reduced_terms(n)) for n in orders]
+    reduced[1] = PolynomialForm("YEOH", "C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3", reduced_terms(3))
+    return (
         PolynomialForm("NEO HOOKE", "C10 (I1 - 3)", ("C10",)),
         PolynomialForm("MOONEY-RIVLIN", "C10 (I1 - 3) + C01 (I2 - 3)", ("C10", "C01")),
-        PolynomialForm("YEOH", "C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3", reduced_terms(3)),
-    )
-    orders = range(2, highest + 1)
-    return (
-        *named,
-        *(PolynomialForm(f"REDUCED POLYNOMIAL, N={n}", "sum of C_i0 (I1 - 3)^i", reduced_terms(n)) for n in orders),
+        *reduced,
         *(PolynomialForm(f"POLYNOMIAL, N={n}", POLYNOMIAL, full_terms(n)) for n in orders),
         *(OgdenForm(f"OGDEN, N={n}", OGDEN, n, n, lambda mu, alpha: mu) for n in range(1, most + 1)),
     )
