@@ -175,7 +175,7 @@ class FECode(CardFormat):
             return
         yield "PROJECTION: the card is the nearest of its form; relative error of stress, largest and root mean square:"
         for name, each in apart.items():
-            yield f"    {_place(name)}: {np.abs(each).max():.2%}, {np.sqrt((each**2).mean()):.2%}"
+            yield f"    {_place(name)}: {_percent(np.abs(each).max())}, {_percent(np.sqrt((each**2).mean()))}"
         if not is_stable:
             yield "    CAUTION: the card is NOT stable over the whole calibrated range"
 
@@ -193,7 +193,7 @@ class FECode(CardFormat):
             f"The draws' own law has no card in {self.name}, so every card is the nearest {told.form.keyword}: its "
             "stresses differ from the draw's in the calibrated range by (root mean square; largest, of all draws) "
             + "; ".join(
-                f"{_place(name)} {np.sqrt((each**2).mean()):.2%}, {np.abs(each).max():.1%}"
+                f"{_place(name)} {_percent(np.sqrt((each**2).mean()))}, {_percent(np.abs(each).max())}"
                 for name, each in told.apart.items()
             )
             + ". Every file and the index say it draw by draw."
@@ -223,3 +223,7 @@ def _errors(apart: Mapping[str, FloatArray]) -> dict[str, float]:
 
 def _place(name: str) -> str:
     return "in any measured state" if name == "states" else name
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %"

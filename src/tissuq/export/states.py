@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.assessment.stability import stable_draws
 from tissuq.ensemble import Ensemble
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, SimpleShear, loading_modes
-from tissuq.mechanics.arithmetic import exp
+from tissuq.mechanics.arithmetic import exp, library
 from tissuq.mechanics.path import invariant_rates
 
 __all__ = [
@@ -70,8 +70,8 @@ class SeenStates(Path):
 
     @cached_property
     def points(self) -> FloatArray:
-        """What its stresses are asked at: the states follow each other, so that the number says nothing."""
-        return np.zeros(self.base.shape[1])
+        """What its stresses are asked at: places among the states, three times, once for each difference."""
+        return np.arange(float(self.base.shape[1]))
 
     @cached_property
     def of_unit_modulus(self) -> FloatArray:
@@ -79,7 +79,9 @@ class SeenStates(Path):
         return np.asarray(np.abs((self.direction * self.base**2).sum(axis=0)))
 
     def moved(self, point: Any, step: Any) -> Deformation:
-        first, second, third = (base * exp(each * step) for base, each in zip(self.base, self.direction, strict=True))
+        own, place = library(point), point.astype(int)
+        base, direction = own.asarray(self.base)[:, place], own.asarray(self.direction)[:, place]
+        first, second, third = base * exp(direction * step)
         return Deformation.along_axes((first, second, third))
 
 
