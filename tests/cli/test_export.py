@@ -103,20 +103,3 @@ def test_fibres_have_no_cards(cli, here):
     said = cli("export", "runs/sheet")
     assert said.status == 2
     assert "has fibres" in said.err
-
-
-def test_a_law_that_only_jax_can_differentiate_has_cards_of_all_draws(cli, here, specimen):
-    (here / "law.py").write_text(
-        "import jax.numpy as jnp\n\ndef law(I1, I2, mu):\n    return mu / 2 * (jnp.exp(I1 - 3) - 1)\n"
-    )
-    own = ["--material", "law.py:law"]
-    options = ["--noise-sd", 1, "--discrepancy", "none", "--no-figures"]
-    assert cli("fit", specimen, *own, *options).status == 0
-    said = cli("export", "runs/specimen", "--draws", 2)
-    assert said.status == 2
-    assert "give it with --material" in said.err
-    said = cli("export", "runs/specimen", "--draws", 2, *own)
-    assert said.status == 2
-    assert "--all-draws" in said.err
-    said = cli("export", "runs/specimen", "--draws", 2, *own, "--all-draws", "--law", "reduced-polynomial")
-    assert said.status == 0, said.err

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import tissuq as tq
 from tissuq.export.states import ANGLES, POINTS, SeenStates, are_stable, differences, moduli
 
 
@@ -63,3 +67,23 @@ def test_what_is_smaller_than_a_hundredth_of_a_neo_hookean_stress_counts_as_that
 def test_stability_is_that_of_the_ensemble(given):
     ensemble = given(*([("mooney-rivlin", [0.5, second])] for second in (0.0, -0.4, 0.1)))
     assert are_stable(ensemble).tolist() == [True, False, True]
+
+
+def test_a_law_that_only_jax_can_differentiate_is_judged_too(given):
+    def law(I1, I2, mu):
+        return 0.5 * mu * (jnp.exp(I1 - 3) - 1)
+
+    like = given([("demiray", [0.8, 1.0])])
+    states = SeenStates(like.most)
+    draw = tq.EnergyDraw(0, ((tq.FunctionLaw(law), (0.8,)),), None)
+    found = replace(like, draws=(draw,)).stress(states, states.points)
+    assert found == pytest.approx(like.stress(states, states.points))
+
+
+def test_the_stability_of_such_a_law_is_refused_in_words(data):
+    def law(I1, I2, mu):
+        return 0.5 * mu * (jnp.exp(I1 - 3) - 1)
+
+    posterior = tq.fit(data, material=tq.FunctionLaw(law), discrepancy="none", noise_sd=0.02)
+    with pytest.raises(tq.ModelError, match=r"is not plain arithmetic.*--all-draws"):
+        posterior.ensemble(2)
