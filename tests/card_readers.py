@@ -46,7 +46,11 @@ def powers(pairs):
 FULL = {  # the order of coefficients in the manuals of Abaqus, CalculiX and ANSYS
     2: [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)],
     3: [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)],
-}
+    4: [
+        (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3),
+        (4, 0), (3, 1), (2, 2), (1, 3), (0, 4),
+    ],
+}  # fmt: skip
 
 
 def abaqus(text: str) -> Read:
@@ -125,6 +129,16 @@ def gent(modulus, limit):
 
 def febio(text: str) -> Read:
     (material,) = ElementTree.fromstring(text.encode()).find("Material")
+    assert float(material.find("density").text) > 0
+    solids = [febio_solid(each) for each in material.findall("solid")]
+    if not solids:
+        return febio_solid(material)
+    assert material.get("type") == "uncoupled solid mixture"
+    both = Read(material.get("type"), lambda stretches: sum(each.energy(stretches) for each in solids), 0.0)
+    return both._replace(bulk=sum(each.bulk for each in solids))
+
+
+def febio_solid(material) -> Read:
     known = {each.tag: float(each.text) for each in material}
     law = material.get("type")
 
@@ -138,7 +152,6 @@ def febio(text: str) -> Read:
         "Gent": lambda: gent(known["G"], known["Jm"]),
         "Veronda-Westmann": lambda: veronda_westmann(known["c1"], known["c2"]),
     }
-    assert known["density"] > 0
     return Read(law, reads[law](), known["k"])
 
 

@@ -11,10 +11,19 @@ import pytest
 import tissuq as tq
 from card_readers import PATHS, READERS, stress
 from tissuq.export import CardSettings, card_format
-from tissuq.export.projection import LADDER, OgdenFit, PolynomialFit, ReducedFit, full_terms, projections, reduced_terms
+from tissuq.export.projection import (
+    LADDER,
+    MixtureFit,
+    OgdenFit,
+    PolynomialFit,
+    ReducedFit,
+    full_terms,
+    projections,
+    reduced_terms,
+)
 from tissuq.export.states import SeenStates
 
-FITS = [PolynomialFit(full_terms(3)), ReducedFit(reduced_terms(4)), OgdenFit(3), OgdenFit(6)]
+FITS = [PolynomialFit(full_terms(3)), ReducedFit(reduced_terms(4)), OgdenFit(3), OgdenFit(6), MixtureFit(4)]
 
 
 def stretches(low, high):
@@ -117,6 +126,7 @@ def test_orders_name_the_coefficients_as_fe_codes_do():
         "reduced-polynomial": "rivlin:C10,C20",
         "polynomial": "rivlin:C10,C01,C20,C11,C02",
         "ogden": "ogden-2",
+        "mixture": "rivlin:C10,C20+ogden-2",
     }
 
 

@@ -32,8 +32,8 @@ def export(
     law: Annotated[
         str | None,
         typer.Option(
-            help="Write the nearest polynomial, reduced-polynomial or ogden [the draws' own law where the code has it, "
-            "else the best of these]."
+            help="Write the nearest polynomial, reduced-polynomial, ogden or (FEBio) mixture [the draws' own law where "
+            "the code has it, else the best of these]."
         ),
     ] = None,
     order: Annotated[int | None, typer.Option(help="Order or number of terms of that law.")] = None,

@@ -52,7 +52,7 @@ class Abaqus(FECode):
         ),
     )
     projections: ClassVar[tuple[Projection, ...]] = (
-        PolynomialFit(full_terms(3)),
+        PolynomialFit(full_terms(4)),
         OgdenFit(6),
         ReducedFit(reduced_terms(5)),
     )

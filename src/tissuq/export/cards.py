@@ -38,8 +38,9 @@ class CardSettings:
     Parameters
     ----------
     law : str, optional
-        The family of materials in which the nearest one is taken: ``"polynomial"``, ``"reduced-polynomial"`` or
-        ``"ogden"``. Unless given, the draws' own law where the code has it, else the best of the code's projections.
+        The family of materials in which the nearest one is taken: ``"polynomial"``, ``"reduced-polynomial"``,
+        ``"ogden"`` or ``"mixture"``. Unless given, the draws' own law where the code has it, else the best of the
+        code's projections: nearly all draws stable, then the smallest error.
     order : int, optional
         Of that family; unless given, the highest that the code has or is worthwhile.
     unit : str

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from tissuq.mechanics import Material
 from tissuq.mechanics.materials import Ogden, Rivlin
 
-__all__ = ["Form", "OgdenForm", "OwnForm", "PolynomialForm"]
+__all__ = ["Constants", "Form", "OgdenForm", "OwnForm", "PolynomialForm"]
 
 Constants = dict[str, float]
 

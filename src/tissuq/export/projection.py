@@ -19,7 +19,16 @@ from tissuq.export.states import LEAST, SHEARS, SeenStates, initial_slope, modul
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.materials import Ogden, Rivlin
 
-__all__ = ["OgdenFit", "PolynomialFit", "Projection", "ReducedFit", "full_terms", "projections", "reduced_terms"]
+__all__ = [
+    "MixtureFit",
+    "OgdenFit",
+    "PolynomialFit",
+    "Projection",
+    "ReducedFit",
+    "full_terms",
+    "projections",
+    "reduced_terms",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -27,8 +36,10 @@ LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
 """Steps of equal size among which Ogden's exponents are chosen."""
 REACHES = (2.0, 4.0, 8.0, 12.0)
 """The largest exponent of the ladder, times the largest logarithmic strain that was measured."""
-HIGHEST = 6
-"""Order of a polynomial, beyond which no code goes."""
+HIGHEST = 4
+"""Order of a polynomial of both invariants, beyond which terms cancel to their last digits at small strains."""
+HIGHEST_REDUCED = 6
+"""Order of a polynomial of I1, beyond which no code goes."""
 
 
 class Candidate(NamedTuple):
@@ -118,7 +129,7 @@ class ReducedFit(PolynomialFit):
 
     @classmethod
     def of_order(cls, order: int) -> Self:
-        return cls(reduced_terms(_checked(order, HIGHEST, "a reduced polynomial")))
+        return cls(reduced_terms(_checked(order, HIGHEST_REDUCED, "a reduced polynomial")))
 
 
 @dataclass(frozen=True)
@@ -138,17 +149,34 @@ class OgdenFit(Projection):
         return Ogden(self.terms)
 
     def candidates(self, states: SeenStates) -> Iterator[Candidate]:
-        farthest = float(np.abs(np.log(states.base)).max())
-        for reach in REACHES:
-            exponents = reach / (LADDER[-1] * farthest) * np.array(LADDER)
-            columns, unit = _columns(Ogden(len(LADDER)), states, exponents)
-            for chosen in map(list, combinations(range(len(LADDER)), self.terms)):
-                yield Candidate(tuple(exponents[chosen]), columns[:, chosen], unit[chosen])
+        return _on_ladders(self.terms, states)
+
+
+@dataclass(frozen=True)
+class MixtureFit(Projection):
+    """A polynomial of I1 and an Ogden sum added, each of so many terms, for a code that adds materials."""
+
+    terms: int
+
+    family = "mixture"
+
+    @classmethod
+    def of_order(cls, order: int) -> Self:
+        return cls(_checked(order, HIGHEST_REDUCED, "a mixture"))
+
+    @property
+    def material(self) -> Material:
+        return Rivlin(reduced_terms(self.terms)) + Ogden(self.terms)
+
+    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+        columns, unit = _columns(Rivlin(reduced_terms(self.terms)), states, ())
+        for each in _on_ladders(self.terms, states):
+            yield Candidate(each.setting, np.hstack([columns, each.columns]), np.concatenate([unit, each.unit]))
 
 
 def projections() -> dict[str, type[Projection]]:
     """Return the families by name."""
-    return {kind.family: kind for kind in (ReducedFit, PolynomialFit, OgdenFit)}
+    return {kind.family: kind for kind in (ReducedFit, PolynomialFit, OgdenFit, MixtureFit)}
 
 
 def full_terms(order: int) -> tuple[str, ...]:
@@ -165,6 +193,16 @@ def _checked(order: int, most: int, what: str) -> int:
     if not 1 <= order <= most:
         raise InputError(f"{what} has an order from 1 to {most}, not {order}.")
     return order
+
+
+def _on_ladders(terms: int, states: SeenStates) -> Iterator[Candidate]:
+    """Return Ogden sums of so many terms, with all choices of exponents from each ladder."""
+    farthest = float(np.abs(np.log(states.base)).max())
+    for reach in REACHES:
+        exponents = reach / (LADDER[-1] * farthest) * np.array(LADDER)
+        columns, unit = _columns(Ogden(len(LADDER)), states, exponents)
+        for chosen in map(list, combinations(range(len(LADDER)), terms)):
+            yield Candidate(tuple(exponents[chosen]), columns[:, chosen], unit[chosen])
 
 
 def _columns(material: Material, states: SeenStates, setting: ArrayLike) -> tuple[FloatArray, FloatArray]:
