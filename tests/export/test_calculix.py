@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import tissuq as tq
 from card_readers import READERS
 from one_element import CCX, FREE, SHEAR, calculix, reference
 from tissuq.export import CardSettings, card_format
@@ -49,6 +50,18 @@ def test_calculix_computes_the_stress_of_a_free_energy_to_the_error_that_is_stat
         assert found == pytest.approx(projected, rel=AGREEMENT), NAMES
         own = [factor * reference(draw.energy, row["bulk_modulus"] / factor, load) for load in LOADS]
         assert np.abs(np.array(found) / own - 1).max() < 1.5 * row["error_states_max"] + 1e-3
+
+
+def test_calculix_follows_to_the_ends_of_what_was_measured(tmp_path):
+    """Rubber to a stretch of 7.5, nearly incompressible."""
+    draws = tq.fit(tq.datasets.load("rubber-treloar-uniaxial")).ensemble(2)
+    end = {mode: high for mode, (_, high) in draws.ranges.items()}
+    assert end["uniaxial"] > 7
+    loads = [(end["uniaxial"], FREE, FREE), (end["equibiaxial"], end["equibiaxial"], FREE), (end["planar"], 1.0, FREE)]
+    cards = card_format("calculix").cards(draws, CardSettings())
+    for text, row in zip(cards.files.values(), cards.index, strict=True):
+        wanted = [reference(READERS["calculix"](text).energy, row["bulk_modulus"], load) for load in loads]
+        assert calculix(text, loads, tmp_path) == pytest.approx(wanted, rel=AGREEMENT)
 
 
 def test_calculix_would_have_replaced_a_second_d_of_zero(given, tmp_path):
