@@ -8,6 +8,7 @@ import shutil
 import pytest
 
 import tissuq as tq
+from tissuq.export import card_formats
 
 from .conftest import command, tree, write_specimen
 
@@ -103,3 +104,8 @@ def test_fibres_have_no_cards(cli, here):
     said = cli("export", "runs/sheet")
     assert said.status == 2
     assert "has fibres" in said.err
+
+
+def test_the_help_names_every_format(cli):
+    said = " ".join(cli("export", "--help").out.split())
+    assert all(name in said for name in card_formats())

@@ -154,6 +154,13 @@ def test_draws_without_stiffness_have_no_card(given):
         card_format("abaqus").cards(given([("neo-hookean", [-0.5])]), CardSettings())
 
 
+def test_a_draw_without_stiffness_has_no_bulk_modulus_by_poissons_ratio(given):
+    ensemble = given([("neo-hookean", [0.5])], [("neo-hookean", [-0.1])])
+    assert len(card_format("abaqus").cards(ensemble, CardSettings(bulk_modulus=3.0)).files) == 2
+    with pytest.raises(tq.InputError, match="--bulk-modulus"):
+        card_format("abaqus").cards(ensemble, CardSettings(poisson=0.49))
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [

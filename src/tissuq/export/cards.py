@@ -93,7 +93,18 @@ class CardSettings:
         return UNITS[self.unit]
 
     def bulk(self, modulus: float, mean: float) -> float:
-        """Return the bulk modulus of a draw with this initial shear modulus, in the unit, where all have that mean."""
+        """Return the bulk modulus of a draw with this initial shear modulus, in the unit, where all have that mean.
+
+        Raises
+        ------
+        InputError
+            When Poisson's ratio gives none, because the shear modulus is not positive.
+        """
+        if self.poisson is not None and not modulus > 0:
+            raise InputError(
+                "a draw's initial shear modulus is not positive, so that Poisson's ratio gives it no bulk modulus: give "
+                "that of all draws (--bulk-modulus), or leave out draws that are not stable."
+            )
         if self.poisson is not None:
             return 2 * modulus * (1 + self.poisson) / (3 * (1 - 2 * self.poisson))
         return self.bulk_modulus if self.bulk_modulus is not None else STIFF * mean

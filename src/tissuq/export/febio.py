@@ -83,7 +83,8 @@ class FEBio(FECode):
                 own = {name: card.constants[name] for name in card.constants if name.startswith(f"{part.keyword}_")}
                 inner = {name.removeprefix(f"{part.keyword}_"): value for name, value in own.items()}
                 inner["k"] = card.bulk / len(card.form.parts)  # the mixture's is their sum
-                lines += [f'      <solid type="{part.keyword}">', *starmap(_element, inner.items()), "      </solid>"]
+                solid = (f"  {_element(name, number)}" for name, number in inner.items())
+                lines += [f'      <solid type="{part.keyword}">', *solid, "      </solid>"]
         else:
             lines += starmap(_element, {**card.constants, "k": card.bulk}.items())
         return "\n".join([*lines, "    </material>", ""])

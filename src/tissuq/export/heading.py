@@ -32,7 +32,7 @@ def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
     if ensemble.admissible_in:
         yield (
             f"admissible: stable over the measured range in {', '.join(ensemble.admissible_in)}; "
-            f"{ensemble.admissible_share:.0%} of the posterior's draws are"
+            f"{len(ensemble)} of {ensemble.tried} draws that were tried are"
         )
     else:
         yield "admissible: not looked at, draws may be unstable"
