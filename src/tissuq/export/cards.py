@@ -102,8 +102,8 @@ class CardSettings:
         """
         if self.poisson is not None and not modulus > 0:
             raise InputError(
-                "a draw's initial shear modulus is not positive, so that Poisson's ratio gives it no bulk modulus: give "
-                "that of all draws (--bulk-modulus), or leave out draws that are not stable."
+                "a draw's initial shear modulus is not positive, so that Poisson's ratio gives it no bulk modulus: "
+                "give that of all draws (--bulk-modulus), or leave out draws that are not stable."
             )
         if self.poisson is not None:
             return 2 * modulus * (1 + self.poisson) / (3 * (1 - 2 * self.poisson))
