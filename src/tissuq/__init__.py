@@ -1,7 +1,7 @@
 """tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
 from tissuq import finite_elements
-from tissuq.assessment import Assessment, Average, average, compare
+from tissuq.assessment import Assessment, Average, Candidate, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.ensemble import EnergyDraw, Ensemble
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
@@ -27,6 +27,7 @@ from tissuq.parameters import Parameter
 from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from tissuq.report.cards import write_cards
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
 from tissuq.tolerances import Tolerances
@@ -36,6 +37,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Assessment",
     "Average",
+    "Candidate",
     "ConvergenceError",
     "Discrepancy",
     "EnergyDraw",
@@ -86,4 +88,5 @@ __all__ = [
     "materials",
     "read_experiment",
     "simulate",
+    "write_cards",
 ]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tissuq.assessment import Assessment, assess
+from tissuq.assessment import Assessment, Candidate, assess, rank_tests
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, calibrated_range, stability, stable_ranges
 from tissuq.cautions import warnings_about
@@ -183,6 +183,31 @@ class Posterior:
         (True, 1.0)
         """
         return stable_ranges(self.solution)
+
+    def design(
+        self, candidates: Sequence[str | Candidate] = (), target: str | Sequence[str] = (), **options: Any
+    ) -> pd.DataFrame:
+        """Rank tests that could be made next by how much less uncertain they are expected to make a target.
+
+        The columns, and the ``options`` points, specimen and seed, are those of `tissuq.assessment.rank_tests`.
+
+        Parameters
+        ----------
+        candidates : sequence of str or Candidate
+            Such as ``"planar 1:1.5 20"``; usual ones in all modes, unless given.
+        target : str or sequence of str
+            ``"modulus"`` (the initial shear modulus, unless given), a parameter, or a stress such as ``"planar:1.5"``.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+        >>> posterior = tq.fit(data, discrepancy="none", noise_sd=0.02)
+        >>> posterior.design(["uniaxial 0.9:1.1 4", "uniaxial 0.7:1.3 4"]).query("not is_repeat")["low"].tolist()
+        [0.7, 0.9]
+        """
+        chosen = [target] if isinstance(target, str) else target
+        return rank_tests(self.solution, candidates, chosen, **options)
 
     def update(self, more: Experiment) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.

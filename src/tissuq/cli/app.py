@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, fit, inspect, paper, population, show, simulate, study
+from tissuq.cli import catalogue, check, compare, design, export, fit, inspect, paper, population, show, simulate, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -27,6 +27,8 @@ app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
 app.command("population")(population.population)
 app.command("compare")(compare.compare)
+app.command("design")(design.design)
+app.command("export")(export.export)
 app.command("simulate")(simulate.simulate)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)

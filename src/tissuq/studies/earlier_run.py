@@ -11,7 +11,6 @@ from tissuq.errors import InputError
 from tissuq.mechanics import Material
 from tissuq.posterior import Posterior
 from tissuq.studies.settings import RECIPE, load_settings
-from tissuq.studies.specimen import SpecimenSettings, fitted
 
 __all__ = ["load_run", "load_run_without"]
 
@@ -44,6 +43,8 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
     >>> import tissuq as tq
     >>> posterior = tq.load_run("runs/brain", discrepancy="auto")  # doctest: +SKIP
     """
+    from tissuq.studies.specimen import SpecimenSettings, fitted
+
     run = Path(folder)
     rows = _summary(run)
     settings = load_settings(SpecimenSettings, run / RECIPE, {})
