@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -71,7 +72,8 @@ def simulate(
     law = material_named(material, laws=True) if material else None
     check_folder(folder, kept)
     check_source(source, folder)
-    with progress() as step:
+    with progress() as step, warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", UserWarning)
         posteriors = load_posteriors(settings, beside, law, step)
 
     def prepare() -> None:
@@ -83,7 +85,7 @@ def simulate(
         study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign_progress)
     write_simulation(study, folder, figures=figures)
     print_rows(f"Case '{named}' with {settings.draws} draws", *readable_forces(study))
-    print_warnings(study.warnings)
+    print_warnings([*dict.fromkeys(str(each.message) for each in told), *study.warnings])
     print(f"Report: {folder / 'report.html'}")
 
 

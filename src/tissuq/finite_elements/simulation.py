@@ -129,7 +129,7 @@ def simulate(
     bulk_ratio : float
         Bulk modulus in initial shear moduli.
     check_mesh : bool
-        Compute one draw on a mesh of twice the fineness, too.
+        Compute one draw on a mesh of twice the fineness, too, where the case has a fineness.
     run : callable
         Carries out the tasks; `tissuq.studies.simulate` has one that uses many processes.
 

@@ -44,7 +44,7 @@ class Shares:
 
     References
     ----------
-    Li et al. (2010), Global sensitivity analysis for systems with independent and/or correlated inputs, eq. 16 to 19.
+    Li et al. (2010), Global sensitivity analysis for systems with independent and/or correlated inputs.
     """
 
     parameters: FloatArray

@@ -71,6 +71,8 @@ def load_run_without(folder: str | Path, material: Material | None = None) -> Po
 
     Parameters and exceptions are those of `load_run`.
     """
+    from tissuq.studies.specimen import SpecimenSettings, fitted
+
     run = Path(folder)
     _summary(run)
     return fitted(load_settings(SpecimenSettings, run / RECIPE, {}), "none", run, material)
