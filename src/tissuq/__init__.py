@@ -28,6 +28,7 @@ from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
+from tissuq.studies.prediction import Prediction, predict_run
 from tissuq.tolerances import Tolerances
 
 __version__ = "0.1.0"
@@ -59,6 +60,7 @@ __all__ = [
     "Parameter",
     "Population",
     "Posterior",
+    "Prediction",
     "Prior",
     "ProportionalNoise",
     "RepeatNoise",
@@ -82,6 +84,7 @@ __all__ = [
     "load_run",
     "loading_modes",
     "materials",
+    "predict_run",
     "read_experiment",
     "simulate",
 ]

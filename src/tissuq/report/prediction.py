@@ -237,4 +237,4 @@ def _lead_of_bands(found: Prediction) -> str:
         band = found.bands[channel, found.kinds[0], False].iloc[place] / found.unit.to_mpa
         texts.append(f"the {name} is {_mean(band)} {found.unit.name} ({100 * found.prob:.4g} %: {_ends(band)})")
     beyond = "" if len(known) else ", which is beyond what was measured"
-    return f"At {where} in mode {found.mode.name}{beyond}, {' and '.join(texts)}, {_kind(found, found.kinds[0])}."
+    return f"At {where} in mode {found.mode.name}{beyond}, {' and '.join(texts)}: {_kind(found, found.kinds[0])}."

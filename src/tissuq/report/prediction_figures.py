@@ -39,6 +39,8 @@ def prediction_figure(found: Prediction) -> Figure:
             for axis, kind in zip(row, kinds, strict=True):
                 _draw(axis, found, channel, kind)
                 axis.set_title(_title(found, channel, kind))
+                if found.points.ndim > 1 or channel == count - 1:
+                    axis.set_xlabel(_label(found, _abscissa(found)[0]))
             row[0].set_ylim(*_limits(found, channel))
             row[0].set_ylabel(f"{found.stresses[channel]} [{found.unit.name}]")
         handles: dict[str, Any] = {}
@@ -52,10 +54,10 @@ def prediction_figure(found: Prediction) -> Figure:
 
 def _draw(axis: Axes, found: Prediction, channel: int, kind: bool) -> None:
     """Draw bands, measurements and where nothing was measured."""
-    which, at = _abscissa(found)
-    stress, noisy = (found.bands[channel, kind, noise] / found.unit.to_mpa for noise in (False, True))
-    order = np.argsort(at, kind="stable")
-    looks = ((noisy, 0.18, f"{found.prob:.4g} of measurements"), (stress, 0.38, f"{found.prob:.4g} of the stress"))
+    _, at = _abscissa(found)
+    stress, noisy = (_drawn(found, channel, kind, noise) for noise in (False, True))
+    order, share = np.argsort(at, kind="stable"), f"{100 * found.prob:.4g} %"
+    looks = ((noisy, 0.18, f"{share} of measurements"), (stress, 0.38, f"{share} of the stress"))
     is_path = found.points.ndim == 1 or found.data is None
     for band, strength, label in looks:
         low, high = (band[end].to_numpy()[order] for end in ("low", "high"))
@@ -76,7 +78,6 @@ def _draw(axis: Axes, found: Prediction, channel: int, kind: bool) -> None:
             if chosen.any():
                 values = found.measured(channel)[chosen] / found.unit.to_mpa
                 axis.plot(points[chosen], values, "o", mec=INK, mfc=face, ms=3.6, mew=0.9, label=label, zorder=4)
-    axis.set_xlabel(found.mode.controls[which].name)
 
 
 def _drawn(found: Prediction, channel: int, kind: bool, noise: bool) -> pd.DataFrame:
@@ -93,6 +94,13 @@ def _abscissa(found: Prediction) -> tuple[int, FloatArray]:
     return which, columns[which]
 
 
+def _label(found: Prediction, which: int) -> str:
+    """Return the name of the control along the axis, and where the others are held."""
+    pairs = enumerate(zip(found.mode.controls, found.controls.values(), strict=True))
+    held = [f"{own.name} {at[0]:.4g}" for place, (own, at) in pairs if place != which and np.ptp(at) == 0]
+    return found.mode.controls[which].name + (f" ({', '.join(held)})" if held else "")
+
+
 def _shade(axis: Axes, found: Prediction) -> None:
     """Hatch where an invariant is larger than any that was measured."""
     if found.points.ndim > 1:
@@ -107,14 +115,14 @@ def _shade(axis: Axes, found: Prediction) -> None:
     for start, end in ((left, min(ends[0], right)), (max(ends[1], left), right)):
         margin = 0.011 * (right - left)  # that of the axis beyond the last stretch is no place of its own
         if end - start > 3 * margin:
-            axis.axvspan(start, end, facecolor="none", edgecolor=BASE, alpha=0.55, hatch="////", lw=0, zorder=3,
+            axis.axvspan(start, end, facecolor="none", edgecolor=BASE, alpha=0.5, hatch="////", lw=0, zorder=3,
                          label="not calibrated")  # fmt: skip
             edge = end if start == left else start
             axis.axvline(edge, color=BASE, lw=1.1, ls="--", zorder=0.5)
 
 
 def _padded(low: float, high: float) -> tuple[float, float]:
-    margin = 0.02 * (high - low) or 0.05
+    margin = 0.02 * max(high - low, 0.1 * abs(high))
     return low - margin, high + margin
 
 

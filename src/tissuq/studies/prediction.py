@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.stability import calibrated_range, is_calibrated
-from tissuq.errors import InputError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit, stress_unit
@@ -248,15 +248,33 @@ def predicted(
     model = posterior.model
     kinds = (True, False) if model.discrepancy.parameters and speaks_of(model, asked) else (False,)
     options: dict[str, Any] = {"prob": prob, "stress_type": stress_type}
-    bands = {
-        (channel, kind, noise): posterior.predict(
-            at, mode=asked, channel=channel, discrepancy=kind, noise=noise, **options
-        )
-        for channel, kind, noise in product(range(len(asked.stresses)), kinds, (False, True))
-    }
+    order = product(range(len(asked.stresses)), kinds, (False, True))
+    bands = {each: _band(posterior, asked, at, *each, options) for each in order}
     scores = None if data is None else _scores(posterior, data, kinds, options)
     known = (*notes, *_notes(posterior, asked, at, data))
     return Prediction(posterior, asked, at, prob, stress_type, kinds, bands, data, scores, known)
+
+
+def _band(
+    posterior: Posterior,
+    mode: LoadingMode,
+    at: FloatArray,
+    channel: int,
+    kind: bool,
+    noise: bool,
+    options: dict[str, Any],
+) -> pd.DataFrame:
+    """Return mean, low and high of a stress at points; refuse where it is too large for a number."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = posterior.predict(at, mode=mode, channel=channel, discrepancy=kind, noise=noise, **options)
+    is_finite = np.isfinite(found.to_numpy()).all(axis=1)
+    if not is_finite.all():
+        beyond = at.reshape(len(at), -1)[~is_finite, 0][0]
+        raise ModelError(
+            f"the predicted stress is too large for a number at a {mode.controls[0].name} of {beyond:g}: predict "
+            "nearer to what was measured."
+        )
+    return found
 
 
 def _mode(posterior: Posterior, mode: str | LoadingMode | None, data: Experiment | None) -> LoadingMode:
@@ -293,7 +311,10 @@ def _points(
     own = [part.stretch for part in posterior.model.experiment.parts if part.mode == mode]
     if data is None and not own:
         names = ", ".join(control.name for control in mode.controls)
-        raise InputError(f"mode '{mode.name}' has several controls ({names}): say at which values of each to predict.")
+        raise InputError(
+            f"mode '{mode.name}' has several controls ({names}): say at which values of each to predict (stretch and "
+            "stretch2)."
+        )
     return own[0] if data is None else data.stretch
 
 
