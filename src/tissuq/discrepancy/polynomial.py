@@ -32,7 +32,7 @@ class Polynomial(IndependentError):
     caution = "Its mean takes a share of the initial stiffness, so the material's modulus may be far off."
 
     def mean_basis(self, mode: Path, stretch: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.vander(mode.abscissa(stretch), self.degree + 1, increasing=True)
+        return np.vander(stretch, self.degree + 1, increasing=True)
 
 
 class Constant(Polynomial):
