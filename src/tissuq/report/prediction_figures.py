@@ -68,6 +68,7 @@ def _draw(axis: Axes, found: Prediction, channel: int, kind: bool) -> None:
     style: dict[str, Any] = {"ls": "-", "lw": 1.6} if is_path else {"ls": "", "marker": "_", "ms": 7}
     axis.plot(at[order], stress["mean"].to_numpy()[order], color=BAND, label="predicted mean", **style)
     axis.set_xlim(*_padded(at.min(), at.max()))
+    axis.locator_params(axis="x", nbins=6)
     _shade(axis, found)
     if found.data is not None:
         points = found.data.stretch if found.points.ndim == 1 else at
