@@ -347,7 +347,8 @@ def _notes(posterior: Posterior, mode: LoadingMode, points: FloatArray, data: Ex
             f"the {mode.name} one, which is predicted without it: by the material alone. Fit with one that is an "
             "energy, such as 'auto', to have it there, too."
         )
-    if data is not None and _was_fitted(model.experiment, data):
+    was_fitted = data is not None and _was_fitted(model.experiment, data)
+    if was_fitted:
         found.append(
             "the run was fitted to these very measurements: how they are predicted is a check of the fit, and says "
             "nothing of other data."
@@ -359,7 +360,7 @@ def _notes(posterior: Posterior, mode: LoadingMode, points: FloatArray, data: Ex
     outside = " and ".join(f"{count} of {whole} {what}" for count, whole, what in beyond if count)
     if outside:
         found.append(f"{outside} lie beyond what was measured: {_calibrated_in_words(posterior, mode)}.")
-    if data is not None and not model.tolerances:
+    if data is not None and not was_fitted and not model.tolerances:
         found.append(
             "the run allows for no errors of whole tests, so that its bands are those of the specimen that was "
             "fitted: a test of another one, or another area or gauge length, is not covered by them. Fit with "
