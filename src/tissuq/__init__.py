@@ -1,6 +1,6 @@
 """tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
-from tissuq.assessment import Assessment, Average, average, compare
+from tissuq.assessment import Assessment, Average, Candidate, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.ensemble import EnergyDraw, Ensemble
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
@@ -36,6 +36,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Assessment",
     "Average",
+    "Candidate",
     "ConvergenceError",
     "Discrepancy",
     "EnergyDraw",

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tissuq.assessment import Assessment, assess
+from tissuq.assessment import Assessment, Candidate, assess, rank_tests
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.scoring import scores_of
 from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
 from tissuq.cautions import warnings_about
 from tissuq.ensemble import Ensemble, Sampling, drawn_ensemble
-from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
-from tissuq.labelled import labelled_arrays, labels_of
+from tissuq.labelled import labelled_arrays, labels_of, summary_table
 from tissuq.model import StatisticalModel
 from tissuq.prediction.bands import predict_band, share_inside, stress_ratio
 
@@ -178,6 +177,31 @@ class Posterior:
         """
         return stable_ranges(self.solution)
 
+    def design(
+        self, candidates: Sequence[str | Candidate] = (), target: str | Sequence[str] = (), **options: Any
+    ) -> pd.DataFrame:
+        """Rank tests that could be made next by how much less uncertain they are expected to make a target.
+
+        The columns, and the ``options`` points, specimen and seed, are those of `tissuq.assessment.rank_tests`.
+
+        Parameters
+        ----------
+        candidates : sequence of str or Candidate
+            Such as ``"planar 1:1.5 20"``; usual ones in all modes, unless given.
+        target : str or sequence of str
+            ``"modulus"`` (the initial shear modulus, unless given), a parameter, or a stress such as ``"planar:1.5"``.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+        >>> posterior = tq.fit(data, discrepancy="none", noise_sd=0.02)
+        >>> posterior.design(["uniaxial 0.9:1.1 4", "uniaxial 0.7:1.3 4"]).query("not is_repeat")["low"].tolist()
+        [0.7, 0.9]
+        """
+        chosen = [target] if isinstance(target, str) else target
+        return rank_tests(self.solution, candidates, chosen, **options)
+
     def update(self, more: Experiment) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.
 
@@ -220,28 +244,7 @@ class Posterior:
             Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
             when the posterior was sampled.
         """
-        import pandas as pd
-
-        if not 0 < prob < 1:
-            raise InputError(f"prob must be between 0 and 1, not {prob}.")
-        wanted = self.model.symbols if parameters is None else tuple(parameters)
-        unknown = [symbol for symbol in wanted if symbol not in self.model.symbols]
-        if unknown:
-            raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(self.model.symbols)}.")
-        index, names = pd.Index(wanted, name="parameter"), ["mean", "sd", "median", "hdi_low", "hdi_high"]
-        table = pd.DataFrame([self._numbers(symbol, prob) for symbol in wanted], index, names)
-        found = self.solution.diagnostics
-        if found is not None:
-            table["ess"] = [min(found.ess_bulk[symbol], found.ess_tail[symbol]) for symbol in table.index]
-            table["rhat"] = [found.rhat[symbol] for symbol in table.index]
-        return table
-
-    def _numbers(self, symbol: str, prob: float) -> tuple[float, ...]:
-        """Return mean and sd (nan where there may be none), median and the ends of the interval of a parameter."""
-        marginal = self.solution.marginals[symbol]
-        has_moments = symbol not in self.model.energy_symbols or self.model.priors[symbol].has_moments
-        moments = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
-        return (*moments, float(marginal.quantile(0.5)), *marginal.hdi(prob))
+        return summary_table(self.solution, prob, parameters)
 
     def predict(
         self,

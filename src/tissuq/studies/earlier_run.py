@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 from warnings import warn
 
 from tissuq.discrepancy import Auto
@@ -11,7 +12,9 @@ from tissuq.errors import InputError
 from tissuq.mechanics import Material
 from tissuq.posterior import Posterior
 from tissuq.studies.settings import RECIPE, load_settings
-from tissuq.studies.specimen import SpecimenSettings, fitted
+
+if TYPE_CHECKING:
+    from tissuq.studies.specimen import SpecimenSettings
 
 __all__ = ["load_run", "recipe_of"]
 
@@ -45,6 +48,8 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
     >>> import tissuq as tq
     >>> posterior = tq.load_run("runs/brain", discrepancy="auto")  # doctest: +SKIP
     """
+    from tissuq.studies.specimen import fitted
+
     run = Path(folder)
     settings, rows = recipe_of(run), _summary(run)
     names = list(rows)
@@ -73,6 +78,8 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
     InputError
         When the folder is no such run.
     """
+    from tissuq.studies.specimen import SpecimenSettings
+
     run = Path(folder)
     recipe = run / RECIPE
     if not run.is_dir():
