@@ -26,6 +26,7 @@ from tissuq.parameters import Parameter
 from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from tissuq.report.cards import write_cards
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.prediction import Prediction, predict_run
@@ -88,4 +89,5 @@ __all__ = [
     "predict_run",
     "read_experiment",
     "simulate",
+    "write_cards",
 ]

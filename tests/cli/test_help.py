@@ -36,6 +36,7 @@ def test_help_is_shown_without_importing_a_heavy_library():
         "discrepancies",
         "datasets",
         "study",
+        "export",
     ],
 )
 def test_every_command_has_help(cli, name):

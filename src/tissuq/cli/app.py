@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, design, fit, inspect, paper, population, predict, show, study
+from tissuq.cli import catalogue, check, compare, design, export, fit, inspect, paper, population, predict, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -29,6 +29,7 @@ app.command("predict")(predict.predict)
 app.command("population")(population.population)
 app.command("compare")(compare.compare)
 app.command("design")(design.design)
+app.command("export")(export.export)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)
 app.command("modes")(catalogue.modes)
