@@ -30,6 +30,7 @@ from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, 
 from tissuq.report.cards import write_cards
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
+from tissuq.studies.prediction import Prediction, predict_run
 from tissuq.tolerances import Tolerances
 
 __version__ = "0.1.0"
@@ -62,6 +63,7 @@ __all__ = [
     "Parameter",
     "Population",
     "Posterior",
+    "Prediction",
     "Prior",
     "ProportionalNoise",
     "RepeatNoise",
@@ -86,6 +88,7 @@ __all__ = [
     "load_run",
     "loading_modes",
     "materials",
+    "predict_run",
     "read_experiment",
     "simulate",
     "write_cards",

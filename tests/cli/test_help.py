@@ -27,6 +27,7 @@ def test_help_is_shown_without_importing_a_heavy_library():
         "paper",
         "fit",
         "inspect",
+        "predict",
         "population",
         "design",
         "show",
@@ -36,6 +37,7 @@ def test_help_is_shown_without_importing_a_heavy_library():
         "datasets",
         "study",
         "export",
+        "simulate",
     ],
 )
 def test_every_command_has_help(cli, name):

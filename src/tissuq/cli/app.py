@@ -6,7 +6,21 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, design, export, fit, inspect, paper, population, show, simulate, study
+from tissuq.cli import (
+    catalogue,
+    check,
+    compare,
+    design,
+    export,
+    fit,
+    inspect,
+    paper,
+    population,
+    predict,
+    show,
+    simulate,
+    study,
+)
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -25,6 +39,7 @@ app = typer.Typer(
 app.command("paper")(paper.paper)
 app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
+app.command("predict")(predict.predict)
 app.command("population")(population.population)
 app.command("compare")(compare.compare)
 app.command("design")(design.design)

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 from warnings import warn
 
-from tissuq.discrepancy import Auto
+from tissuq.discrepancy import Auto, NoDiscrepancy
 from tissuq.errors import InputError
 from tissuq.mechanics import Material
 from tissuq.posterior import Posterior
 from tissuq.studies.settings import RECIPE, load_settings
 
-__all__ = ["load_run", "load_run_without"]
+if TYPE_CHECKING:
+    from tissuq.studies.specimen import SpecimenSettings
 
+__all__ = ["load_run", "load_run_without", "recipe_of"]
+
+SUMMARY = "summary.json"
 AGREEMENT = 1e-6
 """Relative difference between the headline parameter's means in the run and fitted again that needs no word."""
 
@@ -43,11 +48,10 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
     >>> import tissuq as tq
     >>> posterior = tq.load_run("runs/brain", discrepancy="auto")  # doctest: +SKIP
     """
-    from tissuq.studies.specimen import SpecimenSettings, fitted
+    from tissuq.studies.specimen import fitted
 
     run = Path(folder)
-    rows = _summary(run)
-    settings = load_settings(SpecimenSettings, run / RECIPE, {})
+    settings, rows = recipe_of(run), _summary(run)
     names = list(rows)
     name = discrepancy or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in names:
@@ -71,20 +75,32 @@ def load_run_without(folder: str | Path, material: Material | None = None) -> Po
 
     Parameters and exceptions are those of `load_run`.
     """
-    from tissuq.studies.specimen import SpecimenSettings, fitted
+    from tissuq.studies.specimen import fitted
+
+    return fitted(recipe_of(folder), NoDiscrepancy.name, Path(folder), material)
+
+
+def recipe_of(folder: str | Path) -> SpecimenSettings:
+    """Return the settings of a run of ``tissuq fit``.
+
+    Raises
+    ------
+    InputError
+        When the folder is no such run.
+    """
+    from tissuq.studies.specimen import SpecimenSettings
 
     run = Path(folder)
-    _summary(run)
-    return fitted(load_settings(SpecimenSettings, run / RECIPE, {}), "none", run, material)
+    recipe = run / RECIPE
+    if not run.is_dir():
+        raise InputError(f"there is no run folder '{run}'.")
+    if not recipe.is_file() or not (run / SUMMARY).is_file():
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE} or {SUMMARY}.")
+    if " tissuq fit " not in recipe.read_text(encoding="utf-8").partition("\n")[0]:
+        raise InputError(f"run '{run}' is not one of tissuq fit, and only these have a posterior to go on with.")
+    return load_settings(SpecimenSettings, recipe, {})
 
 
 def _summary(run: Path) -> dict[str, dict[str, float]]:
     """Return the rows of a run's summary by discrepancy."""
-    recipe, summary = run / RECIPE, run / "summary.json"
-    if not run.is_dir():
-        raise InputError(f"there is no run folder '{run}'.")
-    if not recipe.is_file() or not summary.is_file():
-        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE} or summary.json.")
-    if " tissuq fit " not in recipe.read_text(encoding="utf-8").partition("\n")[0]:
-        raise InputError(f"run '{run}' is not one of tissuq fit, and only these have a posterior to go on with.")
-    return {row["formulation"]: row for row in json.loads(summary.read_text(encoding="utf-8"))}
+    return {row["formulation"]: row for row in json.loads((run / SUMMARY).read_text(encoding="utf-8"))}
