@@ -2,6 +2,7 @@
 
 from tissuq.assessment import Assessment, Average, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
+from tissuq.emulation import Calibration, Emulator, UmbridgeForward
 from tissuq.ensemble import EnergyDraw, Ensemble
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments import datasets
@@ -26,6 +27,7 @@ from tissuq.parameters import Parameter
 from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from tissuq.studies.calibrate import calibrate
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
 from tissuq.tolerances import Tolerances
@@ -35,8 +37,10 @@ __version__ = "0.1.0"
 __all__ = [
     "Assessment",
     "Average",
+    "Calibration",
     "ConvergenceError",
     "Discrepancy",
+    "Emulator",
     "EnergyDraw",
     "Ensemble",
     "Experiment",
@@ -65,9 +69,11 @@ __all__ = [
     "StretchMaterial",
     "TissuqError",
     "Tolerances",
+    "UmbridgeForward",
     "Uniform",
     "UnknownNoise",
     "average",
+    "calibrate",
     "compare",
     "datasets",
     "discrepancies",

@@ -16,7 +16,7 @@ from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import stress_moments
 
-__all__ = ["Band", "asked_for", "predict_average", "predict_band", "share_inside"]
+__all__ = ["Band", "asked_for", "mixture_quantile", "predict_average", "predict_band", "share_inside"]
 
 FloatArray = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def predict_average(
             for _, model, components in mixture
         ]
         mean, variance = (np.concatenate(each) for each in zip(*moments, strict=True))
-        ends = [_mixture_quantile(tail, weights, mean, variance) for tail in tails]
+        ends = [mixture_quantile(tail, weights, mean, variance) for tail in tails]
         curves.append([weights @ mean, *ends])
     return Band(asked.channels[channel].abscissa(points), *np.concatenate(curves, axis=1))
 
@@ -190,7 +190,7 @@ def _check_mode(solution: Solution, asked: LoadingMode) -> None:
         )
 
 
-def _mixture_quantile(probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:
+def mixture_quantile(probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:
     """Return the quantile of a mixture of M Gaussians, at each of g places; safeguarded Newton iteration."""
     from scipy.special import ndtr, ndtri
 
