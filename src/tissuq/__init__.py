@@ -1,5 +1,6 @@
 """tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
+from tissuq import finite_elements
 from tissuq.assessment import Assessment, Average, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.emulation import Calibration, Emulator, UmbridgeForward
@@ -78,6 +79,7 @@ __all__ = [
     "datasets",
     "discrepancies",
     "engineering_stress",
+    "finite_elements",
     "fit",
     "fit_many",
     "fit_population",

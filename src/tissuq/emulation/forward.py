@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
@@ -48,8 +48,8 @@ class Forward(ABC):
         """What it is called in reports."""
         return self.identity.partition(" ")[0]
 
-    def check(self) -> None:  # noqa: B027  (most kinds have nothing to check)
-        """Raise an InputError where it can be seen before the first run that it cannot run."""
+    def check(self, symbols: Sequence[str]) -> None:  # noqa: B027  (most kinds have nothing to check)
+        """Raise an InputError where it can be seen that no run with these parameters is possible."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class FileForward(Forward):
         match = LAW.fullmatch(self.place)
         return Path(match["path"]) if match else None
 
-    def check(self) -> None:
+    def check(self, symbols: Sequence[str]) -> None:
         _function_at(self.place)
 
 

@@ -62,8 +62,6 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     found: dict[str, Any] = {"outputs": [], "error": ""}
     try:
         outputs = run.forward.run(dict(run.parameters), np.array(run.control))
-    except InputError:
-        raise
     except Exception as error:  # a run that fails is a result: it is listed, and told
         found["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
@@ -47,11 +47,6 @@ class UmbridgeForward(Forward):
     def run(self, parameters: Mapping[str, float], control: FloatArray) -> Any:
         settings, values = {"control": control.tolist()}, iter(parameters.values())
         client, sizes = _connected(self.url, self.model)
-        if sum(sizes) != len(parameters):
-            raise InputError(
-                f"the model '{self.model}' at {self.url} takes {sum(sizes)} parameters; {len(parameters)} have priors "
-                f"({', '.join(parameters)})."
-            )
         inputs = [list(islice(values, size)) for size in sizes]
         return np.concatenate([np.asarray(each, dtype=np.float64) for each in client(inputs, settings)])
 
@@ -63,8 +58,13 @@ class UmbridgeForward(Forward):
     def name(self) -> str:
         return f"{self.model} at {self.url}"
 
-    def check(self) -> None:
-        _connected(self.url, self.model)
+    def check(self, symbols: Sequence[str]) -> None:
+        _, sizes = _connected(self.url, self.model)
+        if sum(sizes) != len(symbols):
+            raise InputError(
+                f"the model '{self.model}' at {self.url} takes {sum(sizes)} parameters; {len(symbols)} have priors "
+                f"({', '.join(symbols)})."
+            )
 
 
 @lru_cache

@@ -114,7 +114,7 @@ def calibrate(
     if emulator is not None and not asked.refine:
         return calibrated(problem, _no_runs, asked, emulator)
     model = as_forward(forward)
-    model.check()
+    model.check(problem.forward_symbols)
     with runs_of(model, problem, folder, workers, step) as run:
         return calibrated(problem, run, asked, emulator)
 
