@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from tissuq.cli import catalogue, check, compare, fit, inspect, paper, population, show, study
+from tissuq.cli import calibrate, catalogue, check, compare, fit, inspect, paper, population, show, study
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -26,6 +26,7 @@ app.command("paper")(paper.paper)
 app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
 app.command("population")(population.population)
+app.command("calibrate")(calibrate.calibrate)
 app.command("compare")(compare.compare)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)

@@ -19,6 +19,9 @@ __all__ = ["ForwardRun", "ForwardRuns", "carry_out", "gathered"]
 
 FloatArray = NDArray[np.float64]
 
+FEW = 3
+"""Failed runs from which a value of one parameter that they all exceed tells something."""
+
 
 @dataclass(frozen=True)
 class ForwardRun:
@@ -146,7 +149,7 @@ class ForwardRuns:
     def _where(self) -> str:
         """Return the region of the failures: beyond a value of one parameter, or their ranges."""
         good, bad = self.points[~self.failed], self.points[self.failed]
-        if len(good):
+        if len(good) and len(bad) >= FEW:
             for symbol, own, others in zip(self.symbols, bad.T, good.T, strict=True):
                 if own.min() > others.max():
                     return f"all those with {symbol} from {own.min():.4g} and none below {others.max():.4g}"

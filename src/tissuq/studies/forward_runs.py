@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import shutil
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -56,7 +57,11 @@ def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers
         _check_travels(model)
     with TemporaryDirectory() as scratch, open_pool(workers) as pool:
         place = Path(scratch) if folder is None else _opened(Path(folder), model, problem)
-        yield _Runs(model, problem, place, pool, step)
+        try:
+            yield _Runs(model, problem, place, pool, step)
+        except BaseException:
+            _remove_if_fruitless(place)
+            raise
 
 
 @dataclass(frozen=True)
@@ -112,6 +117,12 @@ def _opened(folder: Path, model: Forward, problem: Problem) -> Path:
     scratch.write_text(json.dumps(about), encoding="utf-8")
     scratch.replace(file)
     return folder
+
+
+def _remove_if_fruitless(folder: Path) -> None:
+    """Remove a folder in which not one run has ended."""
+    if not any(path.stat().st_size for path in folder.glob(f"batch-*/{RESULTS}")):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _forget_failures(results: Path) -> None:
