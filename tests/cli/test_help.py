@@ -23,7 +23,8 @@ def test_help_is_shown_without_importing_a_heavy_library():
 
 @pytest.mark.parametrize(
     "name",
-    ["paper", "fit", "inspect", "population", "show", "materials", "modes", "discrepancies", "datasets", "study"],
+    ["paper", "fit", "inspect", "population", "calibrate", "show", "materials", "modes", "discrepancies", "study"]
+    + ["datasets"],
 )
 def test_every_command_has_help(cli, name):
     said = cli(name, "--help")

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden, runs_at
 
+from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden, runs_at
 from tissuq.emulation import ForwardRuns, emulate
 from tissuq.emulation.basis import basis_of, output_moments
 from tissuq.emulation.design import space_filling
@@ -77,7 +77,7 @@ def test_failed_runs_are_left_out_and_too_few_are_refused():
     half = ForwardRuns(runs.symbols, runs.points, outputs, errors, runs.seconds)
     assert len(emulate(half, DEPTH).check().points) == 8
     most = ForwardRuns(runs.symbols, runs.points, np.full_like(outputs, np.nan), ("it broke",) * 16, runs.seconds)
-    with pytest.raises(ModelError, match="needs 7 runs that succeed, and there are 0. 16 of 16 runs.*it broke"):
+    with pytest.raises(ModelError, match=r"needs 7 runs that succeed, and there are 0\. 16 of 16 runs.*it broke"):
         emulate(most, DEPTH)
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden
 from scipy.stats import binom, multivariate_normal, norm
 
 import tissuq as tq
+from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden
 from tissuq.discrepancy import PinnedProcess
 from tissuq.emulation import emulate
 from tissuq.emulation.likelihood import Likelihood
@@ -118,7 +118,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emu
             low, high = each.marginals["alpha"].hdi()
             results.append(low <= truth["alpha"] <= high)
     least = binom.ppf(1e-4, count, 0.95)
-    print(sum(inside), sum(exact))
     assert sum(inside) >= least
     assert sum(exact) < least
 
@@ -130,9 +129,23 @@ def test_further_runs_are_made_where_the_posterior_is_until_the_emulator_is_good
     assert more.error_ratio < 0.02 < few.error_ratio
     assert 8 < len(more.runs) < 8 + 24
     added = more.runs.points[8:]
-    assert np.abs(added[:, 1] - -9.0).max() < 1.0
+    assert np.abs(added[:, 1] - -9.0).max() < 3.0  # of a prior 24 wide
     assert len(more.held_out) == len(added) / 4
     np.testing.assert_array_equal(more.runs.points[:8], few.runs.points)
+
+
+def test_the_search_does_not_end_where_the_emulator_knows_nothing():
+    """The logarithm of b reaches far beyond the runs, where anything is possible: a decoy beside a narrow posterior."""
+    priors = {"k": tq.Uniform(0.1, 4.0), "b": tq.Uniform(0.0, 2.0)}
+
+    def spring(parameters):
+        return parameters["k"] * (DEPTH + 3 * parameters["b"] * DEPTH**2)
+
+    emulator = emulate(designed(spring, priors, 12), DEPTH)
+    data = measured(spring, {"k": 1.5, "b": 0.8}, 0.001)
+    found = tq.calibrate(DEPTH, data, spring, priors, noise_sd=0.001, emulator=emulator)
+    assert abs(found.marginals["k"].mean - 1.5) < 0.05
+    assert abs(found.marginals["b"].mean - 0.8) < 0.1
 
 
 def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():

@@ -71,7 +71,7 @@ def calibrated(problem: Problem, run: Runner, choices: Choices, emulator: Emulat
     """
     if emulator is None:
         runs = run(space_filling(problem.forward_priors, choices.runs, choices.seed, choices.design))
-        emulator = emulate(runs, problem.control, choices.kernel, choices.trend)
+        emulator = emulate(runs, problem.control, choices.kernel, choices.trend, problem.forward_priors)
     else:
         _check_fit(problem, emulator)
     found = _posterior(problem, emulator, choices)
@@ -81,7 +81,9 @@ def calibrated(problem: Problem, run: Runner, choices: Choices, emulator: Emulat
         left -= len(more)
         if not more.failed.all():
             held_out = (*held_out, found.emulator.check(*more.good))
-        emulator = emulate(found.runs.joined(more), problem.control, choices.kernel, choices.trend)
+        emulator = emulate(
+            found.runs.joined(more), problem.control, choices.kernel, choices.trend, problem.forward_priors
+        )
         found = _posterior(problem, emulator, choices)
     return Calibration(found.problem, found.emulator, found.posterior, held_out, choices.seed, choices.method)
 

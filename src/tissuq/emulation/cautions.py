@@ -18,6 +18,20 @@ TOO_SURE = 1.5
 """Root mean square of the standardised errors above which an emulator is too sure of itself."""
 EDGE, MASS_AT_EDGE = 0.01, 0.02
 """Share of the design's width that is its edge, and of the posterior there that is worth a word."""
+CAUTIONS = {
+    "none": (
+        "no error of the forward model is allowed for: where it is wrong, its parameters are over-confident, and the "
+        "interval does not show it."
+    ),
+    "gp": (
+        "the discrepancy has initial stiffness of its own, and takes it from the parameters: measured, its intervals hold "
+        "the initial modulus far less often than they say (docs/expensive-models.md). Prefer gp-pinned."
+    ),
+    "gp-pinned": (
+        "the initial stiffness is left to the parameters; what the discrepancy has learnt holds for this experiment alone."
+    ),
+}
+"""What a reader must know of each discrepancy, beside a forward model."""
 NEAR_FAILURES = 0.05
 """Share of the posterior nearer to a run that failed than to any other."""
 
@@ -42,8 +56,7 @@ def warnings_about(calibration: Calibration) -> Iterator[str]:
             f"the posterior reaches the end of what was simulated for {', '.join(ends)}: there the prior, not the "
             "data, decides. Give a wider prior, unless the bound is meant."
         )
-    if calibration.problem.discrepancy.caution:
-        yield calibration.problem.discrepancy.caution
+    yield CAUTIONS[calibration.problem.discrepancy.name]
 
 
 def _about_emulator(calibration: Calibration) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
@@ -16,6 +16,7 @@ from tissuq.emulation.checks import EmulatorCheck
 from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, left_out, moments, trend_basis
 from tissuq.emulation.runs import ForwardRuns
 from tissuq.errors import InputError, ModelError
+from tissuq.priors import Prior
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +27,9 @@ FloatArray = NDArray[np.float64]
 
 MOST_CHOICES = 3
 """Parameters of which each may be taken by its logarithm or not; with more, all or none are."""
+RARE, BEYOND = 1e-4, 0.25
+"""Probability below a value of a parameter that is still looked at, and how far it may lie beyond the runs, in their
+range."""
 MARGIN = 4
 """Runs by which a design must exceed the coefficients of the mean."""
 
@@ -163,7 +167,11 @@ def _compiled(form: tuple[Kernel, Trend]) -> Any:
 
 
 def emulate(
-    runs: ForwardRuns, control: ArrayLike, kernel: Kernel = "squared-exponential", trend: Trend = "linear"
+    runs: ForwardRuns,
+    control: ArrayLike,
+    kernel: Kernel = "squared-exponential",
+    trend: Trend = "linear",
+    priors: Mapping[str, Prior] | None = None,
 ) -> Emulator:
     """Return the emulator of a model from its runs.
 
@@ -179,6 +187,8 @@ def emulate(
         ``"squared-exponential"``, for models that are smooth in their parameters, or ``"matern-5/2"``.
     trend : str
         Polynomial mean of the processes: ``"constant"``, ``"linear"`` or ``"quadratic"``.
+    priors : mapping of str to Prior, optional
+        Of the parameters. One that may come far nearer to zero than the runs is not taken by its logarithm.
 
     Raises
     ------
@@ -189,6 +199,8 @@ def emulate(
         if value not in get_args(kind):
             raise InputError(f"the {name} must be one of {', '.join(get_args(kind))}, not '{value}'.")
     points, outputs = runs.good
+    form: tuple[Kernel, Trend] = (kernel, trend)
+    known = [None if priors is None else priors[symbol] for symbol in runs.symbols]
     needed = MARGIN + trend_basis(np.zeros((1, points.shape[1])), trend).shape[1]
     if len(points) < needed:
         failed = f" {runs.told_failures}" if runs.failed.any() else ""
@@ -198,27 +210,40 @@ def emulate(
         )
     if np.ptp(outputs, axis=0).max() == 0:
         raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")
+    choices = _choices(points, [_may_be_log(column, prior) for column, prior in zip(points.T, known, strict=True)])
     every = [
-        _best_coordinates(runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), kernel, trend)
+        _best_coordinates(runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), choices, form)
         for is_log in (False, True)[: 1 + has_signs(outputs)]
     ]
     return max(every, key=lambda each: each.check().log_density)
 
 
 def _best_coordinates(
-    runs: ForwardRuns, control: FloatArray, basis: OutputBasis, kernel: Kernel, trend: Trend
+    runs: ForwardRuns,
+    control: FloatArray,
+    basis: OutputBasis,
+    choices: Sequence[Coordinates],
+    form: tuple[Kernel, Trend],
 ) -> Emulator:
     """Return the emulator with the coordinates that make the scores of the runs most probable."""
     points, outputs = runs.good
     scores = basis.scores(outputs)
-    found = ((where, fitted(where.of(points), scores, kernel, trend)) for where in _choices(points))
+    found = ((where, fitted(where.of(points), scores, *form)) for where in choices)
     where, kriging = max(found, key=lambda pair: pair[1].log_evidence)
     return Emulator(runs, control, where, basis, kriging)
 
 
-def _choices(points: FloatArray) -> list[Coordinates]:
-    """Return the coordinates that there are: every positive parameter by itself or by its logarithm."""
-    positive = [bool(each) for each in np.all(points > 0, axis=0)]
+def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
+    """Return whether all of a prior that matters is near the runs (m,) on the line of logarithms."""
+    if column.min() <= 0:
+        return False
+    low, high = np.log([column.min(), column.max()])
+    least = column.min() if prior is None else float(prior.quantile(RARE))
+    return least > 0 and low - np.log(least) <= BEYOND * (high - low)
+
+
+def _choices(points: FloatArray, positive: Sequence[bool]) -> list[Coordinates]:
+    """Return the coordinates that there are: every parameter by itself or, where it may be, by its logarithm."""
     choices: list[tuple[bool, ...]] = [(False,) * len(positive), tuple(positive)]
     if sum(positive) <= MOST_CHOICES:
         choices = list(product(*((False, True) if each else (False,) for each in positive)))

@@ -25,7 +25,7 @@ Trend = Literal["constant", "linear", "quadratic"]
 
 NUGGET = (1e-12, 1e-2)
 """Bounds of the nugget over the variance: rounding, and the noise of a solver."""
-TYPICAL, SPREAD = 1.0, 1.5
+TYPICAL, SPREAD = 0.7, 1.0
 """Median of the length scales over the width of the design, and the sd of their logarithm, a priori."""
 STARTS = 5
 SETTINGS = 12

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.likelihood import Likelihood, log_posterior
-from tissuq.emulation.problem import Method
+from tissuq.emulation.problem import Method, Problem
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.importance import Proposal, adapted, effective, log_normal
 from tissuq.inference.marginal import Marginal, marginal_of_points
@@ -28,6 +28,8 @@ LEAST_EFFECTIVE = 800
 MOST_ALONE = 0.02
 """Share of the weight that no point may exceed."""
 CHAINS, DRAWS = 4, 1000
+PRIOR_POINTS = 512
+"""Among which NUTS starts at the best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,59 +98,79 @@ def sampled(likelihood: Likelihood, seed: int = 0, method: Method = "auto") -> S
 
 
 def _by_importance(likelihood: Likelihood, seed: int) -> Sampled:
-    """Return weighted points: scores of a standard normal prior, drawn from a heavy-tailed fit of the posterior."""
+    """Return weighted points: scores of a standard normal prior, drawn from heavy-tailed fits of the posterior."""
+    problem = likelihood.problem
+    scores, logs = _weighted_scores(likelihood, seed)
+    weights = np.exp(logs - logs.max())
+    mean_weight = float(weights.mean())
+    weights /= weights.sum()
+    count, enough, alone = len(logs), effective(logs), float(weights.max())
+    converged = enough > LEAST_EFFECTIVE and alone < MOST_ALONE
+    verdict = (
+        f"{'Converged' if converged else 'Not converged'}: {enough:.0f} of {count} weighted points are effective (at "
+        f"least {LEAST_EFFECTIVE}); the heaviest has {alone:.2g} of the weight (less than {MOST_ALONE})."
+    )
+    values = _values(problem, scores)
+    order = np.random.default_rng([seed, 47]).permutation(systematic(weights[None], CHAINS * DRAWS)[0])
+    return Sampled(
+        symbols=problem.symbols,
+        values=values,
+        weights=weights,
+        method="importance",
+        converged=converged,
+        verdict=verdict,
+        ess=dict.fromkeys(problem.symbols, enough),
+        rhat={},
+        log_evidence=float(logs.max() + np.log(mean_weight)),
+        log_evidence_error=float(np.sqrt(max(1 / enough - 1 / count, 0.0))),
+        draws=values[order].reshape(CHAINS, DRAWS, -1),
+        supports=tuple(each.support for each in problem.priors.values()),
+    )
+
+
+def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Return scores (N, D) and the logarithms of their weights (N,), over the mixture of all rounds' proposals.
+
+    Where an emulator knows nothing anything is possible, and a search may end there: so there are two, one of them as
+    if it were exact, and both lead to the posterior.
+    """
     from scipy.stats import qmc
 
-    priors = tuple(likelihood.problem.priors.values())
-    size = len(priors)
-
-    def log_target(scores: FloatArray) -> FloatArray:
-        height = likelihood.log_density(_values(likelihood, scores)) + log_normal(scores)
-        return np.where(np.isfinite(height), height, -np.inf)
-
-    proposal = adapted(log_target, size, SCOUTS)
+    exact = Likelihood(likelihood.problem, likelihood.emulator, has_error=False)
+    size = len(likelihood.problem.symbols)
+    searched = [adapted(partial(_log_target, each), size, SCOUTS) for each in (exact, likelihood)]
     cube = qmc.Sobol(size, rng=np.random.default_rng([seed, 43])).random(ROUND * ROUNDS)
-    cube = np.clip(cube, 1e-12, 1 - 1e-12)
-    proposals, scores, targets = [], np.zeros((0, size)), np.zeros(0)
-    for uniforms in np.split(cube, ROUNDS):
-        proposals.append(proposal)
-        new = proposal.points(uniforms)
-        scores, targets = np.concatenate([scores, new]), np.concatenate([targets, log_target(new)])
+    proposals: list[Proposal] = []
+    scores, targets, logs = np.zeros((0, size)), np.zeros(0), np.zeros(0)
+    for number, uniforms in enumerate(np.split(np.clip(cube, 1e-12, 1 - 1e-12), ROUNDS)):
+        proposals.append(searched[number] if number < len(searched) else _moved(scores, logs))
+        new = proposals[-1].points(uniforms)
+        scores, targets = np.concatenate([scores, new]), np.concatenate([targets, _log_target(likelihood, new)])
         if not np.isfinite(targets).any():
             raise ConvergenceError("the measurements have no probability at any parameters that the priors allow.")
         mixture = np.logaddexp.reduce([each.log_density(scores) for each in proposals], axis=0)
         logs = targets - mixture + np.log(len(proposals))
-        weights = np.exp(logs - logs.max())
-        weights /= weights.sum()
-        proposal = _moved(scores, weights)
-    number_effective, alone = effective(logs), float(weights.max())
-    converged = number_effective > LEAST_EFFECTIVE and alone < MOST_ALONE
-    evidence = float(logs.max() + np.log(np.exp(logs - logs.max()).mean()))
-    error = float(np.sqrt(1 / number_effective - 1 / len(logs))) if number_effective < len(logs) else 0.0
-    verdict = (
-        f"{'Converged' if converged else 'Not converged'}: {number_effective:.0f} of {len(logs)} weighted points are "
-        f"effective (at least {LEAST_EFFECTIVE}); the heaviest has {alone:.2g} of the weight (less than {MOST_ALONE})."
-    )
-    generator = np.random.default_rng([seed, 47])
-    order = generator.permutation(systematic(weights[None], CHAINS * DRAWS)[0])
-    values = _values(likelihood, scores)
-    return Sampled(
-        likelihood.problem.symbols, values, weights, "importance", converged, verdict,
-        dict.fromkeys(likelihood.problem.symbols, number_effective), {}, evidence, error,
-        values[order].reshape(CHAINS, DRAWS, size), tuple(each.support for each in priors),
-    )  # fmt: skip
+    return scores, logs
 
 
-def _values(likelihood: Likelihood, scores: FloatArray) -> FloatArray:
+def _log_target(likelihood: Likelihood, scores: FloatArray) -> FloatArray:
+    """Return the log of the posterior (N,) at scores (N, D), up to the evidence."""
+    height = likelihood.log_density(_values(likelihood.problem, scores)) + log_normal(scores)
+    return np.where(np.isfinite(height), height, -np.inf)
+
+
+def _values(problem: Problem, scores: FloatArray) -> FloatArray:
     """Return the parameters (N, D) below which the priors hold what a standard normal holds below scores (N, D)."""
     from scipy.special import ndtr
 
-    priors = likelihood.problem.priors.values()
+    priors = problem.priors.values()
     return np.column_stack([each.quantile(ndtr(column)) for each, column in zip(priors, scores.T, strict=True)])
 
 
-def _moved(scores: FloatArray, weights: FloatArray) -> Proposal:
-    """Return a proposal with the mean and the covariance of weighted points."""
+def _moved(scores: FloatArray, logs: FloatArray) -> Proposal:
+    """Return a proposal with the mean and the covariance of points with log weights (N,)."""
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
     mean = weights @ scores
     away = scores - mean
     covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(len(mean))
@@ -156,20 +178,28 @@ def _moved(scores: FloatArray, weights: FloatArray) -> Proposal:
 
 
 def _by_nuts(likelihood: Likelihood, seed: int, before: Sampled | None) -> Sampled:
-    """Return equally weighted draws of the no-U-turn sampler, with the evidence that importance sampling gave."""
-    priors = tuple(likelihood.problem.priors.values())
-    symbols = likelihood.problem.symbols
-    lower, upper = np.array([prior.support for prior in priors]).T
-    scores = np.random.default_rng([seed, 53]).standard_normal((512, len(priors)))
-    points = _values(likelihood, scores) if before is None else before.values
+    """Return equally weighted draws of the no-U-turn sampler, begun where importance sampling came to."""
+    problem = likelihood.problem
+    lower, upper = np.array([prior.support for prior in problem.priors.values()]).T
+    scattered = np.random.default_rng([seed, 53]).standard_normal((PRIOR_POINTS, len(problem.symbols)))
+    points = _values(problem, scattered) if before is None else before.values
     heights = likelihood.log_density(points) if before is None else before.weights
     start = points[int(np.argmax(np.where(np.isfinite(heights), heights, -np.inf)))]
-    density = log_posterior(likelihood.form, priors)
-    found = sample_nuts(density, lower, upper, start, NutsSettings(seed=seed), symbols, likelihood.data)
-    values = found.values.reshape(-1, len(symbols))
-    ess = np.minimum(found.ess_bulk, found.ess_tail)
+    density = log_posterior(likelihood.form, tuple(problem.priors.values()))
+    found = sample_nuts(density, lower, upper, start, NutsSettings(seed=seed), problem.symbols, likelihood.data)
+    values = found.values.reshape(-1, len(problem.symbols))
+    sizes = np.minimum(found.ess_bulk, found.ess_tail)
     return Sampled(
-        symbols, values, np.full(len(values), 1 / len(values)), "nuts", found.converged, found.verdict,
-        dict(zip(symbols, map(float, ess), strict=True)), dict(zip(symbols, map(float, found.rhat), strict=True)),
-        None, None, found.values, tuple(zip(lower.tolist(), upper.tolist(), strict=True)),
-    )  # fmt: skip
+        symbols=problem.symbols,
+        values=values,
+        weights=np.full(len(values), 1 / len(values)),
+        method="nuts",
+        converged=found.converged,
+        verdict=found.verdict,
+        ess=dict(zip(problem.symbols, map(float, sizes), strict=True)),
+        rhat=dict(zip(problem.symbols, map(float, found.rhat), strict=True)),
+        log_evidence=None,
+        log_evidence_error=None,
+        draws=found.values,
+        supports=tuple(each.support for each in problem.priors.values()),
+    )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import pickle
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -56,11 +56,14 @@ def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers
     if workers > 1:
         _check_travels(model)
     with TemporaryDirectory() as scratch, open_pool(workers) as pool:
-        place = Path(scratch) if folder is None else _opened(Path(folder), model, problem)
+        place = Path(scratch) if folder is None else Path(folder)
+        missing = [each for each in (place, *place.absolute().parents) if not each.exists()]
+        if folder is not None:
+            _open(place, model, problem)
         try:
             yield _Runs(model, problem, place, pool, step)
         except BaseException:
-            _remove_if_fruitless(place)
+            _remove_if_fruitless(place, missing)
             raise
 
 
@@ -90,8 +93,8 @@ class _Runs:
         return gathered(symbols, results, len(control))
 
 
-def _opened(folder: Path, model: Forward, problem: Problem) -> Path:
-    """Return the folder, marked as that of this model and these controls."""
+def _open(folder: Path, model: Forward, problem: Problem) -> None:
+    """Mark a folder as that of this model and these controls, or refuse it."""
     about = {
         "model": model.identity,
         "parameters": list(problem.forward_symbols),
@@ -109,20 +112,23 @@ def _opened(folder: Path, model: Forward, problem: Problem) -> Path:
                     f"folder '{folder}' holds runs of another forward model or data (its {name} differ): choose "
                     "another one, or remove it."
                 )
-        return folder
+        return
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"'{folder}' is not a folder of forward runs; choose another one.")
     folder.mkdir(parents=True, exist_ok=True)
     scratch = file.with_suffix(".new")
     scratch.write_text(json.dumps(about), encoding="utf-8")
     scratch.replace(file)
-    return folder
 
 
-def _remove_if_fruitless(folder: Path) -> None:
-    """Remove a folder in which not one run has ended."""
-    if not any(path.stat().st_size for path in folder.glob(f"batch-*/{RESULTS}")):
-        shutil.rmtree(folder, ignore_errors=True)
+def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:
+    """Remove a folder in which not one run has ended, and what was made to hold it."""
+    if any(path.stat().st_size for path in folder.glob(f"batch-*/{RESULTS}")):
+        return
+    shutil.rmtree(folder, ignore_errors=True)
+    for each in missing[1:]:
+        with suppress(OSError):
+            each.rmdir()
 
 
 def _forget_failures(results: Path) -> None:
