@@ -24,11 +24,12 @@ CAUTIONS = {
         "interval does not show it."
     ),
     "gp": (
-        "the discrepancy has initial stiffness of its own, and takes it from the parameters: measured, its intervals hold "
-        "the initial modulus far less often than they say (docs/expensive-models.md). Prefer gp-pinned."
+        "the discrepancy has initial stiffness of its own, and takes it from the parameters: measured, its intervals "
+        "hold the initial modulus far less often than they say (docs/expensive-models.md). Prefer gp-pinned."
     ),
     "gp-pinned": (
-        "the initial stiffness is left to the parameters; what the discrepancy has learnt holds for this experiment alone."
+        "the initial stiffness is left to the parameters; what the discrepancy has learnt holds for this experiment "
+        "alone."
     ),
 }
 """What a reader must know of each discrepancy, beside a forward model."""
