@@ -5,8 +5,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUNS ?= runs
 BENCH := .venv-bench
+APT := { apt-get install -qq -y calculix-ccx || { apt-get update -qq && apt-get install -qq -y calculix-ccx; }; }
 
-.PHONY: demo test lint types check lock bench clean help
+.PHONY: demo test lint types check system lock bench clean help
 
 help:  ## List the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -30,6 +31,17 @@ types: $(VENV)/.installed-dev  ## Check types
 	$(BIN)/mypy
 
 check: lint types test  ## Everything that CI checks
+
+# CalculiX is no Python package. Where it cannot be installed the tests that need it skip, so that this never fails.
+system:  ## Install CalculiX, which judges the material cards in the tests (Debian, Ubuntu; as root or with sudo)
+	@if command -v ccx >/dev/null; then echo "CalculiX is here: $$(command -v ccx)"; \
+	elif ! command -v apt-get >/dev/null; then \
+	  echo "CalculiX (ccx) is not here, and nor is apt-get: install it from https://www.calculix.de or with conda"; \
+	  echo "(conda install -c conda-forge calculix) and put ccx on the PATH. Without it some tests skip."; \
+	elif [ "$$(id -u)" -eq 0 ]; then $(APT); \
+	elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then sudo sh -c '$(APT)'; \
+	else echo "CalculiX (ccx) is not here; to install it: sudo apt-get install calculix-ccx. Without it some tests skip."; fi \
+	|| echo "CalculiX could not be installed; the tests that need it skip."
 
 bench: $(BENCH)/.installed  ## Time tissuq by itself and beside other libraries; writes benchmarks/RESULTS.md (half an hour)
 	$(BENCH)/bin/python benchmarks/cold_start.py

@@ -54,7 +54,8 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
 
 
 @pytest.mark.parametrize(
-    "document", ["README.md", "CONTRIBUTING.md", "docs/several-tests.md", "docs/expensive-models.md"]
+    "document",
+    ["README.md", "CONTRIBUTING.md", "docs/several-tests.md", "docs/prediction.md", "docs/expensive-models.md"],
 )
 def test_the_python_in_the_documents_runs(document):
     text = (ROOT.parents[1] / document).read_text(encoding="utf-8")

@@ -1,7 +1,7 @@
 """tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
 from tissuq import finite_elements
-from tissuq.assessment import Assessment, Average, average, compare
+from tissuq.assessment import Assessment, Average, Candidate, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
 from tissuq.emulation import Calibration, Emulator, UmbridgeForward
 from tissuq.ensemble import EnergyDraw, Ensemble
@@ -28,9 +28,11 @@ from tissuq.parameters import Parameter
 from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from tissuq.report.cards import write_cards
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
+from tissuq.studies.prediction import Prediction, predict_run
 from tissuq.tolerances import Tolerances
 
 __version__ = "0.1.0"
@@ -39,6 +41,7 @@ __all__ = [
     "Assessment",
     "Average",
     "Calibration",
+    "Candidate",
     "ConvergenceError",
     "Discrepancy",
     "Emulator",
@@ -64,6 +67,7 @@ __all__ = [
     "Parameter",
     "Population",
     "Posterior",
+    "Prediction",
     "Prior",
     "ProportionalNoise",
     "RepeatNoise",
@@ -90,6 +94,8 @@ __all__ = [
     "load_run",
     "loading_modes",
     "materials",
+    "predict_run",
     "read_experiment",
     "simulate",
+    "write_cards",
 ]

@@ -213,7 +213,18 @@ def _of_material(material: Material, values: FloatArray, stretch: FloatArray, mo
 
 def _curves(draws: Sequence[EnergyDraw], places: NDArray[np.intp]) -> Callable[[FloatArray, Path], FloatArray]:
     """Return the function that gives the stresses of some of the draws."""
-    return partial(_stress, [draws[place] for place in places])
+    some = [draws[place] for place in places]
+
+    def stresses(points: FloatArray, path: Path) -> FloatArray:
+        try:
+            return _stress(some, points, path)
+        except TypeError as error:
+            raise ModelError(
+                f"the stability of material '{some[0].parts[0][0].name}' is not known, because its energy is not plain "
+                "arithmetic of arrays: write it without jax.numpy and branches, or take all draws (--all-draws)."
+            ) from error
+
+    return stresses
 
 
 def _check(model: StatisticalModel, count: int, sampling: str) -> None:

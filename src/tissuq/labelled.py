@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment import known_evidence_changes
+from tissuq.errors import InputError
 from tissuq.inference.solution import Solution
 from tissuq.prediction.densities import leave_one_out
 from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
-__all__ = ["labelled_arrays", "labels_of"]
+__all__ = ["labelled_arrays", "labels_of", "summary_table"]
 
 
 def labelled_arrays(solution: Solution, seed: int) -> xr.DataTree:
@@ -91,6 +93,34 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[Hashable, float])
         labels |= {} if found.least_bfmi is None else {"least_bfmi": found.least_bfmi}
     evidence = {"log_evidence": solution.log_evidence, "log_evidence_error": solution.log_evidence_error}
     return labels | {name: value for name, value in evidence.items() if value is not None}
+
+
+def summary_table(solution: Solution, prob: float, parameters: Sequence[str] | None) -> pd.DataFrame:
+    """Return mean, sd, median and interval of the parameters that are asked for; `Posterior.summary` describes it."""
+    import pandas as pd
+
+    model = solution.model
+    if not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    wanted = model.symbols if parameters is None else tuple(parameters)
+    unknown = [symbol for symbol in wanted if symbol not in model.symbols]
+    if unknown:
+        raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(model.symbols)}.")
+    index, names = pd.Index(wanted, name="parameter"), ["mean", "sd", "median", "hdi_low", "hdi_high"]
+    table = pd.DataFrame([_numbers(solution, symbol, prob) for symbol in wanted], index, names)
+    found = solution.diagnostics
+    if found is not None:
+        table["ess"] = [min(found.ess_bulk[symbol], found.ess_tail[symbol]) for symbol in table.index]
+        table["rhat"] = [found.rhat[symbol] for symbol in table.index]
+    return table
+
+
+def _numbers(solution: Solution, symbol: str, prob: float) -> tuple[float, ...]:
+    """Return mean and sd (nan where there may be none), median and the ends of the interval of a parameter."""
+    marginal, model = solution.marginals[symbol], solution.model
+    has_moments = symbol not in model.energy_symbols or model.priors[symbol].has_moments
+    moments = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
+    return (*moments, float(marginal.quantile(0.5)), *marginal.hdi(prob))
 
 
 def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:

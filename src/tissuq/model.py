@@ -161,7 +161,10 @@ class StatisticalModel:
         Where the material has parameters in which its stress is not linear, ``bent`` holds their values: (s,), or
         (m, s) for (m, n, k) mean stresses. ``mode`` is that of the experiment unless another is given.
         """
-        return _basis(self.material, self.discrepancy, mode or self.experiment.mode, stretch, bent)
+        if mode is None or self.discrepancy.is_energy or mode == self.experiment.mode:
+            return _basis(self.material, self.discrepancy, mode or self.experiment.mode, stretch, bent)
+        own = stress_basis(self.material, mode, stretch, bent)  # an error of the stress says nothing of other modes
+        return np.pad(own, [(0, 0)] * (own.ndim - 1) + [(0, len(self.column_symbols) - own.shape[-1])])
 
     @property
     def headline(self) -> str:

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tissuq.assessment import Assessment, assess
+from tissuq.assessment import Assessment, Candidate, assess, rank_tests
 from tissuq.assessment.modulus import modulus
-from tissuq.assessment.stability import StableRange, calibrated_range, stability, stable_ranges
+from tissuq.assessment.scoring import scores_of
+from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
 from tissuq.cautions import warnings_about
 from tissuq.ensemble import Ensemble, Sampling, drawn_ensemble
-from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading import STRESS_TYPES
+from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
-from tissuq.labelled import labelled_arrays, labels_of
+from tissuq.labelled import labelled_arrays, labels_of, summary_table
 from tissuq.model import StatisticalModel
-from tissuq.prediction.bands import predict_band, share_inside
+from tissuq.prediction.bands import predict_band, share_inside, stress_ratio
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -159,13 +158,7 @@ class Posterior:
         """
         import pandas as pd
 
-        own = [each for each in self.model.experiment.modes if len(each.controls) == len(each.stresses) == 1]
-        asked = (own or [loading_mode("uniaxial")])[0] if mode is None else loading_mode(mode)
-        if len(asked.controls) > 1:
-            raise InputError(f"stability is told in modes of one control, and '{asked.name}' has several.")
-        ends = calibrated_range(self.model.experiment, asked)
-        at = np.linspace(*ends, points) if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=np.float64))
-        found = stability(self.solution, asked, at)
+        found = stability_over(self.solution, mode, stretch, points)
         return pd.DataFrame({name: value for name, value in vars(found).items() if name != "mode"})
 
     @cached_property
@@ -183,6 +176,31 @@ class Posterior:
         (True, 1.0)
         """
         return stable_ranges(self.solution)
+
+    def design(
+        self, candidates: Sequence[str | Candidate] = (), target: str | Sequence[str] = (), **options: Any
+    ) -> pd.DataFrame:
+        """Rank tests that could be made next by how much less uncertain they are expected to make a target.
+
+        The columns, and the ``options`` points, specimen and seed, are those of `tissuq.assessment.rank_tests`.
+
+        Parameters
+        ----------
+        candidates : sequence of str or Candidate
+            Such as ``"planar 1:1.5 20"``; usual ones in all modes, unless given.
+        target : str or sequence of str
+            ``"modulus"`` (the initial shear modulus, unless given), a parameter, or a stress such as ``"planar:1.5"``.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+        >>> posterior = tq.fit(data, discrepancy="none", noise_sd=0.02)
+        >>> posterior.design(["uniaxial 0.9:1.1 4", "uniaxial 0.7:1.3 4"]).query("not is_repeat")["low"].tolist()
+        [0.7, 0.9]
+        """
+        chosen = [target] if isinstance(target, str) else target
+        return rank_tests(self.solution, candidates, chosen, **options)
 
     def update(self, more: Experiment) -> Posterior:
         """Return the posterior after further measurements, as if all had been fitted at once.
@@ -226,28 +244,7 @@ class Posterior:
             Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
             when the posterior was sampled.
         """
-        import pandas as pd
-
-        if not 0 < prob < 1:
-            raise InputError(f"prob must be between 0 and 1, not {prob}.")
-        wanted = self.model.symbols if parameters is None else tuple(parameters)
-        unknown = [symbol for symbol in wanted if symbol not in self.model.symbols]
-        if unknown:
-            raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(self.model.symbols)}.")
-        index, names = pd.Index(wanted, name="parameter"), ["mean", "sd", "median", "hdi_low", "hdi_high"]
-        table = pd.DataFrame([self._numbers(symbol, prob) for symbol in wanted], index, names)
-        found = self.solution.diagnostics
-        if found is not None:
-            table["ess"] = [min(found.ess_bulk[symbol], found.ess_tail[symbol]) for symbol in table.index]
-            table["rhat"] = [found.rhat[symbol] for symbol in table.index]
-        return table
-
-    def _numbers(self, symbol: str, prob: float) -> tuple[float, ...]:
-        """Return mean and sd (nan where there may be none), median and the ends of the interval of a parameter."""
-        marginal = self.solution.marginals[symbol]
-        has_moments = symbol not in self.model.energy_symbols or self.model.priors[symbol].has_moments
-        moments = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
-        return (*moments, float(marginal.quantile(0.5)), *marginal.hdi(prob))
+        return summary_table(self.solution, prob, parameters)
 
     def predict(
         self,
@@ -286,14 +283,43 @@ class Posterior:
         import pandas as pd
 
         options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
-        if stress_type not in STRESS_TYPES:
-            raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
+        ratio = stress_ratio(stress_type, mode or self.model.experiment.modes[0], channel)
         found = pd.DataFrame(vars(predict_band(self.solution, stretch, **options, channel=channel)))
-        if stress_type == "cauchy":
-            asked = self.model.experiment.modes[0] if mode is None else loading_mode(mode)
-            ratio = asked.channels[channel].cauchy_ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
-            found[["mean", "low", "high"]] *= np.asarray(ratio)[:, None]
+        factor = ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
+        found[["mean", "low", "high"]] *= np.asarray(factor)[:, None]
         return found
+
+    def scores(
+        self, test: Experiment, *, discrepancy: bool = True, prob: float = 0.95, stress_type: str = "engineering"
+    ) -> pd.DataFrame:
+        """Return how well a test that the posterior has not seen is predicted, in any loading mode.
+
+        Parameters
+        ----------
+        test : Experiment
+            Its measurements without stress are left out: at rest it is zero by definition.
+        discrepancy, prob, stress_type
+            As of `predict`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            For every stress of the test a row with all measurements and, where some lie beyond the range in which both
+            invariants were measured, one with those in the ``range`` (``"calibrated"``) and one with those
+            ``"beyond"``: how many (``count``), and what `tissuq.prediction.scores.Judged.summary` describes: inside,
+            half_width, error, crps and interval_score.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data, other = (tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.02, mode=m, seed=1)
+        ...                for m in ("uniaxial", "planar"))
+        >>> found = tq.fit(data, noise_sd=0.02).scores(other)
+        >>> bool(found["inside"][0] > 0.7), bool(found["crps"][0] < 0.03)
+        (True, True)
+        """
+        return scores_of(self.solution, test, discrepancy=discrepancy, prob=prob, stress_type=stress_type)
 
     def ensemble(self, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True) -> Ensemble:
         """Return equally probable draws as complete materials, with the discrepancy in their energy.

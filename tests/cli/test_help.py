@@ -23,8 +23,22 @@ def test_help_is_shown_without_importing_a_heavy_library():
 
 @pytest.mark.parametrize(
     "name",
-    ["paper", "fit", "inspect", "population", "calibrate", "show", "materials", "modes", "discrepancies", "study"]
-    + ["datasets"],
+    [
+        "paper",
+        "fit",
+        "inspect",
+        "predict",
+        "population",
+        "calibrate",
+        "design",
+        "show",
+        "materials",
+        "modes",
+        "discrepancies",
+        "datasets",
+        "study",
+        "export",
+    ],
 )
 def test_every_command_has_help(cli, name):
     said = cli(name, "--help")

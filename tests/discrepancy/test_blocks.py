@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from loading import MEASURED
-from tissuq.discrepancy.blocks import EnergyBlock
+from tissuq.discrepancy.blocks import Coordinates, EnergyBlock
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics import MooneyRivlin, stress_basis
-from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
+from tissuq.mechanics.path import farthest_stretch, invariant_rates, invariants, log_stretches
 from tissuq.registry import variants
 
 BLOCKS = variants(EnergyBlock)
@@ -81,3 +81,39 @@ def test_one_energy_acts_in_every_mode(name):
     for end in ends:
         first, second = energy(equibiaxial, end), energy(uniaxial, end**-2)
         assert np.allclose(first, second, rtol=1e-5, atol=1e-5 * np.abs(first).max())
+
+
+def by_chain_rule(block, path, points, reach, length):
+    """Stresses (n, q) of a block's terms from their slopes, which are functions of I1, of I2 and of ln l alone."""
+    (x, y), (logs, log_rates) = invariants(path, points), log_stretches(path, points)
+    first, second = invariant_rates(path, points)
+    found = block.slopes(Coordinates(x, y, logs.ravel()), reach, length)
+    of_logs = np.einsum("nmq,nm->nq", found.logarithm.reshape(len(points), 3, -1), log_rates)
+    return found.first * first[:, None] + found.second * second[:, None] + of_logs
+
+
+@pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "planar"])
+@pytest.mark.parametrize("name", BLOCKS)
+def test_stresses_follow_from_slopes_along_the_invariants_and_logarithms(name, mode):
+    block, path = of(name), loading_mode(mode)
+    for reach, length in settings(block, path):
+        features = block.stress_features(path, STRETCH, reach, length)
+        assert block.count(reach, length) == features.shape[1]
+        found = by_chain_rule(block, path, STRETCH, reach, length)
+        assert np.allclose(found, features, rtol=1e-9, atol=1e-9 * np.abs(features).max())
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_beyond_the_reach_further_terms_make_up_the_whole_variance(name):
+    block, measured, path = of(name), loading_mode("uniaxial"), loading_mode("equibiaxial")
+    stretched = np.linspace(1.0, 2.0, 30)
+    most = [float(each.max()) for each in invariants(measured, stretched)]  # which leaves ln l free beyond its reach
+    beyond = np.linspace(*(farthest_stretch(path, most, sign) for sign in (-1, 1)), 25)
+    for reach, length in settings(block, measured, stretched):
+        count = block.count(reach, length)
+        found = by_chain_rule(block, path, beyond, reach, length)
+        variance = block.stress_variance(path, beyond, reach, length)
+        own = block.stress_features(path, beyond, reach, length)
+        assert np.allclose(found[:, :count], own, rtol=1e-5, atol=1e-5 * np.sqrt(variance.max()))
+        tolerance = 1e-8 if name != "spline" else 1e-5
+        assert np.allclose((found**2).sum(axis=1), variance, atol=tolerance * variance.max())

@@ -41,6 +41,15 @@ def test_leaving_one_out_is_refitting_without_it(name, tolerance, noise_sd):
     np.testing.assert_allclose(found.log_density[INSIDE], expected, atol=tolerance)
 
 
+def test_a_sampled_posterior_leaves_out_a_measurement_at_rest():
+    # There a material alone has no stress, so that no draw of its parameters explains it better than another.
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.0, 1.1, 1.2, 1.3], noise_sd=0.05, seed=2)
+    found = leave_one_out(tq.fit(data, discrepancy="none", noise_sd=0.05, method="joint").solution)
+    at_rest = -0.5 * (data.stress[2] / 0.05) ** 2 - np.log(0.05 * np.sqrt(2 * np.pi))
+    assert found.log_density[2] == pytest.approx(at_rest, abs=1e-9)
+    assert not found.is_rough.any()
+
+
 def test_a_sampled_posterior_leaves_out_like_an_exact_one():
     # 4000 draws that PSIS weights: errors of a few hundredths.
     exact = leave_one_out(tq.fit(DATA, discrepancy="constant", noise_sd=0.05).solution)

@@ -68,3 +68,11 @@ def test_far_beyond_the_data_the_band_is_wide_and_finite(data):
     width = (band["high"] - band["low"]).to_numpy()
     assert np.isfinite(band.to_numpy()).all()
     assert (np.diff(width) > 0).all()
+
+
+@pytest.mark.parametrize("discrepancy", ["constant", "quadratic", "gp"])
+def test_the_material_alone_is_predicted_in_modes_of_two_stresses(data, discrepancy):
+    posterior = tq.fit(data, discrepancy=discrepancy, noise_sd=0.03)
+    band = posterior.predict([[1.2, 1.1]], noise=False, discrepancy=False, mode="biaxial", channel=1)
+    unit = 2 * (1.1 - 1 / (1.2**2 * 1.1**3))  # neo-Hooke: 2 (l2 - 1 / (l1^2 l2^3))
+    assert band["mean"][0] == pytest.approx(unit * posterior.summary().loc["C10", "mean"], rel=1e-3)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import loading_mode
 from tissuq.inference.marginal import Marginal, blended, marginal_of_mixture, marginal_of_points, widened
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import Components, Solution
 from tissuq.mechanics import Material, initial_shear_modulus, stress_basis
 from tissuq.model import StatisticalModel
 from tissuq.prediction.moments import coefficients
 
-__all__ = ["modulus", "modulus_symbols"]
+__all__ = ["modulus", "modulus_moments", "modulus_symbols"]
 
 FloatArray = NDArray[np.float64]
 
@@ -29,14 +29,13 @@ def modulus(solution: Solution) -> Marginal:
     """
     model, parts = solution.model, solution.components
     symbols = modulus_symbols(model)
-    bent = parts.settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]]
-    moduli = _moduli(model, bent)
+    moduli = _moduli(model, _bent(model, parts))
     if len(symbols) == 1 and not np.ptp(moduli, axis=0).any():
         factor = float(moduli[0, model.column_symbols.index(symbols[0])])
         return _scaled(solution.marginals[symbols[0]], factor)
     bounds = (0.0 if solution.stable_in else -np.inf, np.inf)
-    mean, root = coefficients(model, parts)
-    means, sds = (moduli * mean).sum(axis=1), np.linalg.norm(np.einsum("mk,mkp->mp", moduli, root), axis=1)
+    means, root = modulus_moments(model, parts)
+    sds = np.linalg.norm(root, axis=1)
     is_wide = sds > 0
     found = []
     if is_wide.any():
@@ -48,10 +47,21 @@ def modulus(solution: Solution) -> Marginal:
     return widened(blended(found, bounds), model.common_error)
 
 
+def modulus_moments(model: StatisticalModel, parts: Components) -> tuple[FloatArray, FloatArray]:
+    """Return means (M,) and roots (M, p) of the initial shear modulus in every component, MPa."""
+    moduli, (mean, root) = _moduli(model, _bent(model, parts)), coefficients(model, parts)
+    return (moduli * mean).sum(axis=1), np.einsum("mk,mkp->mp", moduli, root)
+
+
 def modulus_symbols(model: StatisticalModel) -> tuple[str, ...]:
     """Return the parameters that the initial shear modulus is made of."""
     moduli = np.abs(_moduli(model, np.array([model.usual_bent])))[0]
     return tuple(s for s, size in zip(model.column_symbols, moduli, strict=True) if size > 1e-6 * moduli.max())
+
+
+def _bent(model: StatisticalModel, parts: Components) -> FloatArray:
+    """Return the parameters (M, s) in which the material's stress is not linear."""
+    return parts.settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]]
 
 
 def _moduli(model: StatisticalModel, bent: FloatArray) -> FloatArray:

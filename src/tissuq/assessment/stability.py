@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from tissuq.errors import ModelError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_modes
+from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Components, Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
@@ -26,7 +26,9 @@ __all__ = [
     "StableRange",
     "are_stable",
     "calibrated_range",
+    "is_calibrated",
     "stability",
+    "stability_over",
     "stable_draws",
     "stable_ranges",
 ]
@@ -131,6 +133,25 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(found))
     shares = (each.mean(axis=0) for each in (*found, stable))
     return Stability(mode.name, stretch, *shares)
+
+
+def stability_over(
+    solution: Solution, mode: str | LoadingMode | None, stretch: ArrayLike | None, points: int
+) -> Stability:
+    """Return the stability at stretches, or at so many over the range that was measured; unless said in its own mode.
+
+    Raises
+    ------
+    InputError, ModelError
+        When the mode has several controls; and as `stability`.
+    """
+    data = solution.model.experiment
+    own = [each for each in data.modes if len(each.controls) == len(each.stresses) == 1]
+    asked = (own or [loading_mode("uniaxial")])[0] if mode is None else loading_mode(mode)
+    if len(asked.controls) > 1:
+        raise InputError(f"stability is told in modes of one control, and '{asked.name}' has several.")
+    usual = np.linspace(*calibrated_range(data, asked), points)
+    return stability(solution, asked, usual if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=float)))
 
 
 def stable_ranges(solution: Solution) -> dict[str, StableRange]:
@@ -264,6 +285,19 @@ def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]
         return min(at_rest, *(float(each.min()) for each in own)), max(at_rest, *(float(each.max()) for each in own))
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
     return farthest_stretch(mode, most, -1), farthest_stretch(mode, most, 1)
+
+
+def is_calibrated(data: Experiment, mode: LoadingMode, points: FloatArray) -> Flags:
+    """Return at which points of a mode, (g,) or (g, c), the invariants stay in the range that was measured.
+
+    With one control that is `calibrated_range`.
+    """
+    if len(mode.controls) == 1:
+        low, high = calibrated_range(data, mode)
+        margin = 1e-9 * max(abs(low), abs(high))
+        return np.asarray((low - margin <= points) & (points <= high + margin))
+    pairs = zip(invariants(mode.channels[0], points), invariants(data.mode, data.stretch), strict=True)
+    return np.asarray(np.logical_and.reduce([own <= known.max() * (1 + 1e-9) for own, known in pairs]))
 
 
 def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:

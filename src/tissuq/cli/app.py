@@ -6,7 +6,21 @@ import sys
 
 import typer
 
-from tissuq.cli import calibrate, catalogue, check, compare, fit, inspect, paper, population, show, study
+from tissuq.cli import (
+    calibrate,
+    catalogue,
+    check,
+    compare,
+    design,
+    export,
+    fit,
+    inspect,
+    paper,
+    population,
+    predict,
+    show,
+    study,
+)
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -25,9 +39,12 @@ app = typer.Typer(
 app.command("paper")(paper.paper)
 app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
+app.command("predict")(predict.predict)
 app.command("population")(population.population)
 app.command("calibrate")(calibrate.calibrate)
 app.command("compare")(compare.compare)
+app.command("design")(design.design)
+app.command("export")(export.export)
 app.command("show")(show.show)
 app.command("materials")(catalogue.materials)
 app.command("modes")(catalogue.modes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -58,22 +58,24 @@ OPTIONS: dict[str, Any] = {
 DIMENSIONS = ("length", "area", "width", "thickness", "diameter")
 
 
-def reads_files(command: Callable[..., None]) -> Callable[..., None]:
+def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = None) -> Callable[..., None]:
     """Give a command the options that say how files are read, in place of its parameter ``read_as``.
 
-    That gets them as the settings of a file's reading.
+    That gets them as the settings of a file's reading. ``names`` are those of options that the command itself has
+    another use for.
     """
+    names = {name: name for name in OPTIONS} | dict(names or {})
     signature = inspect.signature(command, eval_str=True)
     place = list(signature.parameters).index("read_as")
     own = list(signature.parameters.values())
     options = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
+        inspect.Parameter(names[name], inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
         for name, option in OPTIONS.items()
     ]
 
     @wraps(command)
     def reading(**arguments: Any) -> None:
-        given = {name: arguments.pop(name) for name in OPTIONS}
+        given = {name: arguments.pop(names[name]) for name in OPTIONS}
         command(**arguments, read_as=_settings(given))
 
     reading.__signature__ = signature.replace(  # type: ignore[attr-defined]  # what Typer reads

@@ -23,6 +23,7 @@ from tissuq.discrepancy.blocks import (
 from tissuq.discrepancy.discrepancy import Discrepancy
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import Path
+from tissuq.mechanics.path import invariant_rates, invariants, log_stretches
 from tissuq.parameters import Parameter
 from tissuq.priors import HalfCauchy
 
@@ -80,6 +81,23 @@ class Member:
         """Return the variance (n,) of the stress of each block at unit amplitude."""
         parts = zip(self.blocks, self.reaches, self.lengths, strict=True)
         return [block.stress_variance(mode, stretch, reach, length) for block, reach, length in parts]
+
+    def wide_features(self, mode: Path, stretch: FloatArray) -> list[tuple[FloatArray, int]]:
+        """Return of each block the stresses (n, q) of its terms at any stretches, and how many of them serve the data.
+
+        The latter come first and are the `stress_features`; the others are what beyond the data nothing is known of.
+        """
+        (first, second), (logs, rates) = invariant_rates(mode, stretch), log_stretches(mode, stretch)
+        at = Coordinates(*invariants(mode, stretch), logs.ravel())
+        return [
+            (
+                own.first * first[:, None]
+                + own.second * second[:, None]
+                + np.einsum("nkq,nk->nq", own.logarithm.reshape(*logs.shape, -1), rates),
+                count,
+            )
+            for own, count in self.slopes(at)
+        ]
 
     def slopes(self, at: Coordinates) -> list[tuple[Coordinates, int]]:
         """Return of each block the slopes of its terms, as `EnergyBlock.slopes`, and how many serve the data."""

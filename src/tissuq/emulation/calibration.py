@@ -19,7 +19,7 @@ from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import ForwardRuns
 from tissuq.errors import InputError
 from tissuq.inference.marginal import Marginal
-from tissuq.prediction.bands import mixture_quantile
+from tissuq.prediction.mixture import Mixtures
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,10 +177,9 @@ class Calibration:
 
         _check_probability(prob)
         mean, variance = self.likelihood.predictions(self.draws(MANY), discrepancy=discrepancy, noise=noise)
-        weights = np.full(len(mean), 1 / len(mean))
-        low, high = (mixture_quantile(tail, weights, mean, variance) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
-        columns = {"control": self.problem.control, "mean": weights @ mean, "low": low, "high": high}
-        return pd.DataFrame(columns)
+        found = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
+        low, high = (found.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
+        return pd.DataFrame({"control": self.problem.control, "mean": found.mean, "low": low, "high": high})
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of parameters)."""

@@ -12,6 +12,7 @@ from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.bounds import bounded
 from tissuq.inference.conditional import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_quadrature
+from tissuq.inference.missed import QUANTILES, has_missed
 from tissuq.inference.quadrature import MAX_DIMENSION, Quadrature, integrate
 from tissuq.inference.solution import Components, Solution
 from tissuq.inference.survey import log_prior_density, survey
@@ -106,18 +107,50 @@ class _Integration:
         else:
             self.settings = np.zeros((len(models), 1, 0))
         self.given = self.conditional(self.settings)
+        if self.rule and len(models[0].structure) > 1:
+            for index in range(len(models)):
+                self._check_found(index, self.rule.weights[index])
+
+    def _check_found(self, index: int, weights: FloatArray) -> None:
+        """Refuse the integral of one posterior that has mass where the survey's lattice did not see it."""
+        assert self.warp is not None  # noqa: S101 (there is a structure)
+        is_log, priors = self.warp.is_log, self._priors[index : index + 1]
+        own, structure = ConditionalGaussian(self.models[index : index + 1]), self.models[0].structure
+
+        def coordinates(h: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
+            return np.where(is_log, np.log(np.where(is_log, h, 1.0)), h)
+
+        def log_density(g: FloatArray) -> FloatArray:
+            h = np.where(is_log, np.exp(np.where(is_log, g, 0.0)), g)[None]
+            try:
+                given = own(h)
+            except (ConvergenceError, np.linalg.LinAlgError):  # where columns depend on each other, far away
+                return np.full(len(g), -np.inf)
+            value = (
+                given.log_likelihood + _ceiling(own, given) + log_prior_density(priors, h) + (g * is_log).sum(axis=1)
+            )
+            return np.asarray(np.where(np.isnan(value), -np.inf, value)[0])
+
+        tried = np.array([prior.quantile(QUANTILES) for prior in priors[0][: len(structure)]])
+        starts = coordinates(tried.T, is_log[: len(structure)]).T
+        bounds = np.column_stack([self.warp.lower[index], self.warp.upper[index]])
+        if has_missed(log_density, bounds, coordinates(self.settings[index], is_log), weights, starts):
+            raise ConvergenceError(
+                f"the posterior of {', '.join(structure)} is a ridge too thin for quadrature beside this noise: use "
+                "the method 'nuts', or give a narrow prior of one of them."
+            )
 
     def _log_ceiling(self, h: FloatArray) -> FloatArray:
         """Return a likelihood that is no less than the true one, and equal where at most one bound is near."""
         given = self.conditional(h)
-        return given.log_likelihood + self._ceiling(given)
+        return given.log_likelihood + _ceiling(self.conditional, given)
 
     def _log_integrand(self, u: FloatArray) -> FloatArray:
         """Return the posterior's log density (B, N) in the coordinates of the warp; bounds count where it matters."""
         assert self.warp is not None  # noqa: S101 (only called once it is there)
         h, log_density = self.warp.parameters(u)
         given = self.conditional(h)
-        ceiling = self._ceiling(given)
+        ceiling = _ceiling(self.conditional, given)
         value = given.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
         known = np.zeros(value.shape, dtype=bool)
@@ -132,10 +165,12 @@ class _Integration:
             self._top = np.maximum(self._top, exact.max(axis=1, keepdims=True))
         return value
 
-    def _ceiling(self, given: Conditional) -> FloatArray:
-        shape, size, p = given.log_likelihood.shape, given.log_likelihood.size, given.mean.shape[2]
-        every = self.conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
-        return every.ceiling(given.mean.reshape(size, p), given.root.reshape(size, p, p)).reshape(shape)
+
+def _ceiling(conditional: ConditionalGaussian, given: Conditional) -> FloatArray:
+    """Return no less than the log mass (B, N) within the bounds of the linear parameters."""
+    shape, size, p = given.log_likelihood.shape, given.log_likelihood.size, given.mean.shape[2]
+    every = conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
+    return every.ceiling(given.mean.reshape(size, p), given.root.reshape(size, p, p)).reshape(shape)
 
 
 class ExactSolution(Solution):

@@ -49,7 +49,7 @@ def farthest_stretch(mode: LoadingMode, most: Sequence[float], sign: int) -> flo
     low, high = 0.0, LARGEST - 1 if sign > 0 else min(LARGEST - 1, control.reference - control.above)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        reached = invariants(mode, mode.excursion([sign * middle]))
+        reached = invariants(mode.channels[0], mode.excursion([sign * middle]))  # the same along every channel
         is_inside = all(each[0] <= limit for each, limit in zip(reached, most, strict=True))
         low, high = (middle, high) if is_inside else (low, middle)
     return float(mode.excursion(sign * low))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.reading import STRESS_TYPES
 from tissuq.inference.solution import Components, Solution
 from tissuq.model import StatisticalModel
+from tissuq.prediction.mixture import Mixtures
 from tissuq.prediction.moments import stress_moments
 
-__all__ = ["Band", "asked_for", "mixture_quantile", "predict_average", "predict_band", "share_inside"]
+__all__ = [
+    "Band",
+    "asked_for",
+    "predict_average",
+    "predict_band",
+    "predictive_mixtures",
+    "share_inside",
+    "speaks_of",
+    "stress_ratio",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -92,20 +103,31 @@ def predict_average(
     """
     solutions = [solution for _, solution in parts]
     asked, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
+    tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
+    every = predictive_mixtures(parts, points, asked, channel, discrepancy=discrepancy, noise=noise)
+    curves = [[each.mean, *map(each.quantile, tails)] for each in every]
+    return Band(asked.channels[channel].abscissa(points), *np.concatenate(curves, axis=1))
+
+
+def predictive_mixtures(
+    parts: Sequence[tuple[float, Solution]],
+    points: FloatArray,
+    mode: LoadingMode,
+    channel: int,
+    *,
+    discrepancy: bool,
+    noise: bool,
+) -> Iterator[Mixtures]:
+    """Yield the predictive distributions of a stress at points of a mode, some points at a time."""
     count = FEW if len(points) > BLOCK else MANY
     mixture = [(weight, solution.model, solution.components.thinned(count)) for weight, solution in parts]
     weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
-    tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
-    curves = []
     for block in np.array_split(points, max(1, len(points) // BLOCK)):
         moments = [
-            _moments(model, components, block, asked, channel, discrepancy=discrepancy, noise=noise)
+            _moments(model, components, block, mode, channel, discrepancy=discrepancy, noise=noise)
             for _, model, components in mixture
         ]
-        mean, variance = (np.concatenate(each) for each in zip(*moments, strict=True))
-        ends = [mixture_quantile(tail, weights, mean, variance) for tail in tails]
-        curves.append([weights @ mean, *ends])
-    return Band(asked.channels[channel].abscissa(points), *np.concatenate(curves, axis=1))
+        yield Mixtures(weights, *(np.concatenate(each) for each in zip(*moments, strict=True)))
 
 
 def asked_for(
@@ -136,6 +158,26 @@ def asked_for(
     for solution in solutions if discrepancy else ():
         _check_mode(solution, asked)
     return asked, points
+
+
+def speaks_of(model: StatisticalModel, mode: LoadingMode) -> bool:
+    """Return whether a model's discrepancy says something about the stress in a mode: it is an energy, or of that."""
+    return model.discrepancy.is_energy or mode in model.experiment.modes
+
+
+def stress_ratio(stress_type: str, mode: str | LoadingMode, channel: int) -> Callable[[FloatArray], FloatArray]:
+    """Return the function of points that gives a stress of that type over the engineering stress.
+
+    Raises
+    ------
+    InputError
+        When there is no such type.
+    """
+    if stress_type not in STRESS_TYPES:
+        raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
+    if stress_type == "engineering":
+        return lambda points: np.ones(len(points))
+    return loading_mode(mode).channels[channel].cauchy_ratio
 
 
 def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
@@ -181,32 +223,10 @@ def _only_mode(experiment: Experiment) -> LoadingMode:
 
 def _check_mode(solution: Solution, asked: LoadingMode) -> None:
     model = solution.model
-    if asked not in model.experiment.modes and not model.discrepancy.is_energy:
+    if not speaks_of(model, asked):
         names = ", ".join(mode.name for mode in model.experiment.modes)
         raise InputError(
             f"discrepancy '{model.discrepancy.name}' is an error of the {names} "
             f"stress and says nothing about the {asked.name} one: predict without it, or fit with one that is an "
             "energy, such as 'auto'."
         )
-
-
-def mixture_quantile(probability: float, weights: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return the quantile of a mixture of M Gaussians, at each of g places; safeguarded Newton iteration."""
-    from scipy.special import ndtr, ndtri
-
-    centre = weights @ mean
-    spread = np.sqrt(weights @ (variance + (mean - centre) ** 2))
-    sd = np.sqrt(np.maximum(variance, (0.01 * spread) ** 2))
-    sd = np.maximum(sd, 1e-300)
-    low, high = (mean - 10 * sd).min(axis=0), (mean + 10 * sd).max(axis=0)
-    value = np.clip(centre + ndtri(probability) * spread, low, high)
-    for _ in range(60):
-        scores = (value - mean) / sd
-        excess = weights @ ndtr(scores) - probability
-        if np.abs(excess).max() < 1e-9:
-            break
-        low, high = np.where(excess < 0, value, low), np.where(excess < 0, high, value)
-        density = weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
-        step = value - excess / np.maximum(density, 1e-300)
-        value = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-    return np.where(spread > 0, value, centre)

@@ -57,13 +57,13 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
     density = left_out_log_density(solution.model, components)
     with np.errstate(divide="ignore"):  # a component may have no weight
         log_weights = np.log(components.weights)[:, None] - density
+    is_unsure = np.zeros(density.shape[1], dtype=bool)
     if solution.diagnostics is not None and len(components.weights) > FEWEST:
         from arviz_stats.base import array_stats
 
-        smoothed, khat = array_stats.psislw(density, axis=0)
-        log_weights, is_unsure = smoothed.T, khat > MOST_KHAT
-    else:
-        is_unsure = np.zeros(density.shape[1], dtype=bool)
+        varies = np.ptp(density, axis=0) > 0  # a material has no stress at rest, whatever its parameters
+        smoothed, khat = array_stats.psislw(density[:, varies], axis=0)
+        log_weights[:, varies], is_unsure[varies] = smoothed.T, khat > MOST_KHAT
     log_weights = log_weights - log_weights.max(axis=0)
     weights = np.exp(log_weights) / np.exp(log_weights).sum(axis=0)
     effective = (components.weights**2).sum() / (weights**2).sum(axis=0)

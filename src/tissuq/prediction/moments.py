@@ -18,7 +18,10 @@ from tissuq.model import StatisticalModel
 __all__ = [
     "CorrelatedPart",
     "basis_of",
+    "borne",
     "coefficients",
+    "conditioned",
+    "conditioned_jointly",
     "correlated_parts",
     "drawn_curves",
     "level_of_errors",
@@ -108,7 +111,7 @@ def basis_of(
     return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]], mode)
 
 
-def _borne(model: StatisticalModel, at: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
+def borne(model: StatisticalModel, at: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
     """Return a basis without the components, of next to no weight, in which the material has locked.
 
     Raises
@@ -182,7 +185,7 @@ def stress_moments(
     values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
     at = (mode or model.experiment.mode).abscissa(stretch)
-    basis = _borne(model, at, basis_of(model, stretch, components.settings, mode), components.weights)
+    basis = borne(model, at, basis_of(model, stretch, components.settings, mode), components.weights)
     if not discrepancy:
         basis = basis * np.isin(model.column_symbols, model.material_symbols)
     mean = (basis @ mean_b[:, :, None])[:, :, 0]
@@ -190,7 +193,7 @@ def stress_moments(
     extra = np.zeros_like(mean)
     if discrepancy and model.is_correlated:
         for part in correlated_parts(model, components.settings):
-            shift, pull, variance = _condition(model, part, stretch, mean_b[part.chosen])
+            shift, pull, variance = conditioned(model, part, stretch, mean_b[part.chosen])
             mean[part.chosen] += shift
             root[part.chosen] -= np.einsum("mgk,mkp->mgp", pull, root_b[part.chosen])
             extra[part.chosen] += variance
@@ -252,7 +255,7 @@ def drawn_curves(
             other[chosen] += shift
     if model.is_correlated:
         for part in correlated_parts(model, settings):
-            shift, covariance = _condition_jointly(model, part, stretch, drawn[part.chosen])
+            shift, covariance = conditioned_jointly(model, part, stretch, drawn[part.chosen])
             values, vectors = np.linalg.eigh(covariance)
             score = generator.standard_normal(shift.shape)
             other[part.chosen] += shift + np.einsum(
@@ -261,11 +264,11 @@ def drawn_curves(
     return alone, other
 
 
-def _condition_jointly(
+def conditioned_jointly(
     model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray, b: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return means (N, g) and covariances (N, g, g) of the correlated discrepancy given the data and coefficients b."""
-    shift, _, _ = _condition(model, part, stretch, b)
+    shift, _, _ = conditioned(model, part, stretch, b)
     inside = _with_data(model, part, stretch) @ part.correlation.vectors
     gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
     explained = np.einsum("gr,nr,hr->ngh", inside, gain, inside)
@@ -301,7 +304,7 @@ def _with_data(model: StatisticalModel, part: CorrelatedPart, stretch: FloatArra
     return np.asarray(cross / part.scale)
 
 
-def _condition(
+def conditioned(
     model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray, mean_b: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Condition the correlated discrepancy at new stretches on the data, given coefficients b (N, k).

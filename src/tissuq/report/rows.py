@@ -42,6 +42,7 @@ def interval(low: float, high: float, sd: float) -> tuple[str, str]:
     decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
     if decimals > 8:
         return f"{low:.3g}", f"{high:.3g}"
+    low, high = (round(end, decimals) + 0.0 for end in (low, high))  # no minus before a zero
     return f"{low:.{decimals}f}", f"{high:.{decimals}f}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 from warnings import warn
 
 from tissuq.discrepancy import Auto
@@ -11,10 +12,13 @@ from tissuq.errors import InputError
 from tissuq.mechanics import Material
 from tissuq.posterior import Posterior
 from tissuq.studies.settings import RECIPE, load_settings
-from tissuq.studies.specimen import SpecimenSettings, fitted
 
-__all__ = ["load_run"]
+if TYPE_CHECKING:
+    from tissuq.studies.specimen import SpecimenSettings
 
+__all__ = ["load_run", "recipe_of"]
+
+SUMMARY = "summary.json"
 AGREEMENT = 1e-6
 """Relative difference between the headline parameter's means in the run and fitted again that needs no word."""
 
@@ -44,9 +48,10 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
     >>> import tissuq as tq
     >>> posterior = tq.load_run("runs/brain", discrepancy="auto")  # doctest: +SKIP
     """
+    from tissuq.studies.specimen import fitted
+
     run = Path(folder)
-    rows = _summary(run)
-    settings = load_settings(SpecimenSettings, run / RECIPE, {})
+    settings, rows = recipe_of(run), _summary(run)
     names = list(rows)
     name = discrepancy or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in names:
@@ -65,13 +70,27 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
     return posterior
 
 
-def _summary(run: Path) -> dict[str, dict[str, float]]:
-    """Return the rows of a run's summary by discrepancy."""
-    recipe, summary = run / RECIPE, run / "summary.json"
+def recipe_of(folder: str | Path) -> SpecimenSettings:
+    """Return the settings of a run of ``tissuq fit``.
+
+    Raises
+    ------
+    InputError
+        When the folder is no such run.
+    """
+    from tissuq.studies.specimen import SpecimenSettings
+
+    run = Path(folder)
+    recipe = run / RECIPE
     if not run.is_dir():
         raise InputError(f"there is no run folder '{run}'.")
-    if not recipe.is_file() or not summary.is_file():
-        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE} or summary.json.")
+    if not recipe.is_file() or not (run / SUMMARY).is_file():
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE} or {SUMMARY}.")
     if " tissuq fit " not in recipe.read_text(encoding="utf-8").partition("\n")[0]:
         raise InputError(f"run '{run}' is not one of tissuq fit, and only these have a posterior to go on with.")
-    return {row["formulation"]: row for row in json.loads(summary.read_text(encoding="utf-8"))}
+    return load_settings(SpecimenSettings, recipe, {})
+
+
+def _summary(run: Path) -> dict[str, dict[str, float]]:
+    """Return the rows of a run's summary by discrepancy."""
+    return {row["formulation"]: row for row in json.loads((run / SUMMARY).read_text(encoding="utf-8"))}

@@ -12,6 +12,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.fitting import fit
 from tissuq.mechanics.path import invariants
 from tissuq.posterior import Posterior
+from tissuq.prediction.scores import judged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,28 +76,17 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
     -------
     list of dict
         test, mode, measured; ``inside``, the share of measurements in the predictive band; ``beyond``, the share of
-        them at which an invariant is larger than it was in the data of the posterior; and of the others ``half_width``
-        and ``error``, root mean squares of the band's half width and of the error of its mean, over that of the stress.
-        Measurements without stress are left out, and the band is that of a new test with an error of its own.
+        them at which an invariant is larger than it was in the data of the posterior; and of the others the further
+        scores of `tissuq.prediction.scores.Judged.summary`. Measurements without stress are left out, and the band is
+        that of a new test with an error of its own.
     """
     data, rows = posterior.model.experiment, []
     most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
-    for _, number, stress in test.curves:
-        points, measured = test.stretch[stress != 0], stress[stress != 0]
-        band = posterior.predict(points, mode=test.mode, channel=number, prob=prob)
-        low, high, mean = (band[name].to_numpy() for name in ("low", "high", "mean"))
-        reached = invariants(test.mode.channels[number], points)
-        known = np.logical_and.reduce([own <= end * (1 + 1e-9) for own, end in zip(reached, most, strict=True)])
-        size = float(np.sqrt((measured[known] ** 2).mean())) if known.any() else np.nan
-        parts = {"half_width": 0.5 * (high - low)[known], "error": (mean - measured)[known]}
-        rows.append(
-            {
-                "test": test.name,
-                "mode": test.mode.name,
-                "measured": test.mode.stresses[number],
-                "inside": float(np.mean((low <= measured) & (measured <= high))),
-                "beyond": float(1 - known.mean()),
-            }
-            | {name: float(np.sqrt((own**2).mean())) / size if known.any() else np.nan for name, own in parts.items()}
-        )
+    for _, number, _ in test.curves:
+        every = judged(posterior.solution, test, number, prob=prob)
+        reached = invariants(test.mode.channels[number], every.points)
+        known = np.logical_and.reduce([each <= end * (1 + 1e-9) for each, end in zip(reached, most, strict=True)])
+        own: dict[str, Any] = {"test": test.name, "mode": test.mode.name, "measured": test.mode.stresses[number]}
+        shares = {"inside": float(every.is_inside.mean()), "beyond": float(1 - known.mean())}
+        rows.append(own | every.where(known).summary() | shares)
     return rows

@@ -1,0 +1,82 @@
+"""``tissuq design``: which test to make next."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tissuq.cli.options import progress
+from tissuq.errors import InputError
+from tissuq.studies.settings import load_settings
+
+__all__ = ["design"]
+
+
+def design(
+    run: Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is to become less uncertain: modulus (initial shear modulus), a parameter, or a stress as "
+            "MODE:STRETCH, such as planar:1.5; repeat for more [modulus]."
+        ),
+    ] = None,
+    candidate: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A test as 'MODE LOW:HIGH POINTS', such as 'planar 1:1.5 20'; repeat for more [every mode of one "
+            "stretch, in several ranges]."
+        ),
+    ] = None,
+    points: Annotated[
+        list[int] | None,
+        typer.Option(help="Measurements of every usual test; repeat for more [as many as the data, 10 to 40]."),
+    ] = None,
+    specimen: Annotated[
+        str | None,
+        typer.Option(help="The next test is of the same specimen or of an other one [same, unless there are several]."),
+    ] = None,
+    discrepancy: Annotated[
+        str | None, typer.Option(help="Which discrepancy of the run [auto, or the only one].")
+    ] = None,
+    material: Annotated[str | None, typer.Option(help="Your own law.py:Name, where the run's material is one.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the simulated outcomes [0].")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the ranking [runs/RUN-design].")] = None,
+    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier ranking, or your own.")] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figure, too.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Replace the folder of an earlier ranking.")] = False,
+) -> None:
+    """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
+    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.mechanics import material_named
+    from tissuq.report.design import HEADERS, heading, readable_design, write_design
+    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.studies.design import DesignSettings, run_design
+
+    if run is None and config is None:
+        raise InputError("give the RUN folder of a fit, or --config run.toml.")
+    options: dict[str, Any] = {
+        "run": str(run.absolute()) if run else None, "targets": target or None, "candidates": candidate or None,
+        "points": points or None, "specimen": specimen, "discrepancy": discrepancy, "seed": seed,
+    }  # fmt: skip
+    law = material_named(material, laws=True) if material else None
+    settings = load_settings(DesignSettings, config, options)
+    beside = config.parent if config else Path()
+    place = (beside / settings.run).resolve()
+    folder = out or Path("runs") / f"{place.name}-design"
+    check_target(folder, force=force)
+    if place.is_relative_to(folder.resolve()):
+        raise InputError(f"'{folder}' holds the run itself; choose another folder with --out.")
+    with progress() as step:
+        study = run_design(settings, beside, step, law)
+        step("writing")
+        recipe = settings.model_copy(update={"run": os.path.relpath(place, folder.resolve())})
+        with run_folder(folder, force=force) as scratch:
+            write_design(study, recipe, scratch, figures=figures)
+    for each in study.targets:
+        print_rows(heading(study, each)[0].upper() + heading(study, each)[1:], HEADERS, readable_design(study, each))
+    print_warnings(study.notes)
+    print(f"Report: {folder / 'report.html'}")

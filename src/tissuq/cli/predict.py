@@ -1,0 +1,97 @@
+"""``tissuq predict``: the stress in a loading mode from an earlier fit, beside measurements of it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tissuq.cli import reading
+from tissuq.cli.options import not_converged, progress
+from tissuq.errors import InputError
+from tissuq.studies.settings import load_settings
+
+__all__ = ["predict"]
+
+
+@partial(reading.reads_files, names={"stress_type": "data_stress_type"})
+def predict(
+    run: Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")] = None,
+    mode: Annotated[
+        str | None, typer.Option(help="Loading mode to predict [that of the data, or of the run]; see tissuq modes.")
+    ] = None,
+    stretch: Annotated[
+        str | None,
+        typer.Option(help="Stretches (amounts of shear): a range 0.7:2.0, or a list 1.1,1.2,1.5 [where calibrated]."),
+    ] = None,
+    stretch2: Annotated[
+        str | None,
+        typer.Option(help="Of the second control of a mode with two, such as biaxial; one number where it is held."),
+    ] = None,
+    points: Annotated[int | None, typer.Option(help="Stretches in a range [101].")] = None,
+    discrepancy: Annotated[
+        str | None, typer.Option(help="Which of the run's discrepancies [auto, or the only one].")
+    ] = None,
+    prob: Annotated[float | None, typer.Option(help="Probability of the bands [0.95].")] = None,
+    stress_type: Annotated[str | None, typer.Option(help="Predict engineering or cauchy stress [engineering].")] = None,
+    material: Annotated[
+        str | None, typer.Option(help="Your law.py:Name, where the run's material is one; it is not run unasked.")
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            help="Measurements of that mode to compare with: a file or a built-in data set. The options below, and "
+            "--data-stress-type, say how to read it."
+        ),
+    ] = None,
+    *,
+    read_as: dict[str, Any],
+    out: Annotated[Path | None, typer.Option(help="Folder for the prediction [RUN-MODE, beside the run].")] = None,
+    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier prediction to repeat.")] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figure, too.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing prediction.")] = False,
+) -> None:
+    """Predict the stress in any loading mode from a fit, and compare it with measurements."""
+    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.mechanics import material_named
+    from tissuq.report.prediction import (
+        band_headers,
+        readable_bands,
+        readable_scores,
+        score_headers,
+        write_prediction_run,
+    )
+    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
+
+    if bool(run) == bool(config):
+        raise InputError("give the RUN folder of a fit, or --config run.toml of an earlier prediction.")
+    told = {name: value for name, value in read_as.items() if value is not None}
+    if told and not (data or config):
+        raise InputError(f"there are options that say how to read a file ({', '.join(told)}), and no --data to read.")
+    file = {"file": str(reading.resolve(data))} if data else {}
+    options: dict[str, Any] = {
+        "run": str(run) if run else None, "mode": mode, "stretch": stretch, "stretch2": stretch2, "points": points,
+        "discrepancy": discrepancy, "prob": prob, "stress_type": stress_type, "data": file | told or None,
+    }  # fmt: skip
+    settings = load_settings(PredictionSettings, config, options)
+    beside = config.parent if config else Path()
+    law = material_named(material, laws=True) if material else None
+    source = beside / settings.run
+    target = out or source.parent / f"{source.name}-{settings.mode_in(beside)}"
+    check_target(target, force=force)
+    if source.resolve().is_relative_to(target.resolve()):
+        raise InputError(f"'{target}' holds the run itself; choose another folder for the prediction with --out.")
+    with progress() as step:
+        found = run_prediction(settings, beside, step, law)
+        step("writing")
+        with run_folder(target, force=force) as folder:
+            write_prediction_run(found, settings, folder, target, beside, law=material, figures=figures)
+    print_rows(f"Stress in mode {found.mode.name}, {found.unit.name}", band_headers(found), readable_bands(found))
+    if found.scores is not None and found.data is not None:
+        print_rows(f"Measurements of {found.data.name}", score_headers(found), readable_scores(found))
+    print_warnings(list(found.notes))
+    print(f"Report: {target / 'report.html'}")
+    not_converged(["the fit"] if found.posterior.solution.is_approximate else [])

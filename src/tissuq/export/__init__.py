@@ -1,0 +1,25 @@
+"""Material cards: draws of a posterior as complete materials for finite-element codes, a format a file."""
+
+from tissuq.export.abaqus import Abaqus, CalculiX
+from tissuq.export.ansys import Ansys
+from tissuq.export.cards import CardFormat, Cards, CardSettings, card_format, card_formats
+from tissuq.export.code import Card, FECode
+from tissuq.export.febio import FEBio
+from tissuq.export.ls_dyna import LSDyna
+from tissuq.export.table import Table
+
+__all__ = [
+    "Abaqus",
+    "Ansys",
+    "CalculiX",
+    "Card",
+    "CardFormat",
+    "CardSettings",
+    "Cards",
+    "FEBio",
+    "FECode",
+    "LSDyna",
+    "Table",
+    "card_format",
+    "card_formats",
+]

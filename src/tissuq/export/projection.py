@@ -1,0 +1,225 @@
+"""The nearest material of a family that finite-element codes know, where the draws are no material of their own."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.ensemble import Ensemble
+from tissuq.errors import InputError
+from tissuq.experiments.modes import SimpleShear
+from tissuq.export.laws import Law
+from tissuq.export.states import LEAST, SHEARS, SeenStates, initial_slope, moduli
+from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics.materials import Ogden, Rivlin
+
+__all__ = [
+    "MixtureFit",
+    "OgdenFit",
+    "PolynomialFit",
+    "Projection",
+    "ReducedFit",
+    "full_terms",
+    "projections",
+    "reduced_terms",
+]
+
+FloatArray = NDArray[np.float64]
+
+LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
+"""Steps of equal size among which Ogden's exponents are chosen."""
+REACHES = (2.0, 4.0, 8.0, 12.0)
+"""The largest exponent of the ladder, times the largest logarithmic strain that was measured."""
+HIGHEST = 4
+"""Order of a polynomial of both invariants, beyond which terms cancel to their last digits at small strains."""
+HIGHEST_REDUCED = 6
+"""Order of a polynomial of I1, beyond which no code goes."""
+
+
+class Candidate(NamedTuple):
+    """Values of the parameters that are not linear, and what unit values of the k others give.
+
+    Attributes
+    ----------
+    setting : tuple of float
+    columns : (n, k) array
+        Stresses in the states.
+    unit : (k,) array
+        Initial shear moduli.
+    """
+
+    setting: tuple[float, ...]
+    columns: FloatArray
+    unit: FloatArray
+
+
+@dataclass(frozen=True)
+class Projection(ABC):
+    """A family of materials of some order, of which the one nearest to a draw is found by weighted least squares.
+
+    The stresses are those of `SeenStates`, each relative to the draw's own; the initial shear modulus is exactly the
+    draw's.
+    """
+
+    family: ClassVar[str]
+
+    @classmethod
+    @abstractmethod
+    def of_order(cls, order: int) -> Self:
+        """Return the projection of an order that a user gave."""
+
+    @property
+    @abstractmethod
+    def material(self) -> Material:
+        """The material whose values are found."""
+
+    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+        """Return the values of the parameters that are not linear, among which the best are taken for all draws."""
+        yield Candidate((), *_columns(self.material, states, ()))
+
+    def law(self, ensemble: Ensemble) -> Law:
+        """Return the nearest law to each draw.
+
+        Candidates are compared with weights that all draws share; given the best, every draw has its own.
+        """
+        states = SeenStates(ensemble.most)
+        stress, modulus = ensemble.stress(states, states.points), moduli(ensemble)
+        size = np.maximum(np.abs(stress), LEAST * np.abs(modulus)[:, None] * states.of_unit_modulus)
+        common = 1 / size.mean(axis=0)
+
+        def loss(each: Candidate) -> float:
+            found = _nearest(each, common, stress.T, modulus)
+            return float(((common[:, None] * (each.columns @ found - stress.T)) ** 2).sum())
+
+        best = min(self.candidates(states), key=loss)
+        rows = [
+            _nearest(best, 1 / own, one[:, None], np.array([each]))[:, 0]
+            for own, one, each in zip(size, stress, modulus, strict=True)
+        ]
+        return Law(self.material, np.hstack([np.array(rows), np.tile(best.setting, (len(rows), 1))]))
+
+
+@dataclass(frozen=True)
+class PolynomialFit(Projection):
+    """A Rivlin polynomial of some terms."""
+
+    terms: tuple[str, ...]
+
+    family = "polynomial"
+
+    @classmethod
+    def of_order(cls, order: int) -> Self:
+        return cls(full_terms(_checked(order, HIGHEST, "a polynomial")))
+
+    @property
+    def material(self) -> Material:
+        return Rivlin(self.terms)
+
+
+class ReducedFit(PolynomialFit):
+    """A polynomial of I1 alone, such as Yeoh's."""
+
+    family = "reduced-polynomial"
+
+    @classmethod
+    def of_order(cls, order: int) -> Self:
+        return cls(reduced_terms(_checked(order, HIGHEST_REDUCED, "a reduced polynomial")))
+
+
+@dataclass(frozen=True)
+class OgdenFit(Projection):
+    """An Ogden sum, with exponents in equal steps to either side of zero, the same for all draws."""
+
+    terms: int
+
+    family = "ogden"
+
+    @classmethod
+    def of_order(cls, order: int) -> Self:
+        return cls(_checked(order, len(LADDER), "an Ogden projection"))
+
+    @property
+    def material(self) -> Material:
+        return Ogden(self.terms)
+
+    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+        return _on_ladders(self.terms, states)
+
+
+@dataclass(frozen=True)
+class MixtureFit(Projection):
+    """A polynomial of I1 and an Ogden sum added, each of so many terms, for a code that adds materials."""
+
+    terms: int
+
+    family = "mixture"
+
+    @classmethod
+    def of_order(cls, order: int) -> Self:
+        return cls(_checked(order, HIGHEST_REDUCED, "a mixture"))
+
+    @property
+    def material(self) -> Material:
+        return Rivlin(reduced_terms(self.terms)) + Ogden(self.terms)
+
+    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+        columns, unit = _columns(Rivlin(reduced_terms(self.terms)), states, ())
+        for each in _on_ladders(self.terms, states):
+            yield Candidate(each.setting, np.hstack([columns, each.columns]), np.concatenate([unit, each.unit]))
+
+
+def projections() -> dict[str, type[Projection]]:
+    """Return the families by name."""
+    return {kind.family: kind for kind in (ReducedFit, PolynomialFit, OgdenFit, MixtureFit)}
+
+
+def full_terms(order: int) -> tuple[str, ...]:
+    """Return the coefficients of a polynomial in I1 and I2 as FE codes order them: C10, C01, C20, C11, C02 ..."""
+    return tuple(f"C{total - power}{power}" for total in range(1, order + 1) for power in range(total + 1))
+
+
+def reduced_terms(order: int) -> tuple[str, ...]:
+    """Return the coefficients of a polynomial in I1: C10, C20 and so on."""
+    return tuple(f"C{power}0" for power in range(1, order + 1))
+
+
+def _checked(order: int, most: int, what: str) -> int:
+    if not 1 <= order <= most:
+        raise InputError(f"{what} has an order from 1 to {most}, not {order}.")
+    return order
+
+
+def _on_ladders(terms: int, states: SeenStates) -> Iterator[Candidate]:
+    """Return Ogden sums of so many terms, with all choices of exponents from each ladder."""
+    farthest = float(np.abs(np.log(states.base)).max())
+    for reach in REACHES:
+        exponents = reach / (LADDER[-1] * farthest) * np.array(LADDER)
+        columns, unit = _columns(Ogden(len(LADDER)), states, exponents)
+        for chosen in map(list, combinations(range(len(LADDER)), terms)):
+            yield Candidate(tuple(exponents[chosen]), columns[:, chosen], unit[chosen])
+
+
+def _columns(material: Material, states: SeenStates, setting: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the stresses (n, k) and the initial shear moduli (k,), integers, of unit linear parameters."""
+    near = stress_basis(material, SimpleShear(), SHEARS, setting)
+    return stress_basis(material, states, states.points, setting), np.round(initial_slope(near), 4)
+
+
+def _nearest(candidate: Candidate, weights: FloatArray, wanted: FloatArray, modulus: FloatArray) -> FloatArray:
+    """Return the linear parameters (k, N) nearest to stresses (n, N) by weights (n,) that have these moduli (N,)."""
+    unit = candidate.unit
+    place = int(np.argmax(np.abs(unit)))
+    start = np.zeros((len(unit), len(modulus)))
+    start[place] = modulus / unit[place]
+    free = np.delete(np.eye(len(unit)), place, axis=1)
+    free[place] = -np.delete(unit, place) / unit[place]
+    columns = weights[:, None] * (candidate.columns @ free)
+    size = np.abs(columns).max(axis=0, initial=0.0)
+    found = np.linalg.lstsq(columns / size, weights[:, None] * (wanted - candidate.columns @ start), rcond=1e-12)[0]
+    return np.asarray(start + free @ (found / size[:, None]))

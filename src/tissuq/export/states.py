@@ -1,0 +1,148 @@
+"""States of deformation that a calibration has seen, and how far the stresses of two ensembles are apart in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment.stability import stable_draws
+from tissuq.ensemble import Ensemble
+from tissuq.experiments.modes import Deformation, LoadingMode, Path, SimpleShear, loading_modes
+from tissuq.mechanics.arithmetic import exp, library
+from tissuq.mechanics.path import invariant_rates
+
+__all__ = [
+    "ANGLES",
+    "SeenStates",
+    "are_stable",
+    "curve_modes",
+    "differences",
+    "initial_slope",
+    "mode_stretches",
+    "moduli",
+]
+
+FloatArray = NDArray[np.float64]
+
+ANGLES = (1.0, 15.0, 30.0, 45.0, 59.0)
+"""Lode angles in degrees: from uniaxial tension, 0, by planar tension, 30, to equibiaxial tension, 60.
+
+At 0 and 60 two stretches are equal, and the difference of their stresses tells nothing; just beside, it tells the
+stiffness against making them differ.
+"""
+POINTS = 30
+"""Of a mode in equal steps; of a ray of states ever denser towards the end of what was measured, where fits are bad."""
+FARTHEST = 5.0
+"""Logarithmic strain beyond which no state is followed."""
+PAIRS = np.array([[1.0, -1.0, 0.0], [1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
+LEAST = 0.01
+"""Of the stress of a neo-Hookean material with the same modulus: a stress that is smaller counts as this."""
+SHEARS = np.array([1e-3, 2e-3])
+"""Amounts of simple shear, from which the initial modulus follows."""
+
+
+class SeenStates(Path):
+    """All states between uniaxial and equibiaxial tension whose I1 and I2 were measured, each with three stresses.
+
+    Of an isotropic, incompressible material these are all states there are (compression along one axis is equibiaxial
+    tension). The stress at a point is a difference of two principal Cauchy stresses, the work per logarithmic strain of
+    one axis against the other; of the three of a state each is 2 (l_i^2 - l_j^2) (W1 + l_k^2 W2), so that relative
+    errors of these are relative errors of every stress in any test, and of the stiffness against leaving its path.
+
+    Parameters
+    ----------
+    most : (float, float)
+        The largest I1 - 3 and I2 - 3.
+    angles : sequence of float
+        Lode angles, degrees.
+    """
+
+    def __init__(self, most: tuple[float, float], angles: Sequence[float] = ANGLES) -> None:
+        rays = np.concatenate([_ray(most, np.radians(angle)) for angle in angles])
+        self.stretches = rays
+        self.base = np.tile(np.exp(rays.T), 3)
+        self.direction = np.repeat(PAIRS.T, len(rays), axis=1)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """What its stresses are asked at: places among the states, three times, once for each difference."""
+        return np.arange(float(self.base.shape[1]))
+
+    @cached_property
+    def of_unit_modulus(self) -> FloatArray:
+        """The sizes of the stresses of a neo-Hookean material with unit modulus, |l_i^2 - l_j^2|."""
+        return np.asarray(np.abs((self.direction * self.base**2).sum(axis=0)))
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        own, place = library(point), point.astype(int)
+        base, direction = own.asarray(self.base)[:, place], own.asarray(self.direction)[:, place]
+        first, second, third = base * exp(direction * step)
+        return Deformation.along_axes((first, second, third))
+
+
+def curve_modes() -> list[LoadingMode]:
+    """Return the loading modes of one stretch and one stress."""
+    return [mode for mode in (kind() for kind in loading_modes().values()) if mode.is_curve]
+
+
+def mode_stretches(low: float, high: float) -> FloatArray:
+    """Return the stretches at which a mode is compared: in equal steps on either side of the reference, without it."""
+    ends = (np.linspace(1.0, end, POINTS + 1)[1:] for end in (low, high) if end != 1.0)
+    return np.sort(np.concatenate([*ends]))
+
+
+def moduli(ensemble: Ensemble) -> FloatArray:
+    """Return the initial shear moduli (N,) of draws, MPa, to which a discrepancy that is an energy adds nothing."""
+    alone = replace(ensemble, draws=tuple(replace(draw, discrepancy=None) for draw in ensemble))
+    return initial_slope(alone.stress(SimpleShear(), SHEARS).T)
+
+
+def initial_slope(stress: FloatArray) -> FloatArray:
+    """Return the slopes at no shear of shear stresses (2, k) at `SHEARS`, which are odd functions."""
+    near, far = stress / SHEARS[:, None]
+    return np.asarray((4 * near - far) / 3)
+
+
+def differences(found: Ensemble, wanted: Ensemble) -> dict[str, FloatArray]:
+    """Return the relative differences of stresses, (N, n) each, by loading mode and in the ``states`` that were seen.
+
+    A stress that is less than a hundredth of the neo-Hookean one with the draw's modulus counts as that.
+    """
+    modulus, states = moduli(wanted)[:, None], SeenStates(wanted.most)
+    paths: dict[str, tuple[Path, FloatArray, FloatArray]] = {}
+    for mode in curve_modes():
+        stretch = mode_stretches(*wanted.ranges[mode.name])
+        paths[mode.name] = mode, stretch, np.abs(0.5 * invariant_rates(mode, stretch)[0])
+    paths["states"] = states, states.points, states.of_unit_modulus
+    apart = {}
+    for name, (path, points, size) in paths.items():
+        truth = wanted.stress(path, points)
+        apart[name] = (found.stress(path, points) - truth) / np.maximum(np.abs(truth), LEAST * np.abs(modulus) * size)
+    return apart
+
+
+def are_stable(ensemble: Ensemble) -> NDArray[np.bool_]:
+    """Return whether draws (N,) are stable over the range that was measured, in every mode of one stretch."""
+
+    def curves_of(places: NDArray[np.intp]) -> Any:
+        some = replace(ensemble, draws=tuple(ensemble[int(place)] for place in places))
+        return lambda points, path: some.stress(path, points)
+
+    return stable_draws(curves_of, len(ensemble), ensemble.model.experiment, curve_modes())
+
+
+def _ray(most: tuple[float, float], angle: float) -> FloatArray:
+    """Return the logarithmic strains (n, 3) of a Lode angle, to where an invariant is the largest that was measured."""
+    direction = np.cos(angle - 2 * np.pi / 3 * np.array([0.0, 1.0, -1.0]))
+    low, high = 0.0, FARTHEST
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        logs = 2 * middle * direction
+        is_inside = np.expm1(logs).sum() <= most[0] and np.expm1(-logs).sum() <= most[1]
+        low, high = (middle, high) if is_inside else (low, middle)
+    return np.outer(low * np.sin(np.linspace(0.0, np.pi / 2, POINTS + 1)[1:]), direction)

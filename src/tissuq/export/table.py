@@ -1,0 +1,73 @@
+"""Draws as plain tables of W1 = dW/dI1 and W2 = dW/dI2 against the invariants: for user subroutines and other tools."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.ensemble import Ensemble
+from tissuq.export.cards import CardFormat, Cards, CardSettings
+from tissuq.export.heading import distances_from_median, draw_row, ensemble_lines, file_name, words_of
+from tissuq.export.states import SeenStates, moduli
+
+__all__ = ["Table"]
+
+FloatArray = NDArray[np.float64]
+
+ANGLES = (0.02, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 59.98)
+"""Lode angles, degrees; the ends are so near to uniaxial and equibiaxial tension that nothing of note has changed."""
+COLUMNS = ("lode_angle", "l1", "l2", "l3", "I1", "I2", "W1", "W2", "cauchy_1_less_3", "cauchy_2_less_3")
+
+
+class Table(CardFormat):
+    """W1 and W2 of any draw, its discrepancy included, from its principal Cauchy stresses by Rivlin's formulas.
+
+    t_i - t_j = 2 (l_i^2 - l_j^2) (W1 + l_k^2 W2) in states between uniaxial and equibiaxial tension.
+    """
+
+    name = "table"
+    description = "CSV tables of W1 and W2 against the invariants, exact for every draw"
+
+    def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
+        states = SeenStates(ensemble.most, ANGLES)
+        stress = ensemble.stress(states, states.points) * settings.factor
+        shear = moduli(ensemble) * settings.factor
+        common = [
+            *ensemble_lines(ensemble, settings),
+            f"stresses, W1 and W2 in {settings.unit}; W1 = dW/dI1, W2 = dW/dI2; incompressible; no projection",
+        ]
+        files, index = {}, []
+        for place, (own, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
+            name = file_name(ensemble, place, ".csv")
+            heading = [f"draw {place + 1} of {len(ensemble)}: {words_of(ensemble[place], settings)}", *common]
+            files[name] = _table(heading, _rows(states, stress[place]))
+            index.append(
+                {"file": name, **draw_row(ensemble[place], settings, float(own)), "from_median": float(distance)}
+            )
+        note = "The tables are exact: W1 and W2 of material and discrepancy at states whose invariants were measured."
+        return Cards(files, tuple(index), (note,))
+
+
+def _rows(states: SeenStates, stress: FloatArray) -> FloatArray:
+    """Return the columns (n, 10) from the three differences of stresses (3 n,)."""
+    count = len(stress) // 3
+    squares = states.base[:, :count].T ** 2
+    of_12, of_13, of_23 = stress.reshape(3, count)
+    one, two, three = squares.T
+    sums = [0.5 * each / apart for each, apart in ((of_12, one - two), (of_13, one - three), (of_23, two - three))]
+    by_third, by_second, by_first = sums  # W1 + l_k^2 W2
+    second = np.where(
+        one - two > two - three, (by_first - by_second) / (one - two), (by_second - by_third) / (two - three)
+    )
+    first = by_second - two * second
+    angles = np.repeat(ANGLES, count // len(ANGLES))
+    invariants = squares.sum(axis=1), (1 / squares).sum(axis=1)
+    return np.column_stack([angles, np.sqrt(squares), *invariants, first, second, of_13, of_23])
+
+
+def _table(heading: Sequence[str], rows: FloatArray) -> str:
+    lines = [*(f"# {line}" for line in heading), ",".join(COLUMNS)]
+    lines += [",".join(f"{number:.10g}" for number in row) for row in rows]
+    return "\n".join([*lines, ""])

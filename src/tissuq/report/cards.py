@@ -1,0 +1,72 @@
+"""The folder of material cards: a file for each draw, and an index of all."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from tissuq.ensemble import Ensemble
+from tissuq.export import Cards, CardSettings, card_format
+from tissuq.report.run_folder import run_folder
+
+__all__ = ["INDEX", "write_cards"]
+
+INDEX = "index.csv"
+
+
+def write_cards(
+    ensemble: Ensemble, folder: str | Path, format: str = "abaqus", *, force: bool = False, **settings: Any
+) -> Cards:
+    """Write draws of a posterior as material cards for a finite-element code.
+
+    Every draw is a file of its own, with the same name of the material in all, so that a model includes one after
+    the other; ``index.csv`` has a row for each: parameters, constants, and how far the card is from the draw.
+
+    Parameters
+    ----------
+    ensemble : Ensemble
+        Of `Posterior.ensemble`.
+    folder : str or Path
+        A new folder.
+    format : str
+        ``"abaqus"``, ``"calculix"``, ``"ansys"``, ``"febio"``, ``"ls-dyna"``, or ``"table"``.
+    force : bool
+        Replace the folder of earlier cards.
+    **settings
+        As `tissuq.export.CardSettings`: ``law``, ``order``, ``unit``, ``bulk_modulus``, ``poisson``, ``name``,
+        ``source``.
+
+    Returns
+    -------
+    Cards
+        Texts, rows of the index, and notes to be read.
+
+    Raises
+    ------
+    InputError
+        When the folder exists, or the code has no such law.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import tissuq as tq
+    >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+    >>> data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, stretch, noise_sd=0.02, seed=1)
+    >>> draws = tq.fit(data, material="yeoh", discrepancy="none", noise_sd=0.02).ensemble(4)
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     cards = tq.write_cards(draws, f"{place}/cards", "calculix", unit="kPa")
+    >>> cards.notes[0]
+    "The cards are the draws' own law, exactly: YEOH."
+    >>> print(cards.files["draw-1.inp"].splitlines()[-2])
+    *HYPERELASTIC, YEOH
+    """
+    with run_folder(Path(folder), force=force) as scratch:
+        cards = card_format(format).cards(ensemble, CardSettings(**settings))
+        for name, text in cards.files.items():
+            (scratch / name).write_text(text, encoding="utf-8")
+        with (scratch / INDEX).open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, list(cards.index[0]))
+            writer.writeheader()
+            writer.writerows(cards.index)
+    return cards

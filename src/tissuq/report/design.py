@@ -1,0 +1,171 @@
+"""The folder of a ranking of tests: table, figure and page."""
+
+from __future__ import annotations
+
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.assessment.targets import Target
+from tissuq.report.common import write_figures, write_recipe
+from tissuq.report.figures import BAND, BASE, INK, STYLE
+from tissuq.report.page import embedded_figure, render
+from tissuq.report.rows import significant
+from tissuq.report.run_folder import RECIPE
+from tissuq.report.tables import Row, write_csv, write_json
+from tissuq.studies.design import DesignSettings, DesignStudy
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["HEADERS", "design_figure", "heading", "readable_design", "write_design"]
+
+HEADERS = ["test", "expected sd", "reduction", "note"]
+"""Of `readable_design`."""
+MOST_BARS = 16
+"""Tests in a panel of the figure."""
+BEYOND = "#E69F00"
+
+
+def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
+    """Return the rows of one target as text, under `HEADERS`, in the unit of the data; best first, the others last."""
+    factor, _ = _unit(study, target)
+    rows = []
+    for _, row in _own(study, target).iterrows():
+        known = not isnan(row["reduction"])
+        rows.append(
+            [
+                str(row["candidate"]),
+                f"{row['sd_after'] / factor:#.3g}" if known else "",
+                f"{row['reduction']:.1%}" + (f" ± {row['error']:.1%}" if row["error"] else "") if known else "",
+                str(row["note"]),
+            ]
+        )
+    return rows
+
+
+def heading(study: DesignStudy, target: Target) -> str:
+    """Return what a target is, and how uncertain it is now."""
+    factor, unit = _unit(study, target)
+    now = significant(float(_own(study, target)["sd_now"].iloc[0]) / factor)
+    return f"{target.title(study.posterior.model)}: sd {now}{' ' * bool(unit)}{unit} now"
+
+
+def design_figure(study: DesignStudy) -> Figure:
+    """Return the expected standard deviation after every test, a panel for each target, the best on top."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(STYLE):
+        shown = [_shown(_own(study, target)) for target in study.targets]
+        height = 1.5 + 0.3 * max(map(len, shown))
+        figure = Figure(figsize=(9.5, 0.4 + height * len(shown)))
+        axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
+        for axis, target, table in zip(axes, study.targets, shown, strict=True):
+            _panel(axis, study, target, table)
+        marks: list[Any] = [axes[0].plot([], [], "o", color=color)[0] for color in (BAND, BEYOND, BASE)]
+        words = ["within the I1 and I2 of the data", "beyond", "tests of the data again"]
+        figure.legend(marks, words, loc="outside lower right", ncols=3, fontsize=9)
+    return figure
+
+
+def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, figures: bool = True) -> None:
+    """Write design.csv and design.json (MPa), the figure, run.toml and report.html into an empty folder.
+
+    Parameters
+    ----------
+    study : DesignStudy
+    recipe : DesignSettings
+        The settings, with the run as it is seen from the folder.
+    folder : Path
+        Exists and is empty.
+    figures : bool
+        Draw it, too.
+    """
+    rows: list[Row] = [{str(name): value for name, value in row.items()} for row in study.table.to_dict("records")]
+    write_csv(folder / "design.csv", rows)
+    write_json(folder / "design.json", rows)
+    write_recipe(folder, "design", recipe)
+    if figures:
+        write_figures(folder, {"design": design_figure(study)})
+    model = study.posterior.model
+    page = render(
+        "design.html",
+        data=model.experiment.name,
+        material=model.material.name,
+        discrepancy=model.discrepancy.name,
+        lead=_lead(study),
+        tables=[
+            (heading(study, target), [HEADERS[0], f"{HEADERS[1]}{_in(study, target)}", *HEADERS[2:]],
+             readable_design(study, target))
+            for target in study.targets
+        ],
+        notes=study.notes,
+        command="design",
+        recipe=(folder / RECIPE).read_text(encoding="utf-8"),
+        figure=embedded_figure(folder / "figures" / "design.svg") if figures else "",
+    )  # fmt: skip
+    (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+def _own(study: DesignStudy, target: Target) -> pd.DataFrame:
+    return study.table[study.table["target"] == target.name]
+
+
+def _unit(study: DesignStudy, target: Target) -> tuple[float, str]:
+    """Return what one unit of a target's values is in MPa, and the unit's name."""
+    has_unit = bool(target.unit(study.posterior.model))
+    return (study.unit.to_mpa, study.unit.name) if has_unit else (1.0, "")
+
+
+def _in(study: DesignStudy, target: Target) -> str:
+    unit = _unit(study, target)[1]
+    return f", {unit}" if unit else ""
+
+
+def _lead(study: DesignStudy) -> list[str]:
+    """Return the best test for each target in a sentence, with what as many measurements of the data again give."""
+    found = []
+    for target in study.targets:
+        table = _own(study, target).dropna(subset=["reduction"])
+        best, again = table[~table["is_repeat"]], table[table["is_repeat"]]
+        if not len(best):
+            continue
+        row = best.iloc[0]
+        title = target.title(study.posterior.model)
+        words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}"
+        if len(again):
+            usual = again.iloc[-1]
+            words += f"; {usual['candidate']}, by {usual['reduction']:.0%}"
+        found.append(words + ".")
+    return found
+
+
+def _shown(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the best tests with numbers, and the tests of the data again."""
+    known = table.dropna(subset=["reduction"])
+    places = np.arange(len(known))
+    return known[known["is_repeat"].to_numpy() | (places < MOST_BARS)]
+
+
+def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) -> None:
+    """Draw the tests of one target."""
+    factor, unit = _unit(study, target)
+    now, places = float(table["sd_now"].iloc[0]) / factor, np.arange(len(table))[::-1]
+    for place, (_, row) in zip(places, table.iterrows(), strict=True):
+        after, error = row["sd_after"] / factor, 2 * row["error"] * now
+        color = BASE if row["is_repeat"] else BEYOND if row["beyond"] > 0 else BAND
+        axis.plot([after, now], [place, place], color=color, lw=2, alpha=0.4, solid_capstyle="butt")
+        axis.plot([after - error, after + error], [place, place], color=INK, lw=1.2)
+        axis.plot(after, place, "o", color="white" if row["is_rough"] else color, mec=color, ms=6)
+    axis.axvline(now, color=INK, lw=1)
+    axis.set_yticks(places, [str(name) for name in table["candidate"]])
+    axis.set_ylim(-0.7, len(table) - 0.3)
+    axis.set_xlim(0, 1.04 * now)
+    axis.set_title(target.title(study.posterior.model))
+    axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}; line: now")
+    axis.tick_params(axis="y", length=0)

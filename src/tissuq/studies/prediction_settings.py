@@ -1,0 +1,149 @@
+"""The settings of a prediction as texts and files, and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import loading_mode
+from tissuq.experiments.told_mode import said_mode
+from tissuq.mechanics import Material
+from tissuq.studies.earlier_run import recipe_of
+from tissuq.studies.measured_file import MeasuredFile
+from tissuq.studies.prediction import POINTS, Prediction, predict_run
+
+__all__ = ["ComparedFile", "PredictionSettings", "run_prediction", "stretches"]
+
+FloatArray = NDArray[np.float64]
+
+
+class ComparedFile(MeasuredFile):
+    """A file of measurements to compare with; its mode is that of the prediction."""
+
+    mode: str = ""
+
+
+class PredictionSettings(BaseModel):
+    """Everything that a prediction depends on."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    run: str
+    discrepancy: str | None = None
+    mode: str = ""
+    stretch: str | None = None
+    stretch2: str | None = None
+    points: int = Field(POINTS, ge=2, le=10_001)
+    prob: float = Field(0.95, gt=0, lt=1)
+    stress_type: Literal["engineering", "cauchy"] = "engineering"
+    data: ComparedFile | None = None
+
+    def mode_in(self, folder: Path) -> str:
+        """Return the mode to predict: the one asked for, that of the data, or else that of the run.
+
+        Raises
+        ------
+        InputError
+            When the data say that they are of another mode, or the run is of several modes.
+        """
+        told = None if self.data is None else self.data.mode or said_mode(folder / self.data.file)
+        if self.mode and told and loading_mode(self.mode) != loading_mode(told):
+            assert self.data is not None  # noqa: S101 (they told)
+            raise InputError(
+                f"'{self.data.file}' says that it was measured in mode {told}, and mode {self.mode} is to be "
+                "predicted: leave --mode out, or give measurements of that mode."
+            )
+        own = recipe_of(folder / self.run)
+        modes = sorted({test.mode for test in own.tests} or {own.mode})
+        if not (self.mode or told) and len(modes) > 1:
+            raise InputError(
+                f"run '{self.run}' is of tests in several modes ({', '.join(modes)}): say with --mode which to predict."
+            )
+        return self.mode or told or modes[0]
+
+    def points_of(self, mode: str) -> FloatArray | None:
+        """Return the points that were asked for, (g,) or (g, 2); None where none were.
+
+        Raises
+        ------
+        InputError
+            When a text is no list or range of numbers, or there is not one for every control of the mode.
+        """
+        controls = loading_mode(mode).controls
+        if self.stretch2 is not None and len(controls) == 1:
+            raise InputError(f"mode '{mode}' has one control, {controls[0].name}: leave --stretch2 out.")
+        if len(controls) == 1 or self.stretch is self.stretch2 is None:
+            return None if self.stretch is None else stretches(self.stretch, self.points)
+        if self.stretch is None or self.stretch2 is None:
+            names = " and ".join(control.name for control in controls)
+            raise InputError(f"mode '{mode}' has two controls, {names}: give both --stretch and --stretch2.")
+        first = stretches(self.stretch, self.points)
+        second = stretches(self.stretch2, len(first))
+        if len(first) == 1 or len(second) == 1:
+            first, second = np.broadcast_arrays(first, second)
+        if len(first) != len(second):
+            raise InputError(
+                f"--stretch has {len(first)} values and --stretch2 {len(second)}: give pairs of them, or one number "
+                "for an axis that is held."
+            )
+        return np.column_stack([first, second])
+
+
+def stretches(text: str, points: int = POINTS) -> FloatArray:
+    """Return the numbers that a text means: ``0.7:2.0`` so many from end to end, ``1.1,1.2,1.5`` these.
+
+    Raises
+    ------
+    InputError
+        When it is neither.
+
+    Examples
+    --------
+    >>> stretches("1:2", points=3).tolist(), stretches("1.1, 1.5").tolist()
+    ([1.0, 1.5, 2.0], [1.1, 1.5])
+    """
+    is_range = ":" in text
+    try:
+        numbers = np.array([float(part) for part in text.split(":" if is_range else ",")])
+    except ValueError:
+        numbers = np.array([])
+    is_good = len(numbers) == 2 and numbers[0] < numbers[1] if is_range else len(numbers) > 0
+    if not is_good or not np.isfinite(numbers).all():
+        raise InputError(
+            f"'{text}' says no stretches: write two ends as 0.7:2.0, the lesser first, or a list as 1.1,1.2,1.5."
+        )
+    return np.linspace(numbers[0], numbers[-1], points) if is_range else numbers
+
+
+def run_prediction(
+    settings: PredictionSettings,
+    folder: Path = Path(),
+    step: Callable[[str], None] = lambda text: None,
+    law: Material | None = None,
+) -> Prediction:
+    """Fit a run's measurements again and predict what the settings ask for; relative paths lie in ``folder``.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When run, files or settings cannot be used.
+    """
+    step("reading")
+    mode = settings.mode_in(folder)
+    options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}
+    options |= {"mode": mode, "stretch": settings.points_of(mode), "data": _data(settings, mode, folder)}
+    step("fitting the run again, and predicting")
+    return predict_run(folder / settings.run, settings.discrepancy, law, **options)
+
+
+def _data(settings: PredictionSettings, mode: str, folder: Path) -> Experiment | None:
+    if settings.data is None:
+        return None
+    return settings.data.model_copy(update={"mode": mode}).experiment(folder)

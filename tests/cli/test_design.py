@@ -1,0 +1,73 @@
+"""`tissuq design`, as a user runs it."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from .conftest import tree
+
+
+@pytest.fixture
+def run(cli, here, specimen):
+    assert cli("fit", specimen, "--discrepancy", "none", "--noise-sd", 1, "--no-figures", "--out", "run").status == 0
+    return here / "run"
+
+
+TESTS = ("--candidate", "planar 1.05:1.2 6", "--candidate", "uniaxial 0.9:1.1 6")
+
+
+def rows_of(folder):
+    with (folder / "design.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_tests_are_ranked_and_the_ranking_can_be_repeated(cli, run, here):
+    said = cli("design", "run", *TESTS, "--target", "modulus", "--target", "planar:1.3")
+    assert said.status == 0, said.err
+    assert "Initial shear modulus: sd" in said.out
+    assert "planar 1.05 to 1.2, 6 points" in said.out
+    folder = here / "runs" / "run-design"
+    assert (folder / "figures" / "design.png").exists()
+    rows = rows_of(folder)
+    assert [row["target"] for row in rows] == ["modulus"] * 4 + ["planar:1.3"] * 4
+    assert cli("design", "--config", folder / "run.toml", "--out", "again").status == 0
+    assert rows_of(here / "again") == rows
+
+
+def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
+    (here / "tests.toml").write_text(
+        'run = "run"\ntargets = ["C10"]\n[[candidates]]\nmode = "planar"\nstretch = [1.1, 1.3]\nname = "mine"\n'
+    )
+    said = cli("design", "--config", "tests.toml", "--no-figures", "--out", "ranked")
+    assert said.status == 0, said.err
+    assert "mine" in {row["candidate"] for row in rows_of(here / "ranked")}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "give the RUN folder"),
+        (["walk"], "no run folder"),
+        (["run", "--candidate", "planar 1.2"], "MODE LOW:HIGH POINTS"),
+        (["run", "--candidate", "planer 1:1.2 5"], "planer"),
+        (["run", "--target", "C30"], "no target 'C30'"),
+        (["run", "--points", "0"], "one measurement or more"),
+        (["run", "--specimen", "twin"], "specimen"),
+        (["run", "--discrepancy", "auto"], "no discrepancy 'auto'"),
+        (["run", "--out", "run", "--force"], "holds the run itself"),
+    ],
+)
+def test_what_cannot_be_used_is_told_and_leaves_nothing(cli, run, here, arguments, words):
+    before = tree(here)
+    said = cli("design", *arguments)
+    assert said.status == 2
+    assert words in said.err
+    assert "Traceback" not in said.err
+    assert tree(here) == before
+
+
+def test_a_ranking_is_never_overwritten_unasked(cli, run, here):
+    for options, status in (([], 0), ([], 2), (["--force"], 0)):
+        assert cli("design", "run", *TESTS, "--no-figures", *options).status == status

@@ -1,0 +1,111 @@
+"""`tissuq export`, as a user runs it."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+
+import pytest
+
+import tissuq as tq
+from tissuq.export import card_formats
+
+from .conftest import command, tree, write_specimen
+
+FREE = "auto"
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory):
+    """A run with a free energy, none, and an error of the stress."""
+    folder = tmp_path_factory.mktemp("export")
+    write_specimen(folder / "specimen.csv")
+    chosen = [word for name in (FREE, "none", "gp") for word in ("--discrepancy", name)]
+    said = command("fit", "specimen.csv", *chosen, "--noise-sd", 1, "--no-figures", folder=folder)
+    assert said.status == 0, said.err
+    return folder / "runs" / "specimen"
+
+
+@pytest.fixture
+def run(earlier, here):
+    shutil.copytree(earlier, here / "runs" / "specimen")
+    return "runs/specimen"
+
+
+def test_a_run_becomes_the_cards_of_its_posterior(cli, here, run):
+    said = cli(
+        "export", run, "--discrepancy", "none", "--draws", 4, "--unit", "kPa", "--format", "calculix", "--seed", 3
+    )
+    assert said.status == 0, said.err
+    assert "exactly: NEO HOOKE" in " ".join(said.out.split())
+    assert "cards/specimen-calculix/draw-1.inp to draw-4.inp" in said.out
+    with (here / "cards" / "specimen-calculix" / "index.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    draws = tq.load_run(run, "none").ensemble(4, 3)
+    assert [float(row["C10"]) for row in rows] == pytest.approx([1e3 * draw.values["C10"] for draw in draws])
+    typical = min(rows, key=lambda row: float(row["from_median"]))["file"]
+    assert f"median stresses: {typical}\n" in said.out
+    text = (here / "cards" / "specimen-calculix" / "draw-2.inp").read_text()
+    assert "run specimen of tissuq fit, sobol draws from seed 3" in " ".join(text.split())
+
+
+def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
+    said = cli("export", run, "--draws", 4, "--all-draws", "--law", "ogden", "--order", 3, "--out", "mine")
+    assert said.status == 0, said.err
+    words = " ".join(said.out.split())
+    assert "nearest OGDEN, N=3" in words
+    assert "root mean square" in words
+    text = (here / "mine" / "draw-1.inp").read_text()
+    assert "admissible: not looked at" in text
+    assert "PROJECTION" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--discrepancy", "gp"], "is an error of the measured stress"),
+        (["--discrepancy", "yeoh"], "choose one of auto, none, gp"),
+        (["--format", "nastran"], "no format of cards named 'nastran'"),
+        (["--unit", "psi"], "MPa, kPa, Pa"),
+        (["--law", "gent"], "no law 'gent'"),
+        (["--draws", "0"], "one draw or more"),
+        (["--sampling", "halton"], "sobol, latin, random"),
+        (["--poisson", "0.6"], "between 0 and 0.5"),
+        (["--bulk-modulus", "10", "--poisson", "0.4"], "not both"),
+        (["--out", "runs/specimen", "--force"], "is the run itself"),
+        (["--out", "runs", "--force"], "is the run itself, or holds it"),
+    ],
+    ids=lambda each: " ".join(each) if isinstance(each, list) else "",
+)
+def test_what_cannot_be_is_refused_and_nothing_written(cli, here, run, options, words):
+    before = tree(here)
+    said = cli("export", run, *options)
+    assert said.status == 2
+    assert words in said.err
+    assert "Traceback" not in said.err
+    assert tree(here) == before
+
+
+def test_cards_are_never_overwritten_unasked(cli, here, run):
+    for options, status in (([], 0), ([], 2), (["--force"], 0)):
+        said = cli("export", run, "--discrepancy", "none", "--draws", 1, *options)
+        assert said.status == status
+        assert ("exists" in said.err) == (status == 2)
+
+
+def test_fibres_have_no_cards(cli, here):
+    rows = [f"{x},{y},{100 * (x - 1):.3f},{90 * (y - 1):.3f}" for x in (1.05, 1.1, 1.2) for y in (1.02, 1.1, 1.15)]
+    (here / "sheet.csv").write_text("stretch x,stretch y,stress x (kPa),stress y (kPa)\n" + "\n".join(rows) + "\n")
+    fitted = cli(
+        "fit", "sheet.csv", "--mode", "biaxial", "--material", "neo-hookean+standard-fibres:one@0", "--noise-sd", 1,
+        "--discrepancy", "none", "--no-figures",
+    )  # fmt: skip
+    assert fitted.status == 0, fitted.err
+    said = cli("export", "runs/sheet")
+    assert said.status == 2
+    assert "has fibres" in said.err
+
+
+def test_the_help_names_every_format(cli):
+    said = " ".join(cli("export", "--help").out.split())
+    assert all(name in said for name in card_formats())

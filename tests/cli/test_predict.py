@@ -1,0 +1,143 @@
+"""`tissuq predict`, as a user runs it."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from .conftest import tree
+
+PLANAR_KPA = "# mode: planar\nstretch,stress_kPa\n1.0,0.0\n1.1,34.9\n1.2,62.5\n1.8,160.0\n"
+"""100 (l - l^-3) kPa, C10 = 50 kPa, but for a few tenths."""
+
+
+@pytest.fixture
+def run(fit_run, here):
+    """A run of tissuq fit, as seen from the current folder, with the discrepancies none, constant and gp."""
+    (here / "run").symlink_to(fit_run[0])
+    return "run"
+
+
+@pytest.fixture
+def planar(here):
+    (here / "planar.csv").write_text(PLANAR_KPA)
+    return "planar.csv"
+
+
+def rows_of(folder):
+    with (folder / "prediction.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_mode_is_predicted(cli, here, run):
+    said = cli("predict", run, "--mode", "planar", "--stretch", "0.9:2.5", "--points", 9, "--discrepancy", "none")
+    assert said.status == 0, said.err
+    words = " ".join(said.out.split())
+    assert "Stress in mode planar, kPa" in words
+    assert "points lie beyond what was measured: in mode planar the run is calibrated from" in words
+    found = rows_of(here / "run-planar")
+    assert [float(row["stretch"]) for row in found] == pytest.approx([0.9 + 0.2 * place for place in range(9)])
+    assert {row["is_calibrated"] for row in found} == {"True", "False"}
+    # C10 is about 50 kPa: 2 C10 (l - l^-3) MPa.
+    assert float(found[2]["alone_mean"]) == pytest.approx(0.1 * (1.3 - 1.3**-3), rel=0.03)
+    assert (here / "run-planar" / "figures" / "prediction.png").exists()
+
+
+def test_measurements_are_compared_with_and_the_prediction_repeats(cli, here, run, planar):
+    options = ["--discrepancy", "none", "--points", 5, "--no-figures"]
+    said = cli("predict", run, "--data", planar, *options, "--stress-type", "cauchy")
+    assert said.status == 0, said.err
+    assert "Measurements of planar" in said.out
+    scores = json.loads((here / "run-planar" / "scores.json").read_text())
+    assert [row["range"] for row in scores] == ["all", "calibrated", "beyond"]
+    assert scores[0]["count"] == 3
+    assert scores[1]["error"] < 0.05
+    (here / planar).unlink()
+    again = cli("predict", "--config", "run-planar/run.toml", "--no-figures", "--out", "elsewhere/again")
+    assert again.status == 0, again.err
+    first, second = tree(here / "run-planar"), tree(here / "elsewhere" / "again")
+    assert first.keys() == second.keys()
+    differ = {name for name in first if first[name] != second[name]}
+    assert differ == {"run.toml", "report.html"}  # which name the run from where they are
+    assert again.out.replace("elsewhere/again", "run-planar") == said.out
+
+
+def test_columns_and_cauchy_stress_of_the_file_can_be_said(cli, here, run):
+    (here / "odd.csv").write_text("lambda,sigma\n1.1,38.4\n1.2,75.0\n")
+    words = ["--column", "stretch=lambda", "--column", "stress=sigma", "--stress-unit", "kPa"]
+    words += ["--data-stress-type", "cauchy", "--mode", "planar", "--discrepancy", "none", "--no-figures"]
+    said = cli("predict", run, "--data", "odd.csv", *words, "--out", "odd")
+    assert said.status == 0, said.err
+    (row,) = json.loads((here / "odd" / "scores.json").read_text())
+    assert row["error"] < 0.05
+
+
+def test_an_error_of_the_stress_is_said_to_be_left_out(cli, run):
+    said = cli("predict", run, "--discrepancy", "gp", "--mode", "equibiaxial", "--no-figures", "--points", 3)
+    assert said.status == 0, said.err
+    assert "says nothing about the equibiaxial one" in " ".join(said.out.split())
+
+
+def test_two_controls_are_given_apart(cli, here, run):
+    words = ["--mode", "biaxial", "--stretch", "1:1.2", "--stretch2", "1.1", "--points", 3, "--discrepancy", "none"]
+    said = cli("predict", run, *words, "--no-figures")
+    assert said.status == 0, said.err
+    assert [row["stretch2"] for row in rows_of(here / "run-biaxial")] == ["1.1"] * 6
+
+
+BAD = [
+    ([], ["RUN", "--config"]),
+    (["nowhere"], ["there is no run folder 'nowhere'"]),
+    (["."], ["is not a complete run of tissuq fit"]),
+    (["RUN"], ["has several discrepancies", "none, constant, gp"]),
+    (["RUN", "--discrepancy", "cubic"], ["'cubic'", "constant"]),
+    (["RUN", "--discrepancy", "none", "--mode", "torsion"], ["'torsion'", "planar"]),
+    (["RUN", "--discrepancy", "none", "--stretch", "0.7-2"], ["'0.7-2'", "0.7:2.0"]),
+    (["RUN", "--discrepancy", "none", "--stretch", "2:0.7"], ["'2:0.7'", "the lesser first"]),
+    (["RUN", "--discrepancy", "none", "--stretch", "-1:2"], ["stretch -1", "not positive"]),
+    (["RUN", "--discrepancy", "none", "--stretch2", "1"], ["one control", "--stretch2"]),
+    (["RUN", "--discrepancy", "none", "--mode", "biaxial"], ["several controls", "stretch of axis 2"]),
+    (["RUN", "--discrepancy", "none", "--points", "1"], ["points", "2"]),
+    (["RUN", "--discrepancy", "none", "--prob", "1"], ["prob", "less than 1"]),
+    (["RUN", "--discrepancy", "none", "--stress-type", "kirchhoff"], ["stress_type", "'kirchhoff'"]),
+    (["RUN", "--discrepancy", "none", "--cycle", "1"], ["cycle", "no --data"]),
+    (["RUN", "--discrepancy", "none", "--data", "nowhere.csv"], ["nowhere.csv", "no such file"]),
+    (["RUN", "--discrepancy", "none", "--data", "PLANAR", "--mode", "equibiaxial"],
+     ["planar.csv", "measured in mode planar", "equibiaxial"]),
+    (["RUN", "--discrepancy", "none", "--data", "PLANAR", "--stress-unit", "furlong"], ["'furlong'"]),
+    (["RUN", "--discrepancy", "none", "--mode", "equibiaxial", "--stretch", "1e160"], ["too large for a number"]),
+    (["--config", "nowhere.toml"], ["nowhere.toml"]),
+    (["RUN", "--config", "run.toml"], ["RUN", "--config"]),
+    (["RUN", "--discrepancy", "none", "--out", "RUN", "--force"], ["holds the run itself"]),
+    (["RUN", "--discrepancy", "none", "--out", "PLANAR"], ["is a file"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "words"), BAD)
+def test_bad_input_is_one_message_and_leaves_nothing(cli, here, run, planar, arguments, words):
+    known = {"RUN": run, "PLANAR": planar}
+    before = tree(here)
+    said = cli("predict", *[known.get(each, each) for each in arguments])
+    assert said.status == 2
+    assert said.err.startswith("tissuq: ")
+    assert said.err.count("\n") == 1
+    for word in words:
+        assert word in said.err
+    assert tree(here) == before
+
+
+def test_a_prediction_is_never_overwritten_unasked(cli, here, run):
+    options = ["--discrepancy", "none", "--no-figures", "--points", 3]
+    for more, status in (([], 0), ([], 2), (["--force"], 0)):
+        said = cli("predict", run, *options, *more)
+        assert said.status == status
+        assert ("run-uniaxial" in said.err) == (status == 2)
+
+
+def test_a_prediction_is_no_run_to_predict_from(cli, here, run):
+    assert cli("predict", run, "--discrepancy", "none", "--no-figures", "--points", 3).status == 0
+    said = cli("predict", "run-uniaxial")
+    assert said.status == 2
+    assert "run of tissuq fit" in said.err

@@ -1,0 +1,71 @@
+"""The folder of a ranking of tests."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tissuq as tq
+from tissuq.assessment.targets import target_named
+from tissuq.report.design import design_figure, heading, readable_design, write_design
+from tissuq.studies.design import DesignSettings, DesignStudy
+
+
+@pytest.fixture(scope="module")
+def study():
+    data = tq.simulate("gent", {"mu": 1.0, "Jm": 1.2}, np.linspace(0.75, 1.6, 16), 0.02, seed=1)
+    data = tq.Experiment("uniaxial", data.stretch, data.stress, "gent & co", stress_unit="kPa")
+    posterior = tq.fit(data, material="gent", discrepancy="none", noise_sd=0.02)
+    targets = [target_named(each, posterior.model) for each in ("modulus", "Jm")]
+    table = posterior.design(points=(8,), target=["modulus", "Jm"])
+    settings = DesignSettings(run="run", targets=("modulus", "Jm"), points=(8,))
+    return DesignStudy(settings, posterior, tuple(targets), table, "same", 0.18)
+
+
+def test_numbers_are_in_the_unit_of_the_data(study):
+    first, second = study.targets
+    rows = readable_design(study, first)
+    best = study.table[study.table["target"] == "modulus"].iloc[0]
+    assert rows[0][0] == best["candidate"]
+    assert float(rows[0][1]) == pytest.approx(1000 * best["sd_after"], rel=0.005)
+    assert rows[0][2].startswith(f"{best['reduction']:.1%}")
+    assert heading(study, first).endswith("kPa now")
+    assert "kPa" not in heading(study, second)
+    assert rows[-1][1:3] == ["", ""]
+
+
+def test_everything_is_written(study, tmp_path):
+    write_design(study, study.settings, tmp_path)
+    names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
+    wanted = {"design.csv", "design.json", "run.toml", "report.html", "figures/design.svg", "figures/design.png"}
+    assert names == wanted
+    pd.testing.assert_frame_equal(
+        pd.read_csv(tmp_path / "design.csv", keep_default_na=False, na_values=["nan"])[["target", "sd_after"]],
+        study.table[["target", "sd_after"]],
+        check_dtype=False,
+    )
+    rows = json.loads((tmp_path / "design.json").read_text())
+    assert [row["candidate"] for row in rows] == study.table["candidate"].tolist()
+    assert rows[-1]["sd_after"] is None
+    page = (tmp_path / "report.html").read_text()
+    assert "gent &amp; co" in page
+    assert "is expected to lower its sd by" in page
+
+
+def test_without_figures_there_are_none(study, tmp_path):
+    write_design(study, study.settings, tmp_path, figures=False)
+    assert not (tmp_path / "figures").exists()
+    assert "<img" not in (tmp_path / "report.html").read_text()
+
+
+def test_the_figure_has_a_panel_for_each_target_with_the_best_on_top(study):
+    axes = design_figure(study).axes
+    assert [axis.get_title(loc="left") for axis in axes] == ["initial shear modulus", "Jm"]
+    labels = [label.get_text() for label in axes[0].get_yticklabels()]
+    assert labels[0] == study.table["candidate"].iloc[0]
+    assert any("again" in label for label in labels)
+    assert "kPa" in axes[0].get_xlabel()
+    assert "kPa" not in axes[1].get_xlabel()

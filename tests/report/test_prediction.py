@@ -1,0 +1,145 @@
+"""The figure, the tables and the folder of a prediction."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.report.prediction import (
+    band_headers,
+    readable_bands,
+    readable_scores,
+    score_headers,
+    write_prediction_run,
+)
+from tissuq.report.prediction_figures import prediction_figure
+from tissuq.studies.prediction import predicted
+from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    data = tq.simulate("yeoh", {"C10": 0.4, "C20": 0.03, "C30": 0.0}, np.linspace(0.8, 1.6, 14), 0.02, seed=1)
+    in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress, "specimen", stress_unit="kPa")
+    return tq.fit(in_kpa, discrepancy="yeoh", noise_sd=0.02)
+
+
+@pytest.fixture(scope="module")
+def planar():
+    data = tq.simulate("yeoh", {"C10": 0.4, "C20": 0.03, "C30": 0.0}, [1.0, 1.1, 1.3, 2.2], 0.02, seed=2, mode="planar")
+    return tq.Experiment("planar", data.stretch, data.stress, "other")
+
+
+@pytest.fixture(scope="module")
+def found(posterior, planar):
+    return predicted(posterior, data=planar, stretch=[1.0, 1.1, 1.3, 2.2])
+
+
+def test_numbers_are_in_the_unit_of_the_run(found):
+    rows, headers = readable_bands(found), band_headers(found)
+    assert len(headers) == len(rows[0])
+    assert [row[0] for row in rows] == ["1", "1.1", "1.3", "2.2"]
+    mean = found.bands[0, True, False]["mean"][2]
+    assert float(rows[2][1]) == pytest.approx(1000 * mean, rel=0.05)
+    assert [row[-1] for row in rows] == ["yes", "yes", "yes", "no"]
+    scores = readable_scores(found)
+    assert "CRPS, kPa" in score_headers(found)
+    assert float(scores[0][6]) == pytest.approx(1000 * found.scores["crps"][0], rel=0.01)
+    assert [row[1] for row in scores] == ["all", "calibrated", "beyond"] * 2
+
+
+def test_of_many_points_some_are_read_from_end_to_end(posterior):
+    rows = readable_bands(predicted(posterior, stretch=np.linspace(0.8, 1.6, 101)))
+    assert len(rows) == 13
+    assert (rows[0][0], rows[-1][0]) == ("0.8", "1.6")
+
+
+def test_what_is_not_calibrated_is_hatched_in_every_panel(found):
+    figure = prediction_figure(found)
+    low, high = found.calibrated_range
+    assert len(figure.axes) == 2
+    for axis in figure.axes:
+        (shaded,) = [patch for patch in axis.patches if patch.get_hatch()]
+        assert shaded.get_extents().transformed(axis.transData.inverted()).x0 == pytest.approx(high, rel=1e-6)
+        marks = {line.get_label(): line.get_xdata().tolist() for line in axis.lines if line.get_marker() == "o"}
+        assert marks == {"measured": [1.0, 1.1, 1.3], "measured beyond": [2.2]}
+    assert low < 1
+
+
+def test_nothing_is_hatched_where_all_is_calibrated(posterior):
+    figure = prediction_figure(predicted(posterior, mode="equibiaxial"))
+    assert not any(patch.get_hatch() for axis in figure.axes for patch in axis.patches)
+
+
+def test_a_panel_shows_the_bands_in_the_unit_of_the_run(found):
+    with_it, alone = prediction_figure(found).axes
+    assert with_it.get_ylabel() == "engineering stress [kPa]"
+    assert "with the discrepancy yeoh" in with_it.get_title("left")
+    assert "neo-hookean alone" in alone.get_title("left")
+    (mean,) = [line for line in alone.lines if line.get_label() == "predicted mean"]
+    np.testing.assert_allclose(mean.get_ydata(), 1000 * found.bands[0, False, False]["mean"], rtol=1e-12)
+    inside = round(found.scores["inside"][0] * found.scores["count"][0])
+    assert with_it.get_title("left").endswith(f"{inside} of 4 inside")
+
+
+def test_a_band_of_any_size_can_be_drawn(posterior):
+    far = predicted(posterior, mode="equibiaxial", stretch=[1.0, 1.1, 1e9])
+    figure = prediction_figure(far)
+    figure.draw_without_rendering()
+    assert max(abs(axis.get_ylim()[1]) for axis in figure.axes) < 1e6
+
+
+@pytest.mark.parametrize("mode", ["biaxial", "simple-shear-normal"])
+def test_every_stress_has_a_row_of_panels(posterior, mode):
+    stretch = [[1.0, 1.1], [1.2, 1.1]] if mode == "biaxial" else [-0.1, 0.1]
+    figure = prediction_figure(predicted(posterior, mode=mode, stretch=stretch))
+    assert len(figure.axes) == 4
+    labels = {axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()}
+    assert labels == {"stretch of axis 1 (stretch of axis 2 1.1)" if mode == "biaxial" else "amount of shear"}
+
+
+def test_measurements_of_two_controls_are_drawn_one_by_one(posterior):
+    test = tq.simulate("neo-hookean", {"C10": 0.4}, [[1.1, 1.0], [1.1, 1.2], [1.2, 1.2]], 0.02, seed=1, mode="biaxial")
+    figure = prediction_figure(predicted(posterior, data=test))
+    figure.draw_without_rendering()
+    for axis in figure.axes:
+        assert len(axis.collections) == 2  # the two bands, as bars
+
+
+def test_a_folder_holds_tables_arrays_figure_and_page(found, planar, tmp_path):
+    file = tmp_path / "other.csv"
+    rows = [f"{a},{1000 * b}\n" for a, b in zip(planar.stretch, planar.stress, strict=True)]
+    file.write_text("stretch,stress_kPa\n" + "".join(rows))
+    folder = tmp_path / "out"
+    folder.mkdir()
+    settings = PredictionSettings(run="run", data=ComparedFile(file="other.csv"))
+    write_prediction_run(found, settings, folder, folder, tmp_path)
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
+    assert names == {
+        "prediction.csv", "prediction.nc", "scores.csv", "scores.json", "run.toml", "report.html", "input/other.csv",
+        "figures/prediction.svg", "figures/prediction.png",
+    }  # fmt: skip
+    with (folder / "prediction.csv").open() as table:
+        first = list(csv.DictReader(table))[2]
+    assert float(first["mean"]) == found.bands[0, True, False]["mean"][2]
+    assert json.loads((folder / "scores.json").read_text())[0]["crps"] == found.scores["crps"][0]
+    recipe = (folder / "run.toml").read_text()
+    assert 'run = "../run"' in recipe
+    assert 'file = "input/other.csv"' in recipe
+    page = (folder / "report.html").read_text()
+    assert "Of 3 measurements of other in the calibrated range" in page
+    assert "1 of 4 points and 1 of 4 measurements lie beyond" in page
+    assert "data:image/svg+xml" in page
+
+
+def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(posterior, tmp_path):
+    found = predicted(posterior, mode="planar", stretch=[1.0, 1.2, 9.0])
+    write_prediction_run(found, PredictionSettings(run="run"), tmp_path, tmp_path, figures=False)
+    page = (tmp_path / "report.html").read_text()
+    assert "At stretch 1.2 in mode planar, the engineering stress is" in page
+    assert "How the measurements are predicted" not in page
+    assert "<img" not in page
