@@ -53,7 +53,10 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
         assert not names & {node.id for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Name)}
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "docs/several-tests.md", "docs/prediction.md"])
+@pytest.mark.parametrize(
+    "document",
+    ["README.md", "CONTRIBUTING.md", "docs/several-tests.md", "docs/prediction.md", "docs/expensive-models.md"],
+)
 def test_the_python_in_the_documents_runs(document):
     text = (ROOT.parents[1] / document).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)

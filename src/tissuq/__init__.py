@@ -3,6 +3,7 @@
 from tissuq import finite_elements
 from tissuq.assessment import Assessment, Average, Candidate, average, compare
 from tissuq.discrepancy import Discrepancy, discrepancies
+from tissuq.emulation import Calibration, Emulator, UmbridgeForward
 from tissuq.ensemble import EnergyDraw, Ensemble
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments import datasets
@@ -28,6 +29,7 @@ from tissuq.population import Population, fit_population
 from tissuq.posterior import Posterior
 from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 from tissuq.report.cards import write_cards
+from tissuq.studies.calibrate import calibrate
 from tissuq.studies.earlier_run import load_run
 from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.prediction import Prediction, predict_run
@@ -38,9 +40,11 @@ __version__ = "0.1.0"
 __all__ = [
     "Assessment",
     "Average",
+    "Calibration",
     "Candidate",
     "ConvergenceError",
     "Discrepancy",
+    "Emulator",
     "EnergyDraw",
     "Ensemble",
     "Experiment",
@@ -70,9 +74,11 @@ __all__ = [
     "StretchMaterial",
     "TissuqError",
     "Tolerances",
+    "UmbridgeForward",
     "Uniform",
     "UnknownNoise",
     "average",
+    "calibrate",
     "compare",
     "datasets",
     "discrepancies",

@@ -29,6 +29,7 @@ def test_help_is_shown_without_importing_a_heavy_library():
         "inspect",
         "predict",
         "population",
+        "calibrate",
         "design",
         "show",
         "materials",

@@ -7,6 +7,7 @@ import sys
 import typer
 
 from tissuq.cli import (
+    calibrate,
     catalogue,
     check,
     compare,
@@ -41,6 +42,7 @@ app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
 app.command("predict")(predict.predict)
 app.command("population")(population.population)
+app.command("calibrate")(calibrate.calibrate)
 app.command("compare")(compare.compare)
 app.command("design")(design.design)
 app.command("export")(export.export)

@@ -54,14 +54,16 @@ def log_normal(points: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * log(2 * pi))
 
 
-def adapted(log_density: Callable[[FloatArray], float], dimension: int) -> Proposal:
-    """Return a proposal for a density near the standard normal or much narrower, known at single points (d,).
+def adapted(log_density: Callable[[FloatArray], FloatArray], dimension: int, count: int | None = None) -> Proposal:
+    """Return a proposal for a density near the standard normal or much narrower, known (N,) at points (N, d).
 
     Rounds of quasi-random points come nearer to the density: all points so far, weighted by a power of the density over
     the mixture of all proposals so far, give the next t distribution its mean and covariance; the power is the
-    largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering).
+    largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering). ``count`` is the
+    number of points in a round.
     """
-    count, least = 16 + 16 * dimension, 4.0 + 4 * dimension
+    count = count or 16 + 16 * dimension
+    least = 4.0 + 4 * dimension
     proposal = Proposal(np.zeros(dimension), np.eye(dimension))
     proposals, points, values = [], np.zeros((0, dimension)), np.zeros(0)
     uniforms = even_points(dimension, count * ROUNDS)
@@ -69,7 +71,7 @@ def adapted(log_density: Callable[[FloatArray], float], dimension: int) -> Propo
         new = proposal.points(uniforms[round_::ROUNDS])
         proposals.append(proposal)
         points = np.concatenate([points, new])
-        values = np.concatenate([values, [log_density(point) for point in new]])
+        values = np.concatenate([values, log_density(new)])
         mixture = np.logaddexp.reduce([each.log_density(points) for each in proposals], axis=0) - log(len(proposals))
         weights, power = _tempered(np.nan_to_num(values - mixture, nan=-HUGE, neginf=-HUGE), least)
         mean = weights @ points

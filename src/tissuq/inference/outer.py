@@ -100,7 +100,11 @@ def weighted_settings(outer: Outer, scout: Callable[[FloatArray], float]) -> tup
         When that is far outside the priors.
     """
     d = len(outer.symbols)
-    proposal = adapted(lambda point: scout(outer.settings(point)) + outer.log_base(point), d)
+
+    def log_density(points: FloatArray) -> FloatArray:
+        return np.array([scout(outer.settings(point)) + outer.log_base(point) for point in points])
+
+    proposal = adapted(log_density, d)
     far = [symbol for symbol, at in zip(outer.symbols, np.abs(proposal.mean), strict=True) if at > FARTHEST - 1]
     if far:
         raise ConvergenceError(

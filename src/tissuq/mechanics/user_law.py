@@ -19,7 +19,7 @@ from tissuq.mechanics.material import Material
 from tissuq.parameters import Parameter
 from tissuq.priors import Prior
 
-__all__ = ["LAW", "FunctionLaw", "as_material", "load_material"]
+__all__ = ["LAW", "FunctionLaw", "as_material", "failures_of", "load_material", "run_file"]
 
 LAW = re.compile(r"(?P<path>.+\.py):(?P<name>\w+)")
 """The file and the name in it."""
@@ -134,12 +134,12 @@ def load_material(law: str) -> Material:
     path, name = Path(match["path"]), match["name"]
     if not path.is_file():
         raise InputError(f"there is no file '{path}' for the material '{law}'.")
-    with _failures_of(path):
-        module = _run(path)
+    with failures_of(path):
+        module = run_file(path)
     if not hasattr(module, name):
         own = [key for key, each in vars(module).items() if getattr(each, "__module__", None) == module.__name__]
         raise InputError(f"'{path}' has nothing named '{name}'; it defines {', '.join(own) or 'nothing'}.")
-    with _failures_of(path):
+    with failures_of(path):
         material = as_material(getattr(module, name), law)
         checks = checked(material)
     failed = [f"{each.claim} ({each.problem})" for each in checks if each.problem]
@@ -171,7 +171,8 @@ def as_material(law: Any, place: str) -> Material:
         raise InputError(f"the material '{place}' cannot be made without arguments: {error}.") from error
 
 
-def _run(path: Path) -> Any:
+def run_file(path: Path) -> Any:
+    """Return the module that a user's file makes when it is run."""
     spec = spec_from_file_location(f"tissuq_law_{path.stem}", path)
     assert spec is not None  # noqa: S101 (a file that ends with .py has a loader)
     assert spec.loader is not None  # noqa: S101
@@ -182,7 +183,7 @@ def _run(path: Path) -> Any:
 
 
 @contextmanager
-def _failures_of(path: Path) -> Iterator[None]:
+def failures_of(path: Path) -> Iterator[None]:
     """Say in one sentence what failed in the user's file, and in which line."""
     try:
         yield

@@ -1,0 +1,9 @@
+"""Expensive forward models: a design, an emulator with its own error, and the posterior of the parameters."""
+
+from tissuq.emulation.calibration import Calibration
+from tissuq.emulation.emulator import Emulator, emulate
+from tissuq.emulation.forward import FileForward, Forward
+from tissuq.emulation.runs import ForwardRuns, gathered
+from tissuq.emulation.umbridge import UmbridgeForward
+
+__all__ = ["Calibration", "Emulator", "FileForward", "Forward", "ForwardRuns", "UmbridgeForward", "emulate", "gathered"]

@@ -1,0 +1,256 @@
+"""The emulator: what an expensive model would give at any parameters, and how far that may be off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import product
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.emulation.basis import OutputBasis, basis_of, has_signs, output_moments
+from tissuq.emulation.checks import EmulatorCheck
+from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, left_out, moments, trend_basis
+from tissuq.emulation.runs import ForwardRuns
+from tissuq.errors import InputError, ModelError
+from tissuq.priors import Prior
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Coordinates", "Emulator", "emulate"]
+
+FloatArray = NDArray[np.float64]
+
+MOST_CHOICES = 3
+"""Parameters of which each may be taken by its logarithm or not; with more, all or none are."""
+RARE, BEYOND = 1e-4, 0.25
+"""Probability below a value of a parameter that is still looked at, and how far it may lie beyond the runs, in their
+range."""
+MARGIN = 4
+"""Runs by which a design must exceed the coefficients of the mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """The unit box of the design: parameters, or the logarithms of some, from the least to the largest."""
+
+    low: FloatArray
+    high: FloatArray
+    is_log: NDArray[np.bool_]
+
+    def of(self, values: Any) -> Any:
+        """Return points (..., d) of the box at parameters (..., d), NumPy or JAX."""
+        arrays = values.__array_namespace__()
+        positive = arrays.where(self.is_log, values, 1.0)
+        logs = arrays.log(arrays.maximum(positive, np.finfo(float).tiny))
+        return (arrays.where(self.is_log, logs, values) - self.low) / (self.high - self.low)
+
+
+@dataclass(frozen=True, eq=False)
+class Emulator:
+    """A Gaussian process for each of the few directions in which the outputs of a model vary.
+
+    Parameters
+    ----------
+    runs : ForwardRuns
+        From which it was made.
+    control : (n,) array
+        Where the outputs are.
+    coordinates : Coordinates
+    basis : OutputBasis
+    kriging : Kriging
+    """
+
+    runs: ForwardRuns
+    control: FloatArray
+    coordinates: Coordinates
+    basis: OutputBasis
+    kriging: Kriging
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """The parameters."""
+        return self.runs.symbols
+
+    @property
+    def logarithms(self) -> tuple[str, ...]:
+        """The parameters that are taken by their logarithms."""
+        return tuple(np.array(self.symbols)[self.coordinates.is_log].tolist())
+
+    @cached_property
+    def arrays(self) -> dict[str, Any]:
+        """What `emulated` needs."""
+        return {
+            "low": self.coordinates.low,
+            "span": self.coordinates.high - self.coordinates.low,
+            "is_log": self.coordinates.is_log,
+            "outputs": self.basis.arrays,
+            "processes": self.kriging.arrays,
+        }
+
+    @property
+    def form(self) -> tuple[Kernel, Trend]:
+        """What compiled functions depend on."""
+        return self.kriging.kernel, self.kriging.trend
+
+    def moments(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return means (N, n) and covariances (N, n, n) of the outputs at parameters (N, d)."""
+        mean, cov = _compiled(self.form)(values, self.arrays)
+        return np.asarray(mean), np.asarray(cov)
+
+    def predict(self, parameters: Mapping[str, float]) -> pd.DataFrame:
+        """Return what the model would give at parameters, and the standard deviation of the emulator's error.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns control, mean, sd.
+        """
+        import pandas as pd
+
+        unknown = set(self.symbols) ^ set(parameters)
+        if unknown:
+            raise InputError(
+                f"the emulator needs {', '.join(self.symbols)}; '{sorted(unknown)[0]}' is too much or lacks."
+            )
+        mean, cov = self.moments(np.array([[parameters[symbol] for symbol in self.symbols]], dtype=np.float64))
+        sd = np.sqrt(np.diagonal(cov[0]))
+        return pd.DataFrame({"control": self.control, "mean": mean[0], "sd": sd})
+
+    def check(self, points: ArrayLike | None = None, outputs: ArrayLike | None = None) -> EmulatorCheck:
+        """Return how far the emulator is off: every run predicted from the others, or runs that it has not seen.
+
+        Parameters
+        ----------
+        points : (N, d) array, optional
+            Parameters of runs that were held out; without them, each run of its own is left out in turn.
+        outputs : (N, n) array, optional
+            What the model gave there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from tissuq.emulation import emulate, gathered
+        >>> stretch, points = np.linspace(1.1, 1.5, 5), np.linspace(0.5, 2, 9)
+        >>> results = [{"parameters": {"C10": c}, "outputs": 2 * c * (stretch - stretch**-2), "error": "",
+        ...             "seconds": 0.0} for c in points]
+        >>> emulate(gathered(["C10"], results, 5), stretch).check().relative_error < 1e-6
+        True
+        """
+        if points is None or outputs is None:
+            own, computed = self.runs.good
+            error, sd = left_out(self.kriging)
+            scores, beyond = self.basis.scores(computed) - error, self.basis.residuals(computed)
+            found = [output_moments(self.basis.arrays, *each) for each in zip(scores, sd**2, beyond, strict=True)]
+            mean, cov = (np.array(each) for each in zip(*found, strict=True))
+            return EmulatorCheck("each left out", own, computed, mean, cov)
+        own, computed = np.atleast_2d(np.asarray(points, float)), np.atleast_2d(np.asarray(outputs, float))
+        return EmulatorCheck("held out", own, computed, *self.moments(own))
+
+
+def emulated(form: tuple[Kernel, Trend], values: Any, arrays: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Return mean (n,) and covariance (n, n) of the outputs at parameters (d,); JAX traces it."""
+    place = Coordinates(arrays["low"], arrays["low"] + arrays["span"], arrays["is_log"]).of(values)
+    return output_moments(arrays["outputs"], *moments(*form, arrays["processes"], place))
+
+
+@lru_cache
+def _compiled(form: tuple[Kernel, Trend]) -> Any:
+    import jax
+
+    jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+    return jax.jit(jax.vmap(lambda values, arrays: emulated(form, values, arrays), (0, None)))
+
+
+def emulate(
+    runs: ForwardRuns,
+    control: ArrayLike,
+    kernel: Kernel = "squared-exponential",
+    trend: Trend = "linear",
+    priors: Mapping[str, Prior] | None = None,
+) -> Emulator:
+    """Return the emulator of a model from its runs.
+
+    Positive parameters are taken by their logarithms where that makes the runs more probable; outputs whose signs never
+    change, where every run is then better predicted from the others.
+
+    Parameters
+    ----------
+    runs : ForwardRuns
+    control : (n,) array
+        Where the outputs are.
+    kernel : str
+        ``"squared-exponential"``, for models that are smooth in their parameters, or ``"matern-5/2"``.
+    trend : str
+        Polynomial mean of the processes: ``"constant"``, ``"linear"`` or ``"quadratic"``.
+    priors : mapping of str to Prior, optional
+        Of the parameters. One that may come far nearer to zero than the runs is not taken by its logarithm.
+
+    Raises
+    ------
+    ModelError
+        When too few runs have succeeded.
+    """
+    for name, value, kind in (("kernel", kernel, Kernel), ("trend", trend, Trend)):
+        if value not in get_args(kind):
+            raise InputError(f"the {name} must be one of {', '.join(get_args(kind))}, not '{value}'.")
+    points, outputs = runs.good
+    form: tuple[Kernel, Trend] = (kernel, trend)
+    known = [None if priors is None else priors[symbol] for symbol in runs.symbols]
+    needed = MARGIN + trend_basis(np.zeros((1, points.shape[1])), trend).shape[1]
+    if len(points) < needed:
+        failed = f" {runs.told_failures}" if runs.failed.any() else ""
+        raise ModelError(
+            f"an emulator of {points.shape[1]} parameters with a {trend} mean needs {needed} runs that succeed, and "
+            f"there are {len(points)}.{failed}"
+        )
+    if np.ptp(outputs, axis=0).max() == 0:
+        raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")
+    choices = _choices(points, [_may_be_log(column, prior) for column, prior in zip(points.T, known, strict=True)])
+    every = [
+        _best_coordinates(runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), choices, form)
+        for is_log in (False, True)[: 1 + has_signs(outputs)]
+    ]
+    return max(every, key=lambda each: each.check().log_density)
+
+
+def _best_coordinates(
+    runs: ForwardRuns,
+    control: FloatArray,
+    basis: OutputBasis,
+    choices: Sequence[Coordinates],
+    form: tuple[Kernel, Trend],
+) -> Emulator:
+    """Return the emulator with the coordinates that make the scores of the runs most probable."""
+    points, outputs = runs.good
+    scores = basis.scores(outputs)
+    found = ((where, fitted(where.of(points), scores, *form)) for where in choices)
+    where, kriging = max(found, key=lambda pair: pair[1].log_evidence)
+    return Emulator(runs, control, where, basis, kriging)
+
+
+def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
+    """Return whether all of a prior that matters is near the runs (m,) on the line of logarithms."""
+    if column.min() <= 0:
+        return False
+    low, high = np.log([column.min(), column.max()])
+    least = column.min() if prior is None else float(prior.quantile(RARE))
+    return least > 0 and low - np.log(least) <= BEYOND * (high - low)
+
+
+def _choices(points: FloatArray, positive: Sequence[bool]) -> list[Coordinates]:
+    """Return the coordinates that there are: every parameter by itself or, where it may be, by its logarithm."""
+    choices: list[tuple[bool, ...]] = [(False,) * len(positive), tuple(positive)]
+    if sum(positive) <= MOST_CHOICES:
+        choices = list(product(*((False, True) if each else (False,) for each in positive)))
+    found = []
+    for choice in choices:
+        is_log = np.array(choice)
+        places = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
+        low, high = places.min(axis=0), places.max(axis=0)
+        found.append(Coordinates(low, np.where(high > low, high, low + 1), is_log))
+    return found

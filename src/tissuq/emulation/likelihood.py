@@ -1,0 +1,154 @@
+"""The density of the measurements: emulator with its error, discrepancy and noise, Gaussian given the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.scipy.linalg import cho_solve, solve_triangular
+from numpy.typing import NDArray
+
+from tissuq.discrepancy.discrepancy import Discrepancy
+from tissuq.emulation.emulator import Emulator, emulated
+from tissuq.emulation.kriging import Kernel, Trend
+from tissuq.emulation.problem import Problem
+from tissuq.priors import Prior
+
+__all__ = ["Likelihood"]
+
+FloatArray = NDArray[np.float64]
+
+BLOCK = 256
+"""Parameters at once: what bounds the memory."""
+ROUNDING = 1e-9
+"""Of the largest measurement: the least standard deviation, so that no covariance is singular."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """What compiled functions depend on; all else is data, so that one compilation serves many data sets."""
+
+    emulator: tuple[Kernel, Trend]
+    symbols: tuple[str, ...]
+    forward: int
+    discrepancy: Discrepancy
+
+
+class Likelihood:
+    """Of a problem with an emulator.
+
+    Parameters
+    ----------
+    problem : Problem
+    emulator : Emulator
+    has_error : bool
+        Whether the emulator's own error is part of it.
+    """
+
+    def __init__(self, problem: Problem, emulator: Emulator, *, has_error: bool = True) -> None:
+        self.problem, self.emulator, self.has_error = problem, emulator, has_error
+        self.form = Form(emulator.form, problem.symbols, len(problem.forward_symbols), problem.discrepancy)
+        self.data = {
+            "emulator": emulator.arrays,
+            "measured": problem.measured,
+            "control": problem.control,
+            "noise_sd": 0.0 if problem.noise_sd is None else problem.noise_sd,
+            "has_error": float(has_error),
+        }
+
+    def log_density(self, values: FloatArray) -> FloatArray:
+        """Return the log density (N,) of the measurements at parameters (N, D)."""
+        return self._in_blocks(_density(self.form), values)[0]
+
+    def predictions(self, values: FloatArray, *, discrepancy: bool, noise: bool) -> tuple[FloatArray, FloatArray]:
+        """Return means and variances (N, n) at the controls, given the measurements and parameters (N, D)."""
+        mean, variance = self._in_blocks(_conditional(self.form, discrepancy), values)
+        own = (
+            values[:, self.problem.symbols.index("noise_sd")]
+            if self.problem.noise_sd is None
+            else self.problem.noise_sd
+        )
+        return mean, variance + (np.broadcast_to(own, len(values))[:, None] ** 2 if noise else 0.0)
+
+    def error_ratio(self, values: FloatArray) -> float:
+        """Return the largest variance of the emulator's error over that of noise and discrepancy, in any direction.
+
+        The mean over parameters (N, D). Where it is small, the error hardly widens any posterior: by less than this
+        share of its variance.
+        """
+        return float(self._in_blocks(_ratio(self.form), values)[0].mean())
+
+    def _in_blocks(self, function: Any, values: FloatArray) -> tuple[FloatArray, ...]:
+        count = len(values)
+        whole = np.concatenate([values, np.repeat(values[-1:], -count % BLOCK, axis=0)])
+        found = [function(block, self.data) for block in np.split(whole, len(whole) // BLOCK)]
+        return tuple(np.concatenate([np.asarray(each) for each in part])[:count] for part in zip(*found, strict=True))
+
+
+def _parts(form: Form, values: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
+    """Return the mean, the covariances of the emulator's error and of the discrepancy, and the noise variance."""
+    mean, error = emulated(form.emulator, values[: form.forward], data["emulator"])
+    named = dict(zip(form.symbols, values, strict=True))
+    control = data["control"]
+    own = jnp.zeros_like(error)
+    if form.discrepancy.is_correlated:
+        own = form.discrepancy.correlated_variance(named) * form.discrepancy.correlation(control, control, named)
+    rounding = ROUNDING * jnp.abs(data["measured"]).max()
+    return mean, data["has_error"] * error, own, named.get("noise_sd", data["noise_sd"]) ** 2 + rounding**2
+
+
+def _whole(error: Any, own: Any, noise: Any) -> Any:
+    return jnp.linalg.cholesky(error + own + noise * jnp.eye(len(error)))
+
+
+def log_density(form: Form, values: Any, data: Mapping[str, Any]) -> Any:
+    """Return the log density of the measurements at parameters (D,); JAX traces it."""
+    mean, error, own, noise = _parts(form, values, data)
+    root = _whole(error, own, noise)
+    score = solve_triangular(root, data["measured"] - mean, lower=True)
+    return -0.5 * score @ score - jnp.log(jnp.diag(root)).sum() - 0.5 * len(score) * jnp.log(2 * jnp.pi)
+
+
+@lru_cache
+def _density(form: Form) -> Any:
+    return jax.jit(jax.vmap(lambda values, data: (log_density(form, values, data),), (0, None)))
+
+
+@lru_cache
+def _conditional(form: Form, discrepancy: bool) -> Any:
+    def moments(values: Any, data: Any) -> tuple[Any, Any]:
+        mean, error, own, noise = _parts(form, values, data)
+        root = _whole(error, own, noise)
+        asked = error + own if discrepancy else error
+        shift = asked @ cho_solve((root, True), data["measured"] - mean)
+        explained = solve_triangular(root, asked, lower=True)
+        return mean + shift, jnp.maximum(jnp.diag(asked) - (explained**2).sum(axis=0), 0.0)
+
+    return jax.jit(jax.vmap(moments, (0, None)))
+
+
+@lru_cache
+def _ratio(form: Form) -> Any:
+    def largest(values: Any, data: Any) -> tuple[Any]:
+        _, error, own, noise = _parts(form, values, data)
+        root = _whole(0.0 * error, own, noise)
+        half = solve_triangular(root, error, lower=True)
+        return (jnp.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[-1],)
+
+    return jax.jit(jax.vmap(largest, (0, None)))
+
+
+@lru_cache
+def log_posterior(form: Form, priors: tuple[Prior, ...]) -> Any:
+    """Return the log posterior of parameters (D,) and data, up to a constant; the same function for the same form."""
+
+    def density(values: Any, data: Any) -> Any:
+        prior = sum(each.log_density(value) for each, value in zip(priors, values, strict=True))
+        return log_density(form, values, data) + prior
+
+    return density

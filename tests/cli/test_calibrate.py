@@ -1,0 +1,111 @@
+"""`tissuq calibrate`, as a user runs it."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from .conftest import command, tree
+
+MODEL = """
+import numpy as np
+
+
+def force(parameters, depth):
+    if parameters["b"] > 5.0:
+        raise RuntimeError("the solver has not converged")
+    return parameters["mu"] * np.expm1(parameters["b"] * depth)
+
+
+def wrong(parameters):
+    return [1.0, 2.0]
+"""
+PRIORS = ["--prior", "mu=uniform(0.2,3)", "--prior", "b=uniform(0.5,6)"]
+USUAL = [*PRIORS, "--noise-sd", 0.02, "--runs", 16]
+
+
+def write_all(folder):
+    depth = np.linspace(0.05, 0.7, 12)
+    noise = 0.02 * np.random.default_rng(0).standard_normal(12)
+    rows = zip(depth, 1.1 * np.expm1(2.4 * depth) + noise, strict=True)
+    text = "".join(f"{a:.4f},{b:.5f}\n" for a, b in rows)
+    (folder / "punch.csv").write_text("depth (mm),force (mN)\n" + text)
+    (folder / "force.py").write_text(MODEL)
+
+
+@pytest.fixture(scope="session")
+def calibrate_run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("calibrate")
+    write_all(folder)
+    options = [*USUAL, "--discrepancy", "gp-pinned", "--out", "run"]
+    said = command("calibrate", "punch.csv", "--forward", "force.py:force", *options, folder=folder)
+    assert said.status == 0, said.err
+    return folder, said
+
+
+def test_a_run_leaves_the_promised_files(calibrate_run):
+    folder, said = calibrate_run
+    found = {name for name, content in tree(folder / "run").items() if content is not None}
+    figures = {f"figures/{name}.{kind}" for name in ("band", "emulator", "marginals") for kind in ("svg", "png")}
+    tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc"}
+    assert found == figures | tables | {"input/punch.csv", "input/force.py", "report.html", "run.toml", "contents.txt"}
+    for words in ("force.py:force: 16 runs", "each left out", "the solver has not converged", "run-forward-runs"):
+        assert words in said.out.replace("\n      ", " ")
+    page = (folder / "run" / "report.html").read_text()
+    assert all(words in page for words in ("Runs that failed", "depth (mm)", "<td>mu</td>") if words != "depth (mm)")
+
+
+def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
+    folder, _ = calibrate_run
+    rows = {row["parameter"]: row for row in json.loads((folder / "run" / "summary.json").read_text())}
+    assert list(rows) == ["mu", "b", "c", "psi"]
+    assert rows["mu"]["hdi_low"] < 1.1 < rows["mu"]["hdi_high"]
+    assert rows["b"]["hdi_low"] < 2.4 < rows["b"]["hdi_high"]
+    with (folder / "run" / "forward_runs.csv").open(newline="") as lines:
+        runs = list(csv.DictReader(lines))
+    assert len(runs) == 16
+    for run in runs:
+        assert ("solver" in run["error"]) == (float(run["b"]) > 5) == (run["output_1"] == "")
+    with (folder / "run" / "prediction.csv").open(newline="") as lines:
+        band = list(csv.DictReader(lines))
+    assert sum(float(row["low"]) < float(row["measured"]) < float(row["high"]) for row in band) >= 10
+
+
+def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate_run):
+    folder, _ = calibrate_run
+    again = ["--config", "run/run.toml", "--no-figures", "--out", "again"]
+    refused = command("calibrate", *again, folder=folder)
+    assert refused.status == 2
+    assert "run only when you name it: add --forward input/force.py:force" in refused.err
+    said = command("calibrate", "--forward", "run/input/force.py:force", *again, folder=folder)
+    assert said.status == 0, said.err
+    assert (folder / "again" / "summary.csv").read_bytes() == (folder / "run" / "summary.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["punch.csv", *USUAL], "give the forward model"),
+        (["--forward", "force.py:force", *USUAL], "give a FILE"),
+        (["punch.csv", "--forward", "no.py:force", *USUAL], "no file 'no.py'"),
+        (["punch.csv", "--forward", "force.py:force", "--runs", 8], "priors"),
+        (["punch.csv", "--forward", "force.py:wrong", *USUAL], "shape (2,)"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "depth"], "say which one"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "x", "--measured", "2"], "no column 'x'"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "2", "--measured", "2"], "the same column"),
+        (["punch.csv", "--forward", "force.py:force", *PRIORS, "--noise-sd", "loud"], "--noise-sd"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--kernel", "cubic"], "kernel"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--discrepancy", "auto"], "cannot stand beside"),
+        (["punch.csv", "--umbridge", "http://127.0.0.1:9", *USUAL], "UM-Bridge"),
+    ],
+)
+def test_bad_input_gives_one_message_and_leaves_nothing(cli, here, arguments, words):
+    write_all(here)
+    said = cli("calibrate", *arguments)
+    assert said.status == 2
+    assert words in said.err
+    assert "Traceback" not in said.err
+    assert {path.name for path in here.iterdir()} - {"__pycache__"} == {"punch.csv", "force.py"}

@@ -1,0 +1,95 @@
+"""The processes behind an emulator, held against the textbook's formulas with plain inverses."""
+
+import numpy as np
+import pytest
+
+from tissuq.emulation.kriging import NUGGET, Kriging, _log_posterior, fitted, left_out, moments
+
+
+def dense(kernel, one, other, lengths):
+    distance = np.sqrt((((one[:, None] - other[None]) / lengths) ** 2).sum(axis=-1))
+    if kernel == "squared-exponential":
+        return np.exp(-0.5 * distance**2)
+    r = np.sqrt(5) * distance
+    return (1 + r + r**2 / 3) * np.exp(-r)
+
+
+def textbook(model, values, point, settings=0):
+    """Universal kriging with mean coefficients (flat) and variance (1 / variance) integrated: mean and variance."""
+    points, lengths, nugget = model.points, model.lengths[0, settings], model.nugget[0]
+    H, h = np.column_stack([np.ones(len(points)), points]), np.append(1, point)
+    R = dense(model.kernel, points, points, lengths) + nugget * np.eye(len(points))
+    r = dense(model.kernel, points, point[None], lengths)[:, 0]
+    inverse = np.linalg.inv(R)
+    gram = np.linalg.inv(H.T @ inverse @ H)
+    beta = gram @ H.T @ inverse @ values
+    rest = values - H @ beta
+    free = len(points) - H.shape[1]
+    variance = rest @ inverse @ rest / (free - 2)
+    u = h - H.T @ inverse @ r
+    return h @ beta + r @ inverse @ rest, variance * (1 + nugget - r @ inverse @ r + u @ gram @ u)
+
+
+def case(kernel, seed=0, m=14):
+    points = np.random.default_rng(seed).random((m, 2))
+    values = np.sin(3 * points[:, 0]) + points[:, 1] ** 2
+    model = Kriging(points, values[:, None], np.ones((1, 1)), np.array([[[0.5, 0.9]]]), np.array([1e-6]), 0.0, kernel,
+                    "linear")  # fmt: skip
+    return model, values
+
+
+@pytest.mark.parametrize("kernel", ["squared-exponential", "matern-5/2"])
+def test_predictions_are_those_of_the_textbook(kernel):
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    model, values = case(kernel)
+    for point in np.array([[0.2, 0.7], [0.95, 0.05]]):
+        mean, variance = moments(kernel, "linear", model.arrays, jax.numpy.asarray(point))
+        expected = textbook(model, values, point)
+        assert float(mean[0]) == pytest.approx(expected[0], rel=1e-7)
+        assert float(variance[0]) == pytest.approx(expected[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("kernel", ["squared-exponential", "matern-5/2"])
+def test_a_run_left_out_is_predicted_as_if_it_had_never_been_made(kernel):
+    model, values = case(kernel)
+    error, sd = left_out(model)
+    for k in range(len(values)):
+        others = np.arange(len(values)) != k
+        less = Kriging(model.points[others], values[others, None], model.weights, model.lengths, model.nugget, 0.0,
+                       kernel, "linear")  # fmt: skip
+        mean, variance = textbook(less, values[others], model.points[k])
+        assert error[k, 0] == pytest.approx(values[k] - mean, rel=1e-4, abs=1e-8)
+        assert sd[k, 0] ** 2 == pytest.approx(variance, rel=1e-3)
+
+
+@pytest.mark.parametrize("kernel", ["squared-exponential", "matern-5/2"])
+@pytest.mark.parametrize("trend", ["constant", "linear", "quadratic"])
+def test_the_slope_of_the_evidence_is_that_of_finite_differences(kernel, trend):
+    points = np.random.default_rng(3).random((14, 2))
+    values = np.cos(4 * points[:, 0]) * (1 + points[:, 1])
+    logs = np.log([0.4, 0.8, 1e-4])
+    _, slope = _log_posterior(kernel, trend, logs, points, values)
+    for k, own in enumerate(slope):
+        step = 1e-5 * np.eye(3)[k]
+        high, low = (_log_posterior(kernel, trend, logs + way * step, points, values)[0] for way in (1, -1))
+        assert own == pytest.approx((high - low) / 2e-5, rel=1e-5, abs=1e-5)
+
+
+def test_length_scales_follow_the_function_and_the_weights_are_a_distribution():
+    points = np.random.default_rng(1).random((30, 2))
+    found = fitted(points, np.sin(6 * points[:, :1]), "squared-exponential", "linear")
+    best = found.lengths[0, 0]
+    assert best[0] < 0.6 < 2 < best[1]
+    assert found.weights.sum() == pytest.approx(1)
+    assert NUGGET[0] <= found.nugget[0] < 1e-6
+
+
+def test_noise_of_a_solver_is_found_in_the_nugget():
+    generator = np.random.default_rng(2)
+    points = generator.random((40, 1))
+    values = np.sin(3 * points) + 0.02 * generator.standard_normal((40, 1))
+    model = fitted(points, values, "squared-exponential", "linear")
+    variance = float(model.weights[0] @ [part.variance for part in model.parts[0]])
+    assert np.sqrt(model.nugget[0] * variance) == pytest.approx(0.02, rel=0.5)

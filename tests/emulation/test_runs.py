@@ -1,0 +1,184 @@
+"""Forward models as users give them, and their runs: kept, gone on with, and told where they fail."""
+
+import json
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from forward_models import DEPTH, neo_hooke
+from tissuq.emulation import FileForward, gathered
+from tissuq.emulation.forward import CallableForward, as_forward
+from tissuq.emulation.problem import pose
+from tissuq.emulation.runs import ForwardRun, carry_out
+from tissuq.errors import InputError
+from tissuq.studies.forward_runs import runs_of
+
+PRIORS = {"C10": tq.Uniform(0.2, 5.0)}
+PROBLEM = pose(DEPTH, neo_hooke({"C10": 1.0}), PRIORS)
+POINTS = np.array([[1.0], [2.0], [3.0]])
+
+
+def silent(label, is_new):
+    pass
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda parameters: neo_hooke(parameters),
+        lambda parameters, control: 2 * parameters["C10"] * ((1 - control) ** -2 - (1 - control)),
+        lambda parameters, control=None: 2 * parameters["C10"] * ((1 - control) ** -2 - (1 - control)),
+        lambda parameters, factor=1.0: factor * neo_hooke(parameters),
+    ],
+)
+def test_a_function_gets_the_parameters_and_the_controls_where_it_takes_them(function):
+    found = as_forward(function).run({"C10": 1.5}, DEPTH)
+    np.testing.assert_allclose(found, neo_hooke({"C10": 1.5}))
+
+
+def test_a_function_in_a_file_is_run_from_there(tmp_path):
+    file = tmp_path / "cube.py"
+    file.write_text("def force(parameters, depth):\n    return parameters['k'] * depth\n")
+    forward = FileForward(f"{file}:force")
+    np.testing.assert_allclose(forward.run({"k": 2.0}, DEPTH), 2 * DEPTH)
+    before = forward.identity
+    file.write_text("def force(parameters, depth):\n    return 2 * parameters['k'] * depth\n")
+    assert forward.identity != before
+
+
+@pytest.mark.parametrize(
+    ("place", "content", "words"),
+    [
+        ("no.py:force", None, "there is no file"),
+        ("cube.py:force", "x = 1", "has no function named 'force'"),
+        ("cube.py:force", "x = ", "is not Python, line 1"),
+        ("cube.py:force", "raise ValueError('no licence')", "fails, line 1: ValueError: no licence"),
+        ("nothing.here:force", None, "cannot be imported"),
+        ("math:nothing", None, "no function named 'nothing'"),
+        ("force", None, "write path.py:function"),
+    ],
+)
+def test_what_is_no_function_is_told_before_any_run(tmp_path, monkeypatch, place, content, words):
+    monkeypatch.chdir(tmp_path)
+    if content:
+        (tmp_path / "cube.py").write_text(content + "\n")
+    name = place if ".py" not in place else f"{tmp_path / place}"
+    with pytest.raises(InputError, match=words):
+        FileForward(name).check(["C10"])
+
+
+def test_a_function_of_a_module_is_found():
+    assert FileForward("builtins:len").run({"C10": 1.0}, DEPTH) == 1
+
+
+def test_a_run_that_fails_is_a_result_and_a_wrong_shape_is_an_error():
+    def broken(parameters):
+        raise ZeroDivisionError("division by zero\nat length")
+
+    task = ForwardRun(CallableForward(broken), (("C10", 1.0),), tuple(DEPTH), 1)
+    assert carry_out(task)["error"] == "ZeroDivisionError: division by zero"
+    some = ForwardRun(CallableForward(lambda p: np.where(DEPTH > 0.2, np.nan, 1)), (("C10", 1.0),), tuple(DEPTH), 1)
+    assert "of 15 outputs are not finite" in carry_out(some)["error"]
+    with pytest.raises(InputError, match="15 measurements"):
+        carry_out(ForwardRun(CallableForward(lambda p: 1.0), (("C10", 1.0),), tuple(DEPTH), 1))
+
+
+def runs_with(points, failed):
+    results = [
+        {"parameters": dict(zip("ab", point, strict=True)), "error": "it broke" if bad else "", "seconds": 1.0,
+         "outputs": [1.0]}
+        for point, bad in zip(points, failed, strict=True)
+    ]  # fmt: skip
+    return gathered(["a", "b"], results, 1)
+
+
+def test_the_region_of_failure_is_told():
+    points = np.random.default_rng(0).random((30, 2))
+    beyond = points[:, 1] > 0.7
+    text = runs_with(points, beyond).told_failures
+    assert f"{beyond.sum()} of 30 runs of the forward model failed" in text
+    assert f"all those with b from {points[beyond, 1].min():.4g} and none below {points[~beyond, 1].max():.4g}" in text
+    assert "it broke" in text
+    below = points[:, 0] < 0.3
+    assert "all those with a up to" in runs_with(points, below).told_failures
+    corner = (points > 0.5).all(axis=1)
+    assert f"(where {0} others did not)" in runs_with(points, corner).told_failures
+    assert runs_with(points, np.zeros(30, bool)).told_failures == ""
+
+
+def test_runs_are_kept_and_not_made_again_but_failed_ones_are(tmp_path):
+    calls = []
+
+    class Model(CallableForward):
+        def __init__(self):
+            super().__init__(self.once)
+
+        def once(self, parameters):
+            calls.append(parameters["C10"])
+            if parameters["C10"] == 2.0 and calls.count(2.0) == 1:
+                raise OSError("the licence server is away")
+            return neo_hooke(parameters)
+
+    model = Model()
+    with runs_of(model, PROBLEM, tmp_path / "runs", 1, silent) as run:
+        first = run(POINTS)
+    assert first.errors == ("", "OSError: the licence server is away", "")
+    assert np.isnan(first.outputs[1]).all()
+    told = []
+    with runs_of(model, PROBLEM, tmp_path / "runs", 1, lambda label, is_new: told.append((label, is_new))) as run:
+        second = run(np.vstack([POINTS, [[4.0]]]))
+    assert calls == [1.0, 2.0, 3.0, 2.0, 4.0]
+    assert sorted(told) == [("run 1", False), ("run 2", True), ("run 3", False), ("run 4", True)]
+    np.testing.assert_allclose(second.outputs[1], neo_hooke({"C10": 2.0}))
+
+
+def test_runs_of_another_model_or_of_other_controls_are_not_taken(tmp_path):
+    def other(parameters):
+        return 2 * neo_hooke(parameters)
+
+    folder = tmp_path / "runs"
+    with runs_of(as_forward(neo_hooke), PROBLEM, folder, 1, silent) as run:
+        run(POINTS)
+    with pytest.raises(InputError, match="its model differ"), runs_of(as_forward(other), PROBLEM, folder, 1, silent):
+        pass
+    elsewhere = pose(2 * DEPTH, DEPTH, PRIORS)
+    with pytest.raises(InputError, match="control differ"):
+        runs_of(as_forward(neo_hooke), elsewhere, folder, 1, silent).__enter__()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("all of it")
+    with pytest.raises(InputError, match="not a folder of forward runs"):
+        runs_of(as_forward(neo_hooke), PROBLEM, tmp_path / "mine", 1, silent).__enter__()
+
+
+def test_a_folder_without_any_run_does_not_stay(tmp_path):
+    with pytest.raises(InputError, match="15 measurements"):
+        tq.calibrate(DEPTH, DEPTH, lambda parameters: [1.0], PRIORS, folder=tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_processes_give_the_same_runs(tmp_path):
+    file = tmp_path / "cube.py"
+    file.write_text("def force(parameters, depth):\n    return parameters['C10'] * depth\n")
+    with runs_of(FileForward(f"{file}:force"), PROBLEM, tmp_path / "runs", 2, silent) as run:
+        found = run(POINTS)
+    np.testing.assert_allclose(found.outputs, POINTS * DEPTH)
+    lines = (tmp_path / "runs" / "batch-0" / "tasks.jsonl").read_text().splitlines()
+    assert [json.loads(line)["parameters"]["C10"] for line in lines] == [1.0, 2.0, 3.0]
+
+
+def test_failed_runs_are_told_in_the_result():
+    def fragile(parameters):
+        if parameters["C10"] > 3.5:
+            raise RuntimeError("the solver has not converged")
+        return neo_hooke(parameters)
+
+    measured = neo_hooke({"C10": 1.2}) + 0.05 * np.random.default_rng(0).standard_normal(len(DEPTH))
+    found = tq.calibrate(DEPTH, measured, fragile, PRIORS, noise_sd=0.05, runs=16)
+    assert found.runs.failed.sum() == (found.runs.points[:, 0] > 3.5).sum() > 0
+    text = " ".join(found.warnings)
+    assert "all those with C10 from" in text
+    assert "the solver has not converged. The posterior keeps away from them." in text
+    near = neo_hooke({"C10": 3.49}) + 0.05 * np.random.default_rng(0).standard_normal(len(DEPTH))
+    found = tq.calibrate(DEPTH, near, fragile, PRIORS, noise_sd=0.5, runs=16)
+    assert "the emulator is a guess" in " ".join(found.warnings)
