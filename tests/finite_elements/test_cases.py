@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from tissuq.errors import ConvergenceError, InputError
+from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements import (
     Case,
@@ -163,6 +163,12 @@ def test_what_ends_early_says_where_and_why():
 def test_sizes_that_are_not_possible_are_refused(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+@pytest.mark.parametrize("values", [[3e-4, -8e-4], [3e-4, -3e-4]])
+def test_a_material_without_initial_stiffness_has_no_force(values):
+    with pytest.raises(ModelError, match="has an initial shear modulus of"):
+        respond(ClampedBar(fineness=0.5), material_named("mooney-rivlin"), values, steps=1)
 
 
 def test_the_cases_are_known_by_name():

@@ -12,6 +12,7 @@ from tissuq.finite_elements import ClampedBar, Indentation, bar_force, respond, 
 from tissuq.finite_elements.cautions import simulation_warnings
 from tissuq.finite_elements.optional import felupe
 from tissuq.finite_elements.tasks import Solve, each_in_turn, solved
+from tissuq.mechanics import material_named
 
 pytest.importorskip("felupe", reason="FElupe is not installed")
 
@@ -134,6 +135,13 @@ def test_it_fails_when_no_draw_gets_anywhere(posterior):
 def test_one_draw_is_too_few(posterior):
     with pytest.raises(InputError, match="2 draws or more"):
         simulate(posterior, BAR, 1)
+
+
+def test_a_draw_without_initial_stiffness_is_a_failure_that_is_told(draws):
+    weak = replace(draws[0], parts=((material_named("neo-hookean"), (-5e-4,)),), discrepancy=None)
+    found = solved(Solve.of(BAR, weak, 1, 2e3))
+    assert "has an initial shear modulus of -0.001 MPa" in found["problem"]
+    assert found["force"] == [None]
 
 
 def test_results_are_plain_data(draws):

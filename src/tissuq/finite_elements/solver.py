@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.errors import ModelError
 from tissuq.finite_elements.case import AXIAL, Case
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.finite_elements.optional import felupe
@@ -69,7 +70,7 @@ class Solver:
         fem, mesh = felupe(), case.mesh()
         supports = case.supports(mesh.points)
         self._umat = FElupeMaterial(material, values=values)
-        self._modulus = self._umat.unit = self._umat.energy.initial_shear_modulus
+        self._modulus = self._umat.unit = _stiffness(material, self._umat.energy.initial_shear_modulus)
         region = fem.RegionQuad(fem.Mesh(*mesh, "quad"))
         self._field = fem.FieldContainer([fem.FieldAxisymmetric(region, dim=2)])
         self._solid = fem.SolidBodyNearlyIncompressible(self._umat, self._field, bulk=bulk_ratio)
@@ -218,3 +219,13 @@ class Solver:
         self._field[0].values[:] = kept[0]
         state.u[:], state.p[:], state.J[:] = kept
         state.F = self._field.extract()
+
+
+def _stiffness(material: Material, modulus: float) -> float:
+    """Return an initial shear modulus that stresses can be divided by, and a bulk modulus follows from."""
+    if not modulus > 0:
+        raise ModelError(
+            f"material '{material.name}' has an initial shear modulus of {modulus:.3g} MPa; finite elements need a "
+            "positive one."
+        )
+    return modulus

@@ -51,6 +51,8 @@ class Solve:
         if draw.discrepancy is not None or not linear:
             return cls(case, draw, 1.0, steps, bulk_ratio, most)
         modulus = distortional_energy(draw).initial_shear_modulus
+        if not modulus > 0:  # the solver says what is wrong with it
+            return cls(case, draw, 1.0, steps, bulk_ratio, most)
         scaled = ((part, tuple(float(f"{each / modulus:.{DIGITS}g}") for each in own)) for part, own in draw.parts)
         return cls(case, replace(draw, parts=tuple(scaled)), modulus, steps, bulk_ratio, most)
 
