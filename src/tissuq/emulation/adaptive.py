@@ -97,21 +97,29 @@ def _posterior(problem: Problem, emulator: Emulator, choices: Choices) -> Calibr
 
 
 def _where_unsure(found: Calibration, count: int) -> FloatArray:
-    """Return parameters (count, d) from the posterior at which the emulator is least sure, apart from each other."""
+    """Return parameters (count, d) from the posterior at which the emulator is least sure.
+
+    They are apart from each other and from runs that failed, which an emulator never becomes surer of.
+    """
     draws = found.draws(CANDIDATES)[:, : len(found.problem.forward_symbols)]
     _, covariance = found.emulator.moments(draws)
     unsure = np.trace(covariance, axis1=1, axis2=2)
     spread = np.maximum(draws.std(axis=0), 1e-12 * np.abs(draws).max(axis=0) + np.finfo(float).tiny)
+
+    def away_from(point: FloatArray) -> FloatArray:
+        return np.asarray(-np.expm1(-0.5 * (((draws - point) / spread) ** 2).sum(axis=1)))
+
+    for point in found.runs.points[found.runs.failed]:
+        unsure = unsure * away_from(point)
     chosen: list[int] = []
     for _ in range(count):
         chosen.append(int(np.argmax(unsure)))
-        apart = (((draws - draws[chosen[-1]]) / spread) ** 2).sum(axis=1)
-        unsure = unsure * -np.expm1(-0.5 * apart)
+        unsure = unsure * away_from(draws[chosen[-1]])
     return np.asarray(draws[chosen])
 
 
 def _check_fit(problem: Problem, emulator: Emulator) -> None:
-    """Refuse an emulator of other parameters or controls, or of a narrower region than the priors."""
+    """Refuse an emulator of other parameters or controls; of a narrower region than the priors, a warning tells."""
     if emulator.symbols != problem.forward_symbols:
         raise InputError(
             f"the emulator is one of {', '.join(emulator.symbols)}; the priors are of "
