@@ -1,5 +1,8 @@
 """The posterior of emulated models beside closed forms, quadrature, another sampler, and simulation."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.stats import binom, multivariate_normal, norm
@@ -132,6 +135,47 @@ def test_further_runs_are_made_where_the_posterior_is_until_the_emulator_is_good
     assert np.abs(added[:, 1] - -9.0).max() < 3.0  # of a prior 24 wide
     assert len(more.held_out) == len(added) / 4
     np.testing.assert_array_equal(more.runs.points[:8], few.runs.points)
+
+
+def test_further_runs_keep_away_from_those_that_failed():
+    """The measurements lie where the model fails; without a word of it the same points would be run again and again."""
+    priors, depth = {"mu": tq.Uniform(0.1, 1.0), "b": tq.Uniform(0.5, 3.0)}, np.linspace(0.1, 1, 10)
+
+    def stiffening(parameters):
+        mu, b = parameters["mu"], parameters["b"]
+        return mu * (np.sin(3 * b) * np.expm1(b * depth) + depth)
+
+    def failing(parameters):
+        if parameters["b"] > 2.2:
+            raise RuntimeError("no convergence")
+        return stiffening(parameters)
+
+    data = stiffening({"mu": 0.4, "b": 2.3}) + 0.01 * np.random.default_rng(1).standard_normal(10)
+    found = tq.calibrate(depth, data, failing, priors, discrepancy="none", noise_sd=0.01, runs=12, refine=8)
+    assert len(found.runs) == 20
+    assert len(np.unique(found.runs.points, axis=0)) == 20
+
+
+def test_a_likelihood_by_itself_is_computed_in_double_precision():
+    code = """
+import numpy as np
+import tissuq as tq
+from tissuq.emulation import emulate, gathered
+from tissuq.emulation.likelihood import Likelihood
+from tissuq.emulation.problem import pose
+column, points, at = np.linspace(0.5, 1.5, 5), np.linspace(0.5, 2, 12), np.array([[1.2]])
+outputs = [c * (1 + 0.1 * c) * column for c in points]
+results = [{"parameters": {"C10": c}, "outputs": y, "error": "", "seconds": 0} for c, y in zip(points, outputs)]
+emulator = emulate(gathered(["C10"], results, 5), column)
+measured = 1.2 * 1.12 * column + 1e-3
+problem = pose(column, measured, {"C10": tq.Uniform(0.5, 2)}, noise_sd=1e-3)
+found = Likelihood(problem, emulator).log_density(at)[0]
+mean, cov = (each[0] for each in emulator.moments(at))
+apart, cov = measured - mean, cov + 1e-6 * np.eye(5)
+print(found + 0.5 * apart @ np.linalg.solve(cov, apart) + 0.5 * np.linalg.slogdet(2 * np.pi * cov)[1])
+"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert abs(float(found.stdout)) < 1e-6
 
 
 def test_the_search_does_not_end_where_the_emulator_knows_nothing():

@@ -19,6 +19,8 @@ from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Problem
 from tissuq.priors import Prior
 
+jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+
 __all__ = ["Likelihood"]
 
 FloatArray = NDArray[np.float64]
