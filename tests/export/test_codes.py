@@ -84,6 +84,14 @@ def test_a_law_that_the_code_has_is_written_exactly(given, code, parts, keyword)
     assert all(row["error_states_max"] < 1e-8 for row in cards.index)
 
 
+@pytest.mark.parametrize(("code", "name"), [("abaqus", "van-der-waals"), ("ansys", "gent")])
+def test_the_volumetric_energy_that_is_stated_is_that_of_the_form(given, code, name):
+    """Both manuals give these two laws another volumetric energy than the rest, with the same bulk modulus."""
+    values = {"van-der-waals": [0.9, 0.2, 30.0], "gent": [0.9, 30.0]}[name]
+    (text,) = card_format(code).cards(given([(name, values)]), CardSettings()).files.values()
+    assert "((J^2 - 1)/2 - ln J)" in " ".join(text.split())
+
+
 @pytest.mark.parametrize("code", CODES)
 def test_a_unit_scales_stresses_and_nothing_else(given, code):
     ensemble = given([("ogden-2", [0.9, 0.2, 3.0, -4.0])])

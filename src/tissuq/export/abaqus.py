@@ -41,7 +41,7 @@ class Abaqus(FECode):
     suffix = ".inp"
     comment = ("** ", "")
     checked = "written after the manual of Abaqus, not run there; CalculiX, which reads the same keyword, was run"
-    volumetric = "(J - 1)^2 / D1, D1 = 2/K"
+    volumetric = "(J - 1)^2 / D1, D1 = 2/K (VAN DER WAALS: ((J^2 - 1)/2 - ln J) / D)"
     forms = (
         *_forms(6, 6),
         OwnForm(
@@ -75,6 +75,7 @@ class CalculiX(Abaqus):
     name = "calculix"
     description = "CalculiX *HYPERELASTIC include files"
     checked = "cards of this form were run in CalculiX on one element, and gave tissuq's stresses"
+    volumetric = "(J - 1)^2 / D1, D1 = 2/K"
     forms = _forms(3, 3)
     projections = PolynomialFit(full_terms(3)), OgdenFit(3), ReducedFit(reduced_terms(3))
     further = 1e20
