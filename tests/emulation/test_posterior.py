@@ -201,6 +201,22 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     assert any("reaches the end of what was simulated for mu (upper)" in text for text in found.warnings)
 
 
+def test_measurements_are_simulated_together():
+    """The mean of all is as uncertain as a Gaussian process given the data says, at one value of every parameter."""
+    data = measured(neo_hooke, {"C10": 1.2}, 0.05)
+    emulator = emulate(designed(neo_hooke, {"C10": tq.Uniform(0.5, 3.0)}, 8), DEPTH)
+    likelihood = Likelihood(pose(DEPTH, data, {"C10": tq.Uniform(0.5, 3.0)}, "gp", 0.05), emulator)
+    values = np.tile([1.2, 0.3, 0.5], (4000, 1))
+    drawn = likelihood.replicates(values, np.random.default_rng(0).standard_normal((4000, len(DEPTH))))
+    own = 0.3**2 * np.exp(-0.5 * ((DEPTH[:, None] - DEPTH) / 0.5) ** 2)
+    pull = own @ np.linalg.inv(own + 0.05**2 * np.eye(len(DEPTH)))
+    cov = own - pull @ own + 0.05**2 * np.eye(len(DEPTH))
+    truth = neo_hooke({"C10": 1.2})
+    np.testing.assert_allclose(drawn.mean(axis=0), truth + pull @ (data - truth), atol=5 * 0.07 / 4000**0.5)
+    assert drawn.mean(axis=1).std() == pytest.approx(cov.mean() ** 0.5, rel=0.05)
+    np.testing.assert_allclose(np.cov(drawn.T), cov, atol=5 * cov.max() * (2 / 4000) ** 0.5)
+
+
 def test_a_saved_calibration_is_read_by_xarray(tmp_path):
     import xarray as xr
 

@@ -25,11 +25,9 @@ def labelled_arrays(calibration: Calibration) -> xr.DataTree:
     chains, draws = np.arange(drawn.shape[0]), np.arange(drawn.shape[1])
     sample, some = {"chain": chains, "draw": draws}, {"chain": chains, "draw": draws[::STRIDE]}
     chosen = drawn[:, ::STRIDE]
-    mean, variance = calibration.likelihood.predictions(
-        chosen.reshape(-1, drawn.shape[2]), discrepancy=True, noise=True
-    )
-    noise = np.random.default_rng([calibration.seed, 59]).standard_normal(mean.shape)
-    simulated = (mean + np.sqrt(variance) * noise).reshape(*chosen.shape[:2], -1)
+    flat = chosen.reshape(-1, drawn.shape[2])
+    scores = np.random.default_rng([calibration.seed, 59]).standard_normal((len(flat), len(problem.measured)))
+    simulated = calibration.likelihood.replicates(flat, scores).reshape(*chosen.shape[:2], -1)
     point, run = {"measurement": np.arange(len(problem.measured))}, {"run": np.arange(len(runs))}
     columns = enumerate(problem.symbols)
     groups = {

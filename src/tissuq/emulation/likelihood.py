@@ -77,6 +77,10 @@ class Likelihood:
         )
         return mean, variance + (np.broadcast_to(own, len(values))[:, None] ** 2 if noise else 0.0)
 
+    def replicates(self, values: FloatArray, scores: FloatArray) -> FloatArray:
+        """Return new measurements (N, n), all of a row together, from parameters (N, D) and normal scores (N, n)."""
+        return self._in_blocks(_replicate(self.form), np.hstack([values, scores]))[0]
+
     def error_ratio(self, values: FloatArray) -> float:
         """Return the largest variance of the emulator's error over that of noise and discrepancy, in any direction.
 
@@ -132,6 +136,21 @@ def _conditional(form: Form, discrepancy: bool) -> Any:
         return mean + shift, jnp.maximum(jnp.diag(asked) - (explained**2).sum(axis=0), 0.0)
 
     return jax.jit(jax.vmap(moments, (0, None)))
+
+
+@lru_cache
+def _replicate(form: Form) -> Any:
+    def replicate(row: Any, data: Any) -> tuple[Any]:
+        values, scores = jnp.split(row, [len(form.symbols)])
+        mean, error, own, noise = _parts(form, values, data)
+        root = _whole(error, own, noise)
+        shift = (error + own) @ cho_solve((root, True), data["measured"] - mean)
+        half = solve_triangular(root, jnp.eye(len(scores)), lower=True)
+        # A - A K^-1 A + s^2 I with K = A + s^2 I, but never singular
+        spread = jnp.linalg.cholesky(noise * (2 * jnp.eye(len(scores)) - noise * half.T @ half))
+        return (mean + shift + spread @ scores,)
+
+    return jax.jit(jax.vmap(replicate, (0, None)))
 
 
 @lru_cache

@@ -69,7 +69,7 @@ def exact_law(ensemble: Ensemble) -> Law | None:
     """
     if any(draw.discrepancy is not None for draw in ensemble):
         return None
-    parts = [(material, values) for material, values in parts_of(ensemble) if len(material.parameters)]
+    parts = list(parts_of(ensemble))
     if all(isinstance(material, POLYNOMIALS) for material, _ in parts):
         return _polynomial(parts)
     terms = [_ogden_terms(material, values) for material, values in parts]
