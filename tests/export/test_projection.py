@@ -78,6 +78,15 @@ def test_ogden_terms_on_the_ladder_are_found_again(given):
     assert found == pytest.approx([0.2, 0.5, 0.1, *exponents], rel=1e-6)
 
 
+def test_a_single_ogden_term_finds_its_exponent_closely(given):
+    # neo-Hooke is alpha = 2 and mu = 2 C10; the exponents tried lie a 64th of the first ladder's largest apart.
+    like = given([("neo-hookean", [0.5])])
+    step = 2.0 / np.abs(np.log(SeenStates(like.most).base)).max() / 64
+    ((mu, alpha),) = OgdenFit(1).law(like).values
+    assert abs(alpha - 2) < step
+    assert mu == pytest.approx(1.0, rel=1e-6)
+
+
 def test_a_projection_is_near_in_every_state_and_not_only_along_the_modes(auto):
     """General biaxial states, in which both stresses are compared, by a mode that shares nothing with the fit."""
     cards = card_format("calculix").cards(auto, CardSettings())

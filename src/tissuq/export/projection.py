@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 
 LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
 """Steps of equal size among which Ogden's exponents are chosen."""
+FINE = tuple(step / 16 for step in range(-64, 65) if step)
+"""The same for a single term, which has no others to make up for a coarse step."""
 REACHES = (2.0, 4.0, 8.0, 12.0)
 """The largest exponent of the ladder, times the largest logarithmic strain that was measured."""
 HIGHEST = 4
@@ -198,10 +200,12 @@ def _checked(order: int, most: int, what: str) -> int:
 def _on_ladders(terms: int, states: SeenStates) -> Iterator[Candidate]:
     """Return Ogden sums of so many terms, with all choices of exponents from each ladder."""
     farthest = float(np.abs(np.log(states.base)).max())
+    ladder = np.array(FINE if terms == 1 else LADDER, dtype=np.float64)
     for reach in REACHES:
-        exponents = reach / (LADDER[-1] * farthest) * np.array(LADDER)
-        columns, unit = _columns(Ogden(len(LADDER)), states, exponents)
-        for chosen in map(list, combinations(range(len(LADDER)), terms)):
+        exponents = reach / (ladder[-1] * farthest) * ladder
+        some = [_columns(Ogden(len(LADDER)), states, own) for own in exponents.reshape(-1, len(LADDER))]
+        columns, unit = np.hstack([own for own, _ in some]), np.concatenate([own for _, own in some])
+        for chosen in map(list, combinations(range(len(ladder)), terms)):
             yield Candidate(tuple(exponents[chosen]), columns[:, chosen], unit[chosen])
 
 
