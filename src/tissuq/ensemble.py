@@ -165,7 +165,7 @@ def drawn_ensemble(
         When the posterior is not one of energies, or hardly any draw is admissible.
     """
     model = solution.model
-    _check(model, count, sampling)
+    _check(model, count, seed, sampling)
     modes, draws, tried = _curve_modes(), list[EnergyDraw](), 0
     while len(draws) < count:
         if tried >= MOST_TRIES * count:
@@ -227,9 +227,11 @@ def _curves(draws: Sequence[EnergyDraw], places: NDArray[np.intp]) -> Callable[[
     return stresses
 
 
-def _check(model: StatisticalModel, count: int, sampling: str) -> None:
+def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> None:
     if count < 1:
         raise InputError(f"an ensemble has one draw or more, not {count}.")
+    if seed < 0:
+        raise InputError(f"the seed of an ensemble must be 0 or more, not {seed}.")
     if sampling not in get_args(Sampling):
         raise InputError(f"sampling must be one of {', '.join(get_args(Sampling))}, not '{sampling}'.")
     if not model.material.is_isotropic:

@@ -88,10 +88,11 @@ def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["punch.csv", *USUAL], "give the forward model"),
+        (["punch.csv", *USUAL], "give one forward model"),
         (["--forward", "force.py:force", *USUAL], "give a FILE"),
         (["punch.csv", "--forward", "no.py:force", *USUAL], "no file 'no.py'"),
-        (["punch.csv", "--forward", "force.py:force", "--runs", 8], "priors"),
+        (["punch.csv", "--forward", "force.py:force", "--runs", 8], "give the --prior of every parameter"),
+        (["punch.csv", "--forward", "force.py:force", *PRIORS, "--runs", 2], "runs or more, and 2 are asked for"),
         (["punch.csv", "--forward", "force.py:wrong", *USUAL], "shape (2,)"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "depth"], "say which one"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "x", "--measured", "2"], "no column 'x'"),

@@ -74,6 +74,9 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
         (["--bulk-modulus", "10", "--poisson", "0.4"], "not both"),
         (["--out", "runs/specimen", "--force"], "is the run itself"),
         (["--out", "runs", "--force"], "is the run itself, or holds it"),
+        (["--out", "runs/specimen/cards"], "lies in the run"),
+        (["--seed", "-1"], "the seed of an ensemble must be 0 or more, not -1"),
+        (["--material", "yeoh"], "'yeoh' is none"),
     ],
     ids=lambda each: " ".join(each) if isinstance(each, list) else "",
 )

@@ -110,7 +110,10 @@ BAD = [
     (["RUN", "--discrepancy", "none", "--mode", "equibiaxial", "--stretch", "1e160"], ["too large for a number"]),
     (["--config", "nowhere.toml"], ["nowhere.toml"]),
     (["RUN", "--config", "run.toml"], ["RUN", "--config"]),
-    (["RUN", "--discrepancy", "none", "--out", "RUN", "--force"], ["holds the run itself"]),
+    (["RUN", "--discrepancy", "none", "--out", "RUN", "--force"], ["is the run itself, or holds it"]),
+    (["RUN", "--discrepancy", "none", "--out", "run/inside"], ["lies in the run 'run'"]),
+    (["RUN", "--discrepancy", "none", "--material", "yeoh"], ["law.py:Name", "'yeoh' is none"]),
+    (["RUN", "--discrepancy", "none", "--stretch", "1e-200"], ["too large for a number"]),
     (["RUN", "--discrepancy", "none", "--out", "PLANAR"], ["is a file"]),
 ]  # fmt: skip
 

@@ -67,7 +67,7 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], ["give the folder of a run"]),
+        ([], ["give the RUN folder of a fit"]),
         (["nowhere"], ["no run folder 'nowhere'"]),
         (["run", "--case", "beam"], ["no case named 'beam'", "bar, indentation"]),
         (["run", "--size", "width=3"], ["no size 'width'", "punch_radius=0.75"]),

@@ -63,3 +63,16 @@ def test_other_folders_are_refused(run, tmp_path):
     recipe.write_text(recipe.read_text().replace("tissuq fit", "tissuq paper"))
     with pytest.raises(tq.InputError, match="is not one of tissuq fit"):
         tq.load_run(run)
+
+
+@pytest.mark.parametrize(("content", "words"), [("{", "is damaged"), ("[3]", "is damaged"), ("[]", "has no rows")])
+def test_a_damaged_summary_is_said(run, content, words):
+    (run / "summary.json").write_text(content)
+    with pytest.raises(tq.InputError, match=words):
+        tq.load_run(run)
+
+
+def test_another_material_than_that_of_the_run_is_refused(run):
+    with pytest.raises(tq.InputError, match="is of the material 'neo-hookean', not 'yeoh'"):
+        tq.load_run(run, material=tq.materials()["yeoh"]())
+    assert tq.load_run(run, material=tq.materials()["neo-hookean"]()).model.material.name == "neo-hookean"

@@ -76,6 +76,8 @@ def calibrate(
         "kernel": kernel, "trend": trend, "method": method, "every": every, "sheet": _column(sheet),
         "skip_rows": skip_rows, "seed": seed, "priors": once_each("--prior", map(parse_prior, prior or [])) or None,
     }  # fmt: skip
+    if not (prior or config):
+        raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5).")
     settings = load_settings(CalibrationSettings, config, options, rivals=("forward", "umbridge"))
     if settings.forward and not forward:
         raise InputError(

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import progress
+from tissuq.cli.options import own_law, progress
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -37,7 +37,7 @@ def design(
     ] = None,
     specimen: Annotated[
         str | None,
-        typer.Option(help="The next test is of the same specimen or of an other one [same, unless there are several]."),
+        typer.Option(help="The next test is of the same specimen or of another one [same, unless there are several]."),
     ] = None,
     discrepancy: Annotated[
         str | None, typer.Option(help="Which discrepancy of the run [auto, or the only one].")
@@ -51,9 +51,8 @@ def design(
 ) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
     from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.mechanics import material_named
     from tissuq.report.design import HEADERS, heading, readable_design, write_design
-    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.run_folder import check_apart, check_target, run_folder
     from tissuq.studies.design import DesignSettings, run_design
 
     if run is None and config is None:
@@ -62,14 +61,13 @@ def design(
         "run": str(run.absolute()) if run else None, "targets": target or None, "candidates": candidate or None,
         "points": points or None, "specimen": specimen, "discrepancy": discrepancy, "seed": seed,
     }  # fmt: skip
-    law = material_named(material, laws=True) if material else None
+    law = own_law(material)
     settings = load_settings(DesignSettings, config, options)
     beside = config.parent if config else Path()
     place = (beside / settings.run).resolve()
     folder = out or Path("runs") / f"{place.name}-design"
+    check_apart(folder, place)
     check_target(folder, force=force)
-    if place.is_relative_to(folder.resolve()):
-        raise InputError(f"'{folder}' holds the run itself; choose another folder with --out.")
     with progress() as step:
         study = run_design(settings, beside, step, law)
         step("writing")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from tissuq.errors import InputError
+from tissuq.cli.options import own_law
 
 if TYPE_CHECKING:
     from tissuq.ensemble import Sampling
@@ -53,21 +53,19 @@ def export(
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
     from tissuq.cli.tables import print_warnings
     from tissuq.export import CardSettings, card_format
-    from tissuq.mechanics import material_named
     from tissuq.report.cards import INDEX, write_cards
-    from tissuq.report.run_folder import check_target
+    from tissuq.report.run_folder import check_apart, check_target
     from tissuq.studies.earlier_run import load_run
 
     target = out or Path("cards") / f"{run.resolve().name}-{format}"
-    if run.resolve().is_relative_to(target.resolve()):
-        raise InputError(f"'{target}' is the run itself, or holds it; choose another folder for the cards with --out.")
+    check_apart(target, run)
     card_format(format)
     check_target(target, force=force)
     settings: dict[str, Any] = {
         "law": law, "order": order, "unit": unit, "bulk_modulus": bulk_modulus, "poisson": poisson, "name": name,
     }  # fmt: skip
     CardSettings(**settings)
-    own = material_named(material, laws=True) if material else None
+    own = own_law(material)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", UserWarning)
         posterior = load_run(run, discrepancy, own)

@@ -7,13 +7,16 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.priors import Prior
 from tissuq.registry import find
 
-__all__ = ["campaign_progress", "not_converged", "once_each", "parse_prior", "progress"]
+if TYPE_CHECKING:
+    from tissuq.mechanics import Material
+
+__all__ = ["campaign_progress", "not_converged", "once_each", "own_law", "parse_prior", "progress"]
 
 NOT_CONVERGED = 3
 
@@ -44,6 +47,18 @@ def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
         optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
         raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
     return symbol, {"distribution": distribution, **dict(zip(names, values, strict=False))}
+
+
+def own_law(material: str | None) -> Material | None:
+    """Return the law in a file that ``--material`` names for a run whose material is one."""
+    from tissuq.mechanics import material_named
+
+    if material is not None and ".py:" not in material:
+        raise InputError(
+            f"--material names the law in a file of a run whose material is one, as law.py:Name, and '{material}' is "
+            "none; the run knows every other material."
+        )
+    return material_named(material, laws=True) if material else None
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli import reading
-from tissuq.cli.options import not_converged, progress
+from tissuq.cli.options import not_converged, own_law, progress
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -55,7 +55,6 @@ def predict(
 ) -> None:
     """Predict the stress in any loading mode from a fit, and compare it with measurements."""
     from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.mechanics import material_named
     from tissuq.report.prediction import (
         band_headers,
         readable_bands,
@@ -63,7 +62,7 @@ def predict(
         score_headers,
         write_prediction_run,
     )
-    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.run_folder import check_apart, check_target, run_folder
     from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
 
     if bool(run) == bool(config):
@@ -78,12 +77,12 @@ def predict(
     }  # fmt: skip
     settings = load_settings(PredictionSettings, config, options)
     beside = config.parent if config else Path()
-    law = material_named(material, laws=True) if material else None
+    law = own_law(material)
     source = beside / settings.run
-    target = out or source.parent / f"{source.name}-{settings.mode_in(beside)}"
+    named = source if source.name.strip(".") else source.resolve()  # "." and ".." have no name of their own
+    target = out or named.parent / f"{named.name}-{settings.mode_in(beside)}"
+    check_apart(target, source)
     check_target(target, force=force)
-    if source.resolve().is_relative_to(target.resolve()):
-        raise InputError(f"'{target}' holds the run itself; choose another folder for the prediction with --out.")
     with progress() as step:
         found = run_prediction(settings, beside, step, law)
         step("writing")

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
-from tissuq.cli.options import campaign_progress, once_each, progress
+from tissuq.cli.options import campaign_progress, once_each, own_law, progress
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -52,13 +52,13 @@ def simulate(
 ) -> None:
     """Compute the force in a case with draws of a posterior; the same command goes on with one that was stopped."""
     from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.mechanics import material_named
+    from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import SOURCE, check_source, copy_source, readable_forces, write_simulation
     from tissuq.studies.simulate import SimulationSettings, load_posteriors, run_simulation
     from tissuq.studies.stream import open_pool
 
     if bool(run) == bool(config):
-        raise InputError("give the folder of a run of tissuq fit, or --config run.toml of an earlier simulation.")
+        raise InputError("give the RUN folder of a fit, or --config run.toml of an earlier simulation.")
     options: dict[str, Any] = {
         "run": str(run) if run else None, "case": case, "sizes": _sizes(size or []) or None, "discrepancy": discrepancy,
         "draws": draws, "steps": steps, "force_noise": force_noise, "bulk_ratio": bulk_ratio, "seed": seed,
@@ -69,7 +69,9 @@ def simulate(
     kept = settings.model_copy(update={"run": SOURCE})
     named = settings.sized_case().name
     folder = out or Path("runs") / f"{(run or beside).resolve().name}-{named}"
-    law = material_named(material, laws=True) if material else None
+    law = own_law(material)
+    if not config:  # a simulation that is repeated may go on in its own folder, which holds the run
+        check_apart(folder, source)
     check_folder(folder, kept)
     check_source(source, folder)
     with progress() as step, warnings.catch_warnings(record=True) as told:

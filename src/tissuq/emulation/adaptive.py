@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.design import Design, space_filling
-from tissuq.emulation.emulator import Emulator, emulate
+from tissuq.emulation.emulator import Emulator, emulate, runs_needed
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
 from tissuq.emulation.runs import ForwardRuns
@@ -70,6 +71,7 @@ def calibrated(problem: Problem, run: Runner, choices: Choices, emulator: Emulat
         An earlier one of the same model at the same controls, instead of the design.
     """
     if emulator is None:
+        _check_enough(problem, choices)
         runs = run(space_filling(problem.forward_priors, choices.runs, choices.seed, choices.design))
         emulator = emulate(runs, problem.control, choices.kernel, choices.trend, problem.forward_priors)
     else:
@@ -116,6 +118,19 @@ def _where_unsure(found: Calibration, count: int) -> FloatArray:
         chosen.append(int(np.argmax(unsure)))
         unsure = unsure * away_from(draws[chosen[-1]])
     return np.asarray(draws[chosen])
+
+
+def _check_enough(problem: Problem, choices: Choices) -> None:
+    """Refuse too few runs before any is made: each may take hours."""
+    if choices.trend not in get_args(Trend):
+        return  # which `emulate` refuses
+    dimension = len(problem.forward_symbols)
+    needed = runs_needed(dimension, choices.trend)
+    if choices.runs < needed:
+        raise InputError(
+            f"an emulator of {dimension} parameters with a {choices.trend} mean needs {needed} runs or more, and "
+            f"{choices.runs} are asked for (--runs)."
+        )
 
 
 def _check_fit(problem: Problem, emulator: Emulator) -> None:

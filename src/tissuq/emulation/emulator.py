@@ -21,7 +21,7 @@ from tissuq.priors import Prior
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Coordinates", "Emulator", "emulate"]
+__all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
 
 FloatArray = NDArray[np.float64]
 
@@ -201,7 +201,7 @@ def emulate(
     points, outputs = runs.good
     form: tuple[Kernel, Trend] = (kernel, trend)
     known = [None if priors is None else priors[symbol] for symbol in runs.symbols]
-    needed = MARGIN + trend_basis(np.zeros((1, points.shape[1])), trend).shape[1]
+    needed = runs_needed(points.shape[1], trend)
     if len(points) < needed:
         failed = f" {runs.told_failures}" if runs.failed.any() else ""
         raise ModelError(
@@ -216,6 +216,11 @@ def emulate(
         for is_log in (False, True)[: 1 + has_signs(outputs)]
     ]
     return max(every, key=lambda each: each.check().log_density)
+
+
+def runs_needed(dimension: int, trend: Trend) -> int:
+    """Return how many runs an emulator of so many parameters needs."""
+    return MARGIN + int(trend_basis(np.zeros((1, dimension)), trend).shape[1])
 
 
 def _best_coordinates(

@@ -125,10 +125,11 @@ def borne(model: StatisticalModel, at: FloatArray, basis: FloatArray, weights: F
     locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(at)))
     if locked.max() > NEXT_TO_NOTHING:
         beyond = at[locked > NEXT_TO_NOTHING]
+        bent = ", ".join(model.bent_symbols)
+        why = f"its {bent} may be such that it locks before" if bent else "it is too large for a number"
         raise ModelError(
             f"material '{model.material.name}' has no stress at a stretch of {beyond[np.abs(beyond - 1).argmin()]:g}: "
-            f"its {', '.join(model.bent_symbols)} may be such that it locks before (up to a probability of "
-            f"{locked.max():.2g}). Predict at stretches nearer to those of the data."
+            f"{why} (up to a probability of {locked.max():.2g}). Predict at stretches nearer to those of the data."
         )
     return np.where(is_borne[..., None], basis, 0.0)
 

@@ -12,7 +12,7 @@ from tempfile import mkdtemp
 from tissuq.errors import InputError
 from tissuq.studies.settings import RECIPE
 
-__all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "INPUT", "RECIPE", "check_target", "run_folder"]
+__all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "INPUT", "RECIPE", "check_apart", "check_target", "run_folder"]
 
 INPUT = "input"
 """The folder of a run that holds copies of the user's files, so that the run can be repeated."""
@@ -40,6 +40,21 @@ def check_target(target: Path, *, force: bool) -> None:
         _check(target, force)
     except OSError as error:
         raise _not_written(target, error) from error
+
+
+def check_apart(target: Path, run: Path) -> None:
+    """Refuse to write what is made of a run into its own folder, or over it.
+
+    Raises
+    ------
+    InputError
+        When the folder holds the run, is the run, or lies in it.
+    """
+    place, source = Path(os.path.realpath(target)), Path(os.path.realpath(run))
+    if source.is_relative_to(place):
+        raise InputError(f"'{target}' is the run itself, or holds it; choose another folder with --out.")
+    if place.is_relative_to(source):
+        raise InputError(f"'{target}' lies in the run '{run}'; choose a folder outside of it with --out.")
 
 
 @contextmanager

@@ -66,7 +66,7 @@ class CalibrationSettings(BaseModel):
     @model_validator(mode="after")
     def _one_model(self) -> Self:
         if (self.forward is None) == (self.umbridge is None):
-            raise ValueError("give the forward model: a function in a file (forward), or a server (umbridge)")
+            raise ValueError("give one forward model: a function in a file (forward) or a server (umbridge), not both")
         return self
 
     @property

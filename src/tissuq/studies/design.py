@@ -13,6 +13,7 @@ from tissuq.assessment.candidates import Candidate, candidate_named
 from tissuq.assessment.next_test import NextTest
 from tissuq.assessment.ranking import rank_tests
 from tissuq.assessment.targets import MODULUS, Target, target_named
+from tissuq.errors import InputError
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.posterior import Posterior
@@ -116,6 +117,8 @@ def run_design(
         When the run or the settings cannot be used.
     """
     tests = settings.tests
+    if tests and settings.points:
+        raise InputError("numbers of points are those of the usual tests; a candidate says its own: give only one.")
     step("the earlier run")
     posterior = load_run(folder / settings.run, settings.discrepancy, law)
     targets = tuple(dict.fromkeys(target_named(each, posterior.model) for each in settings.targets))

@@ -9,7 +9,8 @@ from warnings import warn
 
 from tissuq.discrepancy import Auto, NoDiscrepancy
 from tissuq.errors import InputError
-from tissuq.mechanics import Material
+from tissuq.mechanics import Material, material_named
+from tissuq.mechanics.user_law import LAW
 from tissuq.posterior import Posterior
 from tissuq.studies.settings import RECIPE, load_settings
 
@@ -52,6 +53,7 @@ def load_run(folder: str | Path, discrepancy: str | None = None, material: Mater
 
     run = Path(folder)
     settings, rows = recipe_of(run), _summary(run)
+    _check_material(settings.material, material, folder)
     names = list(rows)
     name = discrepancy or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in names:
@@ -103,4 +105,18 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
 
 def _summary(run: Path) -> dict[str, dict[str, float]]:
     """Return the rows of a run's summary by discrepancy."""
-    return {row["formulation"]: row for row in json.loads((run / SUMMARY).read_text(encoding="utf-8"))}
+    try:
+        rows = {row["formulation"]: row for row in json.loads((run / SUMMARY).read_text(encoding="utf-8"))}
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: its {SUMMARY} is damaged.") from error
+    if not rows:
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: its {SUMMARY} has no rows.")
+    return rows
+
+
+def _check_material(named: str, given: Material | None, run: str | Path) -> None:
+    """Refuse another material than that of the run: what is wanted is the run's posterior, not a new fit."""
+    if given is not None and not LAW.search(named) and given != material_named(named):
+        raise InputError(
+            f"run '{run}' is of the material '{named}', not '{given.name}': leave the material out, or fit anew."
+        )
