@@ -246,7 +246,7 @@ def test_a_saved_calibration_is_read_by_xarray(tmp_path):
         ({"forward": 3}, "must be a function"),
         ({"forward": lambda parameters: [1.0, 2.0]}, r"shape \(2,\); there are 15 measurements"),
         ({"forward": lambda parameters: "words"}, "no array of numbers"),
-        ({"runs": 3}, "needs 6 runs that succeed"),
+        ({"runs": 3}, "needs 6 runs or more, and 3 are asked for"),
         ({"rnus": 3}, "no option 'rnus'"),
         ({"refine": -1}, "further runs"),
         ({"workers": 2, "forward": lambda parameters: DEPTH}, "cannot be sent to other processes"),
