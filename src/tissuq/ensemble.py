@@ -221,8 +221,8 @@ def _curves(draws: Sequence[EnergyDraw], places: NDArray[np.intp]) -> Callable[[
         except TypeError as error:
             raise ModelError(
                 f"the stability of material '{some[0].parts[0][0].name}' is not known, because its energy is not plain "
-                "arithmetic of arrays: write it without jax.numpy and branches, or take all draws (tissuq export "
-                "--all-draws)."
+                "arithmetic of arrays: take exp, log and the like from tissuq.mechanics.arithmetic instead of "
+                "jax.numpy, write no branches, or take all draws (tissuq export --all-draws)."
             ) from error
 
     return stresses
