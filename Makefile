@@ -1,16 +1,20 @@
-# tissuq: `make demo` shows what it does, `make test` runs every test. Both make their own environment in .venv.
+# tissuq: `make demo` shows what it does, `make test` tests it in five minutes, `make test-all` runs every test. All make their own environment in .venv.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RUNS ?= runs
+PROCESSES ?= 2
+PYTEST := $(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist worksteal
+LONG := slow or statistical or finite_elements
 BENCH := .venv-bench
 APT := { apt-get install -qq -y calculix-ccx || { apt-get update -qq && apt-get install -qq -y calculix-ccx; }; }
+JAX_CACHE ?= .jax_cache
 
-.PHONY: demo test lint types check system lock bench clean help
+.PHONY: demo test test-rest test-all mutants frozen architecture lint types check system lock bench clean help
 
 help:  ## List the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain tissue; say where the reports lie
 	$(BIN)/tissuq paper --replicates 20 --out $(RUNS)/paper --force
@@ -20,8 +24,24 @@ demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain 
 	@echo "  the paper's study:  $(abspath $(RUNS))/paper/report.html"
 	@echo "  human brain cortex: $(abspath $(RUNS))/brain/report.html"
 
-test: $(VENV)/.installed-dev  ## Run all tests, with coverage
-	$(BIN)/python -m pytest --cov=src/tissuq --cov-report=term:skip-covered
+test: $(VENV)/.installed-dev  ## Run the quick tests (five minutes on two cores)
+	$(PYTEST) -m 'not ($(LONG))'
+
+test-rest: $(VENV)/.installed-dev  ## Run the tests that `make test` leaves out
+	$(PYTEST) -m '$(LONG)'
+
+test-all: $(VENV)/.installed-dev  ## Run every test, with coverage (25 minutes on two cores)
+	$(PYTEST) --cov=src/tissuq --cov-report=term:skip-covered
+
+mutants: $(VENV)/.installed-dev  ## Plant faults in copies of the source and see that tests catch each (ten minutes)
+	$(BIN)/python tests/mutants.py
+
+frozen: $(VENV)/.installed-dev  ## Hold reference posteriors against their stored numbers (a minute, at first two)
+	JAX_COMPILATION_CACHE_DIR=$(abspath $(JAX_CACHE)) JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \
+	  $(BIN)/python -W ignore tests/frozen/check.py
+
+architecture:  ## Write the table of files in docs/architecture.md
+	$(PYTHON) docs/architecture_table.py
 
 lint: $(VENV)/.installed-dev  ## Check style and format
 	$(BIN)/ruff check src tests benchmarks
@@ -30,7 +50,7 @@ lint: $(VENV)/.installed-dev  ## Check style and format
 types: $(VENV)/.installed-dev  ## Check types
 	$(BIN)/mypy
 
-check: lint types test  ## Everything that CI checks
+check: lint types test test-rest  ## Everything that CI checks
 
 # CalculiX is no Python package. Where it cannot be installed the tests that need it skip, so that this never fails.
 system:  ## Install CalculiX, which judges the material cards in the tests (Debian, Ubuntu; as root or with sudo)
@@ -62,8 +82,8 @@ lock: $(VENV)/.installed-dev  ## Write the installed versions to constraints.txt
 	mv constraints.new constraints.txt
 
 $(VENV)/.installed: pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' || \
-	  { echo "tissuq needs Python 3.11 to 3.13, but '$(PYTHON)' is $$($(PYTHON) -V 2>&1). Try: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "tissuq needs Python 3.11 or later, but '$(PYTHON)' is $$($(PYTHON) -V 2>&1). Try: make $(MAKECMDGOALS) PYTHON=python3.12"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
 	touch $@
@@ -73,4 +93,4 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	touch $@
 
 clean:  ## Remove the environment and caches
-	rm -rf $(VENV) $(BENCH) .pytest_cache .mypy_cache .ruff_cache .coverage build dist
+	rm -rf $(VENV) $(BENCH) .pytest_cache $(JAX_CACHE) .mypy_cache .ruff_cache .coverage build dist

@@ -1,21 +1,29 @@
-"""For all tests: a process may map only so many pieces of memory, and every function that JAX compiles takes some."""
+"""For all tests: compiled functions, which are kept in the environment from run to run, and let go of within one."""
 
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from pathlib import Path
 
 import pytest
 
-MAPS, MOST = Path("/proc/self/maps"), 20_000
-"""What is mapped (on Linux, where 65530 are allowed), and from how many on compiled functions are let go."""
+if sys.prefix != sys.base_prefix:  # JAX reads these when it is imported, in the processes that tests start, too
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(sys.prefix) / "jax-cache"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+if "PYTEST_XDIST_WORKER" in os.environ:  # as many processes as cores: more threads than one in each only get in the way
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+MEMORY_MAPS, MOST_MAPS = Path("/proc/self/maps"), 20_000
+"""What a process has mapped (on Linux, where 65530 are allowed), and from how many on compiled functions are let go."""
 
 
 @pytest.fixture(autouse=True, scope="module")
 def few_maps():
-    """Let go of compiled functions after a module that has left many."""
+    """Let go of compiled functions after a module that has left many: each takes some pieces of memory."""
     yield
-    if "jax" in sys.modules and MAPS.exists() and MAPS.read_bytes().count(b"\n") > MOST:
+    if "jax" in sys.modules and MEMORY_MAPS.exists() and MEMORY_MAPS.read_bytes().count(b"\n") > MOST_MAPS:
         sys.modules["jax"].clear_caches()
         gc.collect()

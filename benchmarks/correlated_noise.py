@@ -12,8 +12,7 @@ import numpy as np
 
 import tissuq as tq
 from tissuq.experiments.modes import loading_mode
-from tissuq.studies.coverage.families import FAMILIES
-from tissuq.studies.coverage.truths import draw_truth
+from tissuq.validation.coverage.truths import FAMILIES, draw_truth
 
 STRETCH = np.linspace(0.6, 2.0, 60)
 NOISE = 0.03

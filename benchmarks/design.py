@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 import tissuq as tq
-from tissuq.assessment.candidates import reach_of
 from tissuq.assessment.modulus import modulus
-from tissuq.assessment.next_test import NextTest
-from tissuq.assessment.targets import target_named
 from tissuq.inference.resampling import systematic
-from tissuq.prediction.joint_moments import joint_stresses, points_together
+from tissuq.next_test.candidates import reach_of
+from tissuq.next_test.next_test import NextTest
+from tissuq.next_test.targets import target_named
+from tissuq.prediction.joint_moments import joint_stresses, states_of
 
 TRUTH = {"C10": 0.5, "C20": 0.05, "C30": 0.0}
 STRETCH = np.linspace(0.75, 1.5, 20)
@@ -61,11 +61,10 @@ def cases() -> Iterator[Case]:
 
 def outcomes(posterior: tq.Posterior, candidate: tq.Candidate, count: int, seed: int) -> list[tq.Experiment]:
     """Return outcomes of a test as a posterior predicts them, with its noise."""
-    model, parts = posterior.model, posterior.solution.components
+    model, parts = posterior.model, posterior.solution.mixture
     parts = parts[systematic(parts.weights[None], count)[0]]
     generator = np.random.default_rng(seed)
-    path, points = points_together(model, [(candidate.mode, candidate.stretch)])
-    mean, root = joint_stresses(model, parts, path, points)
+    mean, root = joint_stresses(model, parts, states_of(model, [(candidate.mode, candidate.stretch)]))
     stress = mean + np.einsum("mgr,mr->mg", root, generator.standard_normal((count, root.shape[2])))
     values = {symbol: own[:, None] for symbol, own in zip(model.nonlinear, parts.settings.T, strict=True)}
     sd = np.sqrt(np.broadcast_to(model.white_variance(values), stress.shape))
@@ -84,11 +83,11 @@ def simulated(case: Case, count: int, seed: int) -> tuple[float, float, float, f
     same = case.candidate.mode == case.data.mode
     sets = [case.data.joined(test) if same else [case.data, test] for test in tests]
     after = tq.fit_many(sets, **options, tolerances=None if same else NONE)
-    variances = np.array([_sd(posterior, case.target) ** 2 for posterior in after]) / asked.now[0] ** 2
+    variances = np.array([_sd(posterior, case.target) ** 2 for posterior in after]) / asked.sd_now[0] ** 2
     error = variances.std(ddof=1) / np.sqrt(count)
     found = np.sqrt(variances.mean())
     return (
-        float(expected.after[0] / expected.now[0]),
+        float(expected.sd_after[0] / expected.sd_now[0]),
         float(expected.error[0]),
         float(found),
         float(error / (2 * found)),
@@ -100,7 +99,7 @@ def _sd(posterior: tq.Posterior, target: str) -> float:
         return posterior.marginals[target].sd
     if target == "modulus":
         return modulus(posterior.solution).sd
-    return float(NextTest(posterior.solution, [target_named(target, posterior.model)]).now[0])
+    return float(NextTest(posterior.solution, [target_named(target, posterior.model)]).sd_now[0])
 
 
 def measured() -> Iterator[str]:
@@ -122,7 +121,7 @@ def measured() -> Iterator[str]:
                 asked = NextTest(before.solution, [target_named(each, before.model) for each in targets], specimen)
                 expected, after = asked.expected(candidate), tq.fit([uniaxial, test], tolerances=tolerances)
                 for place, target in enumerate(targets):
-                    numbers = expected.now[place], expected.after[place], _sd(after, target)
+                    numbers = expected.sd_now[place], expected.sd_after[place], _sd(after, target)
                     cells = " | ".join(f"{number:.3g}" for number in numbers)
                     yield f"| {family}, {candidate.name} | {specimen} | {target} | {cells} |"
 

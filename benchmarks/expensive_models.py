@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 import tissuq as tq
 from tissuq.emulation import Emulator, ForwardRuns, emulate
-from tissuq.emulation.design import space_filling
 from tissuq.emulation.forward import as_forward
 from tissuq.emulation.problem import pose
-from tissuq.studies.forward_runs import runs_of
+from tissuq.emulation.run_plan import space_filling
+from tissuq.studies.calibrate import runs_of
 
 DEPTH = np.linspace(0.06, 0.9, 15)
 """mm; the punch has a radius of 0.75 mm, the disc a height of 5 mm."""
@@ -121,7 +121,7 @@ def _pool(name: str, asked: argparse.Namespace) -> ForwardRuns:
     points = space_filling(PRIORS[name], count, seed=1)
     with runs_of(as_forward(FORWARD[name]), problem, asked.runs_in / name, asked.workers, lambda *_: None) as run:
         found = run(points)
-    print(f"{name}: {len(found)} runs of {np.median(found.seconds):.1f} s. {found.told_failures or 'None failed.'}")
+    print(f"{name}: {len(found)} runs of {np.median(found.seconds):.1f} s. {found.failure_summary or 'None failed.'}")
     return found
 
 

@@ -13,8 +13,7 @@ import numpy as np
 
 import tissuq as tq
 from tissuq.experiments.modes import loading_mode
-from tissuq.studies.coverage.families import FAMILIES
-from tissuq.studies.coverage.truths import draw_truth
+from tissuq.validation.coverage.truths import FAMILIES, draw_truth
 
 DESIGN = (
     ("uniaxial", np.linspace(1.02, 1.6, 20)),

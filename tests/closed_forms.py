@@ -7,6 +7,7 @@ with the derivatives W1, W2 and W4 of an energy of the invariants and a sum of w
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.stats import special_ortho_group
 
 from loading import LARGEST, MEASURED
@@ -135,6 +136,23 @@ def has_stress(material, measured):
 
 STRESSES = [(material, measured) for material in EVERY for measured in MEASURED if has_stress(material, measured)]
 ISOTROPIC = [material for material in EVERY if "fibres" not in material.name]
+
+
+def in_every_mode(test):
+    """Run a test of a material and a measured stress for each material in all its modes; a failure names the mode."""
+
+    @pytest.mark.parametrize("material", EVERY, ids=lambda material: material.name)
+    def whole(material):
+        for own, measured in STRESSES:
+            if own is material:
+                try:
+                    test(material, measured)
+                except Exception as error:
+                    error.add_note(f"{material.name} in {measured}")
+                    raise
+
+    whole.__name__, whole.__doc__ = test.__name__, test.__doc__
+    return whole
 
 
 def of_fibres(name, values, F):

@@ -7,9 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from tissuq.studies.paper import PaperSettings
+from tissuq.validation.paper import PaperSettings
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def gallery():
+    """The posteriors of `gallery.py`, which no test may change."""
+    yield
+    if "gallery" in sys.modules:
+        assert not sys.modules["gallery"].changed(), "a test has changed a posterior that others look at, too"
 
 
 @pytest.fixture(scope="session")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tissuq.emulation import gathered
-from tissuq.emulation.design import space_filling
-from tissuq.priors import Uniform
+from tissuq.emulation.run_plan import space_filling
+from tissuq.parameters.priors import Uniform
 
 DEPTH = np.linspace(0.02, 0.3, 15)
 STRETCH = 1 - DEPTH

@@ -53,7 +53,7 @@ class Measured:
 def every_stress():
     for name, kind in loading_modes().items():
         points, gradient, components = TEXTBOOK[name]
-        for path, component in zip(kind().channels, components, strict=True):
+        for path, component in zip(kind().paths, components, strict=True):
             yield Measured(kind(), path, points, gradient, component)
 
 

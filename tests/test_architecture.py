@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,10 +17,9 @@ from tissuq.registry import variants
 
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
-    "errors", "registry", "gaussian", "priors", "parameters", "smoothing", "experiments", "mechanics", "discrepancy",
-    "noise", "statistics", "scales", "tolerances", "whitening", "compatibility", "model", "inference", "prediction",
-    "assessment", "cautions", "labelled", "ensemble", "posterior", "fitting", "population", "export",
-    "finite_elements", "emulation", "studies", "report", "cli", "__main__",
+    "errors", "registry", "parameters", "experiments", "mechanics", "model", "inference", "prediction", "assessment",
+    "next_test", "posterior", "population", "export", "finite_elements", "emulation", "studies", "validation", "report",
+    "cli", "__main__",
 ]  # fmt: skip
 
 
@@ -41,21 +43,34 @@ def test_a_stage_imports_only_stages_to_its_left(file):
     assert not imports_of(file) & set(later)
 
 
+def test_the_page_of_the_architecture_lists_the_files_as_they_are():
+    table = runpy.run_path(str(ROOT.parents[1] / "docs" / "architecture_table.py"))
+    text = table["PAGE"].read_text(encoding="utf-8")
+    assert table["stages_of"](text) == STAGES[2:-1]
+    assert table["page"](text, STAGES[2:-1]) == text, "run: make architecture"
+
+
 def test_the_statistics_of_the_data_know_nothing_of_the_rest():
-    assert not imports_of(ROOT / "statistics.py")
+    assert not imports_of(ROOT / "model" / "statistics.py")
 
 
 def test_inference_knows_no_particular_material_discrepancy_or_noise():
     kinds = (Material, StretchMaterial, Discrepancy, Noise)
     names = {variant.__name__ for kind in kinds for variant in variants(kind).values()}
     assert {"NeoHookean", "Ogden1", "GaussianProcess", "Constant", "RepeatNoise"} <= names
-    for file in (ROOT / "inference").glob("*.py"):
+    for file in (ROOT / "inference").rglob("*.py"):
         assert not names & {node.id for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.Name)}
 
 
 @pytest.mark.parametrize(
     "document",
-    ["README.md", "CONTRIBUTING.md", "docs/several-tests.md", "docs/prediction.md", "docs/expensive-models.md"],
+    [
+        *["CONTRIBUTING.md", "docs/prediction.md"],
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("README.md", "docs/several-tests.md", "docs/expensive-models.md")
+        ),
+    ],
 )
 def test_the_python_in_the_documents_runs(document):
     text = (ROOT.parents[1] / document).read_text(encoding="utf-8")
@@ -68,3 +83,24 @@ def test_the_python_in_the_documents_runs(document):
 def test_every_public_name_is_there_and_documented():
     for name in tissuq.__all__:
         assert (getattr(tissuq, name).__doc__ or "").strip(), name
+    assert {"Experiment", "fit", "datasets"} <= set(tissuq.__all__) <= set(dir(tissuq))
+
+
+def test_importing_the_package_imports_none_of_it_before_it_is_used():
+    code = (
+        "import sys, tissuq\n"
+        "before = [name for name in sys.modules if name.startswith('tissuq.') or name == 'numpy']\n"
+        "from tissuq import InputError\n"
+        "print(before, tissuq.errors.InputError is InputError, hasattr(tissuq, 'no_such_name'))"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.strip() == "[] True False"
+
+
+def test_variants_are_listed_before_anything_else_of_the_package_is_used():
+    listings = ("tissuq.materials()", "tissuq.discrepancies()", "tissuq.loading_modes()")
+    for listing in listings:
+        code = f"import tissuq\nprint(sorted({listing}))"
+        said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        names = sorted(name for name, kind in eval(listing).items() if kind.__module__.startswith("tissuq."))
+        assert ast.literal_eval(said) == names

@@ -1,101 +1,37 @@
-"""tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
+"""tissuq: parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted.
 
-from tissuq import finite_elements
-from tissuq.assessment import Assessment, Average, Candidate, average, compare
-from tissuq.discrepancy import Discrepancy, discrepancies
-from tissuq.emulation import Calibration, Emulator, UmbridgeForward
-from tissuq.ensemble import EnergyDraw, Ensemble
-from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
-from tissuq.experiments import datasets
-from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.inspection import Inspection, inspect
-from tissuq.experiments.modes import LoadingMode, loading_modes
-from tissuq.experiments.reading import read_experiment
-from tissuq.fitting import fit, fit_many
-from tissuq.mechanics import (
-    FibreMaterial,
-    FunctionLaw,
-    Material,
-    StretchMaterial,
-    engineering_stress,
-    initial_shear_modulus,
-    load_material,
-    simulate,
-)
-from tissuq.mechanics.material import materials
-from tissuq.noise import KnownNoise, Noise, ProportionalNoise, RepeatNoise, UnknownNoise
-from tissuq.parameters import Parameter
-from tissuq.population import Population, fit_population
-from tissuq.posterior import Posterior
-from tissuq.priors import Exponential, Flat, HalfCauchy, HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
-from tissuq.report.cards import write_cards
-from tissuq.studies.calibrate import calibrate
-from tissuq.studies.earlier_run import load_run
-from tissuq.studies.held_out import held_out_tests
-from tissuq.studies.prediction import Prediction, predict_run
-from tissuq.tolerances import Tolerances
+The public names stand in ``__init__.pyi``, each beside the module that it is imported from when it is first used.
+"""
 
-__version__ = "0.1.0"
+import ast
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
-__all__ = [
-    "Assessment",
-    "Average",
-    "Calibration",
-    "Candidate",
-    "ConvergenceError",
-    "Discrepancy",
-    "Emulator",
-    "EnergyDraw",
-    "Ensemble",
-    "Experiment",
-    "Exponential",
-    "FibreMaterial",
-    "Flat",
-    "FunctionLaw",
-    "HalfCauchy",
-    "HalfNormal",
-    "InputError",
-    "Inspection",
-    "KnownNoise",
-    "LoadingMode",
-    "LogNormal",
-    "LogUniform",
-    "Material",
-    "ModelError",
-    "Noise",
-    "Normal",
-    "Parameter",
-    "Population",
-    "Posterior",
-    "Prediction",
-    "Prior",
-    "ProportionalNoise",
-    "RepeatNoise",
-    "StretchMaterial",
-    "TissuqError",
-    "Tolerances",
-    "UmbridgeForward",
-    "Uniform",
-    "UnknownNoise",
-    "average",
-    "calibrate",
-    "compare",
-    "datasets",
-    "discrepancies",
-    "engineering_stress",
-    "finite_elements",
-    "fit",
-    "fit_many",
-    "fit_population",
-    "held_out_tests",
-    "initial_shear_modulus",
-    "inspect",
-    "load_material",
-    "load_run",
-    "loading_modes",
-    "materials",
-    "predict_run",
-    "read_experiment",
-    "simulate",
-    "write_cards",
-]
+_MODULES = {
+    alias.name: statement.module
+    for statement in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    if isinstance(statement, ast.ImportFrom) and statement.module
+    for alias in statement.names
+}
+
+__all__ = sorted(_MODULES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used (PEP 562)."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value: Any = version("tissuq")
+    elif name in _MODULES:
+        module = import_module(_MODULES[name])
+        value = vars(module)[name] if name in vars(module) else import_module(f"{_MODULES[name]}.{name}")
+    else:
+        raise AttributeError(f"module 'tissuq' has no attribute '{name}'")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,5 +1,18 @@
-"""`python -m tissuq` is `tissuq`."""
+"""The program: `tissuq`, and `python -m tissuq`."""
 
-from tissuq.cli import main
+import sys
 
-main()
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Run the command line; an interrupt while its modules are loaded is no traceback."""
+    try:
+        from tissuq.cli.app import main as run
+    except KeyboardInterrupt:
+        sys.exit(130)
+    run()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,15 +1,19 @@
-"""Variants by name: every concrete subclass with a ``name`` is listed, wherever it was defined."""
+"""Variants by name: every concrete subclass with a ``name``, wherever it was defined, and those of other packages.
+
+A base class whose variants other packages may add names a group of entry points, ``entry_point_group``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from difflib import get_close_matches
+from importlib.metadata import EntryPoint, entry_points
 from inspect import isabstract
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from tissuq.errors import ModelError, TissuqError
 
-__all__ = ["find", "variants"]
+__all__ = ["find", "load_plugins", "plugins", "variants"]
 
 T = TypeVar("T")
 
@@ -52,6 +56,50 @@ def find(base: type[T], kind: str, name: str, error: type[TissuqError]) -> type[
     known = variants(base)
     if name in known:
         return known[name]
+    for plugin in plugins(base, str(name)):
+        return plugin
     close = get_close_matches(str(name).lower(), known, n=1)
     hint = f" Did you mean '{close[0]}'?" if close else ""
     raise error(f"there is no {kind} named '{name}'.{hint} Choose one of: {', '.join(known)}.")
+
+
+def plugins(base: type[T], name: str | None = None) -> list[type[T]]:
+    """Return the variants of a base class that other packages add, or the one under that entry point.
+
+    Once loaded they are among its `variants`, too.
+
+    Raises
+    ------
+    ModelError
+        When one of them cannot be used.
+    """
+
+    def accept(plugin: Any, source: str) -> type[T]:
+        if not (isinstance(plugin, type) and issubclass(plugin, base)):
+            raise ModelError(f"{source} is not a subclass of {_origin(base)}")
+        return plugin
+
+    group = getattr(base, "entry_point_group", "")
+    return load_plugins(group, accept, name) if group else []
+
+
+def load_plugins(group: str, accept: Callable[[Any, str], T], name: str | None = None) -> list[T]:
+    """Return the objects under a group of entry points, each as ``accept`` returns it for the object and its source.
+
+    Raises
+    ------
+    ModelError
+        When one of them cannot be loaded, or is not accepted.
+    """
+    points = entry_points(group=group) if name is None else entry_points(group=group, name=name)
+    return [_loaded(point, accept) for point in points]
+
+
+def _loaded(point: EntryPoint, accept: Callable[[Any, str], T]) -> T:
+    try:
+        return accept(point.load(), point.value)
+    except Exception as error:
+        raise ModelError(
+            f"'{point.name}' of another package ({point.group}: {point.value}) cannot be used: {error}. Repair or "
+            "uninstall that package."
+        ) from error

@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.experiments.modes import loading_mode
-from tissuq.mechanics.path import invariants
+from tissuq.mechanics.invariants import invariants
 
 STRETCH = np.linspace(0.8, 1.5, 12)
 
@@ -61,15 +61,15 @@ def test_a_mode_of_one_control_is_calibrated_up_to_its_range(data, mode):
     step = 1e-6
     points = np.array([low - step, low, asked.reference, high, high + step])
     assert is_calibrated(data, asked, points).tolist() == [False, True, True, True, False]
-    largest = [each.max() for each in invariants(data.mode, data.stretch)]
+    largest = [each.max() for each in invariants(data.mode.at(data.stretch))]
     if mode != "uniaxial":  # there, what was measured is the range
-        at_ends = invariants(asked.channels[0], np.array([low, high]))
+        at_ends = invariants(asked.paths[0].at(np.array([low, high])))
         ratio = np.array([own / most for own, most in zip(at_ends, largest, strict=True)]).max(axis=0)
         np.testing.assert_allclose(ratio, 1, rtol=1e-6)
 
 
 def test_points_of_several_controls_are_calibrated_where_both_invariants_are(data):
-    first, second = (each.max() for each in invariants(data.mode, data.stretch))
+    first, second = (each.max() for each in invariants(data.mode.at(data.stretch)))
     points = np.array([[1.0, 1.0], [1.2, 1.05], [1.5, 1.5], [1.5**-0.5, 1.5], [1.01 * 1.5**-0.5, 1.51]])
     l1, l2 = points.T
     i1 = l1**2 + l2**2 + (l1 * l2) ** -2 - 3

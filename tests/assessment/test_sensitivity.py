@@ -16,20 +16,20 @@ from tissuq.prediction.densities import joint_log_likelihood
 STRETCH = np.linspace(0.7, 1.9, 14)
 DATA = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, STRETCH, noise_sd=0.05, seed=1)
 UNIT = 2 * (STRETCH - STRETCH**-2)
-ALPHAS = (0.8, 1.25)
+POWERS = (0.8, 1.25)
 
 
 @pytest.fixture
 def wide_powers(monkeypatch):
     """Powers so far from one that refitting tells the difference."""
-    monkeypatch.setattr(sensitivity, "ALPHAS", ALPHAS)
+    monkeypatch.setattr(sensitivity, "POWERS", POWERS)
 
 
 def speed(draws, cdf, others):
     """Return the mean distance of cumulative distributions to others, for each doubling of the power."""
     grid = np.linspace(draws.min(), draws.max(), 20_001)
     found = []
-    for alpha, other in zip(ALPHAS, others, strict=True):
+    for alpha, other in zip(POWERS, others, strict=True):
         distances = []
         for p, q in ((cdf(grid), other(grid)), (1 - cdf(grid), 1 - other(grid))):
             p, q = (np.clip(each, 1e-12, 1) for each in (p, q))
@@ -52,8 +52,8 @@ def test_powers_of_a_normal_prior_and_likelihood_are_other_variances():
 
     draws, found = posterior.solution.draws["C10"], power_scaling(posterior.solution)
     # 4000 draws tell a cumulative distribution to some hundredths of its change.
-    assert found.prior == pytest.approx(speed(draws, cdf(1, 1), [cdf(a, 1) for a in ALPHAS]), rel=0.06)
-    assert found.likelihood == pytest.approx(speed(draws, cdf(1, 1), [cdf(1, a) for a in ALPHAS]), rel=0.06)
+    assert found.prior == pytest.approx(speed(draws, cdf(1, 1), [cdf(a, 1) for a in POWERS]), rel=0.06)
+    assert found.likelihood == pytest.approx(speed(draws, cdf(1, 1), [cdf(1, a) for a in POWERS]), rel=0.06)
 
 
 @pytest.mark.usefixtures("wide_powers")
@@ -72,7 +72,7 @@ def test_the_power_of_an_amplitudes_prior_is_a_fit_with_it(name):
         return lambda values: np.interp(values, marginal.points, marginal.cumulative, left=0.0, right=1.0)
 
     solution = fitted(1.0)
-    expected = speed(solution.draws["C10"], cdf(solution), [cdf(fitted(alpha)) for alpha in ALPHAS])
+    expected = speed(solution.draws["C10"], cdf(solution), [cdf(fitted(alpha)) for alpha in POWERS])
     # Over seeds of the 4000 draws the number has an sd of 0.003.
     assert power_scaling(solution).prior == pytest.approx(expected, abs=0.012)
 
@@ -108,7 +108,7 @@ def test_a_missing_amplitude_does_not_bring_in_the_unit_of_stress():
 
 @pytest.mark.parametrize(
     ("prior", "likelihood", "words"),
-    [(0.01, 0.1, "data decide"), (0.2, 0.01, "priors decide"), (0.2, 0.3, "at odds"), (0.0, 0.0, "neither")],
+    [(0.01, 0.1, "data determine"), (0.2, 0.01, "priors influence"), (0.2, 0.3, "contradict"), (0.0, 0.0, "neither")],
 )
 def test_the_diagnosis_is_a_sentence(prior, likelihood, words):
     text = sensitivity.PowerScaling(prior, likelihood).sentence("C10")

@@ -74,12 +74,13 @@ def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
     assert sum(float(row["low"]) < float(row["measured"]) < float(row["high"]) for row in band) >= 10
 
 
+@pytest.mark.slow
 def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate_run):
     folder, _ = calibrate_run
     again = ["--config", "run/run.toml", "--no-figures", "--out", "again"]
     refused = command("calibrate", *again, folder=folder)
     assert refused.status == 2
-    assert "run only when you name it: add --forward input/force.py:force" in refused.err
+    assert "whose code runs only if you name it: add --forward input/force.py:force" in refused.err
     said = command("calibrate", "--forward", "run/input/force.py:force", *again, folder=folder)
     assert said.status == 0, said.err
     assert (folder / "again" / "summary.csv").read_bytes() == (folder / "run" / "summary.csv").read_bytes()
@@ -92,14 +93,14 @@ def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate
         (["--forward", "force.py:force", *USUAL], "give a FILE"),
         (["punch.csv", "--forward", "no.py:force", *USUAL], "no file 'no.py'"),
         (["punch.csv", "--forward", "force.py:force", "--runs", 8], "give the --prior of every parameter"),
-        (["punch.csv", "--forward", "force.py:force", *PRIORS, "--runs", 2], "runs or more, and 2 are asked for"),
+        (["punch.csv", "--forward", "force.py:force", *PRIORS, "--runs", 2], "runs or more, and 2 are requested"),
         (["punch.csv", "--forward", "force.py:wrong", *USUAL], "shape (2,)"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "depth"], "say which one"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "x", "--measured", "2"], "no column 'x'"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "2", "--measured", "2"], "the same column"),
         (["punch.csv", "--forward", "force.py:force", *PRIORS, "--noise-sd", "loud"], "--noise-sd"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--kernel", "cubic"], "kernel"),
-        (["punch.csv", "--forward", "force.py:force", *USUAL, "--discrepancy", "auto"], "cannot stand beside"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--discrepancy", "auto"], "cannot be used with"),
         (["punch.csv", "--umbridge", "http://127.0.0.1:9", *USUAL], "UM-Bridge"),
     ],
 )
@@ -110,3 +111,16 @@ def test_bad_input_gives_one_message_and_leaves_nothing(cli, here, arguments, wo
     assert words in said.err
     assert "Traceback" not in said.err
     assert {path.name for path in here.iterdir()} - {"__pycache__"} == {"punch.csv", "force.py"}
+
+
+def test_a_server_that_a_configuration_names_is_asked_only_when_the_command_line_names_it(cli, here, monkeypatch):
+    write_all(here)
+    asked = []
+    monkeypatch.setattr("tissuq.emulation.forward.UmbridgeForward.check", lambda *each: asked.append(each))
+    (here / "own.toml").write_text(
+        'file = "punch.csv"\numbridge = "http://127.0.0.1:9"\n'
+        '[priors]\nmu = { distribution = "uniform", low = 0.2, high = 3.0 }\n'
+    )
+    said = cli("calibrate", "--config", "own.toml")
+    assert (said.status, asked) == (2, [])
+    assert "add --umbridge http://127.0.0.1:9" in said.err

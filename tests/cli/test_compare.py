@@ -4,15 +4,30 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 
 import pytest
 
+from .conftest import command, write_specimen
 
-@pytest.fixture
-def two_runs(cli, here, specimen):
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Two run folders, of two discrepancies and of one."""
+    folder = tmp_path_factory.mktemp("fitted")
+    write_specimen(folder / "specimen.csv")
     for name, discrepancies in (("first", ("none", "constant")), ("second", ("auto",))):
         options = [part for each in discrepancies for part in ("--discrepancy", each)]
-        assert cli("fit", specimen, *options, "--noise-sd", 1, "--no-figures", "--out", name).status == 0
+        said = command("fit", "specimen.csv", *options, "--noise-sd", 1, "--no-figures", "--out", name, folder=folder)
+        assert said.status == 0, said.err
+    return folder
+
+
+@pytest.fixture
+def two_runs(fitted, here):
+    """Copies of both in the current folder."""
+    for name in ("first", "second"):
+        shutil.copytree(fitted / name, here / name)
     return here
 
 
@@ -27,7 +42,7 @@ def test_runs_are_compared(cli, two_runs):
     for name in ("first/none", "first/constant", "second/auto"):
         assert name in said.out
     words = " ".join(said.out.split())
-    assert "for predictions only" in words
+    assert "weights for averaging predictions" in words
     assert "C10, kPa (95 %)" in words
     rows = rows_of(two_runs / "compared")
     assert set(rows) == {"first/none", "first/constant", "second/auto"}

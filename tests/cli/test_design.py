@@ -56,9 +56,9 @@ def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
         (["run", "--points", "0"], "one measurement or more"),
         (["run", "--specimen", "twin"], "specimen"),
         (["run", "--discrepancy", "auto"], "no discrepancy 'auto'"),
-        (["run", "--out", "run", "--force"], "is the run itself, or holds it"),
-        (["run", "--out", "run/inside"], "lies in the run"),
-        (["run", "--candidate", "planar 1:1.2 9", "--points", "10"], "a candidate says its own"),
+        (["run", "--out", "run", "--force"], "is the run itself or contains it"),
+        (["run", "--out", "run/inside"], "lies inside the run"),
+        (["run", "--candidate", "planar 1:1.2 9", "--points", "10"], "a candidate states its own points"),
     ],
 )
 def test_what_cannot_be_used_is_told_and_leaves_nothing(cli, run, here, arguments, words):

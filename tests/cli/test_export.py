@@ -41,7 +41,7 @@ def test_a_run_becomes_the_cards_of_its_posterior(cli, here, run):
     assert "cards/specimen-calculix/draw-1.inp to draw-4.inp" in said.out
     with (here / "cards" / "specimen-calculix" / "index.csv").open() as file:
         rows = list(csv.DictReader(file))
-    draws = tq.load_run(run, "none").ensemble(4, 3)
+    draws = tq.load(run, "none").ensemble(4, 3)
     assert [float(row["C10"]) for row in rows] == pytest.approx([1e3 * draw.values["C10"] for draw in draws])
     typical = min(rows, key=lambda row: float(row["from_median"]))["file"]
     assert f"median stresses: {typical}\n" in said.out
@@ -64,7 +64,7 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
     ("options", "words"),
     [
         (["--discrepancy", "gp"], "is an error of the measured stress"),
-        (["--discrepancy", "yeoh"], "choose one of auto, none, gp"),
+        (["--discrepancy", "yeoh"], "choose one of auto, gp, none"),
         (["--format", "nastran"], "no format of cards named 'nastran'"),
         (["--unit", "psi"], "MPa, kPa, Pa"),
         (["--law", "gent"], "no law 'gent'"),
@@ -73,10 +73,10 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
         (["--poisson", "0.6"], "between 0 and 0.5"),
         (["--bulk-modulus", "10", "--poisson", "0.4"], "not both"),
         (["--out", "runs/specimen", "--force"], "is the run itself"),
-        (["--out", "runs", "--force"], "is the run itself, or holds it"),
-        (["--out", "runs/specimen/cards"], "lies in the run"),
+        (["--out", "runs", "--force"], "is the run itself or contains it"),
+        (["--out", "runs/specimen/cards"], "lies inside the run"),
         (["--seed", "-1"], "the seed of an ensemble must be 0 or more, not -1"),
-        (["--material", "yeoh"], "'yeoh' is none"),
+        (["--material", "yeoh"], "'yeoh' is not of the form law.py:Name"),
     ],
     ids=lambda each: " ".join(each) if isinstance(each, list) else "",
 )

@@ -1,10 +1,13 @@
 import json
+import os
+import signal
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 
-HEAVY = ["jax", "pandas", "xarray", "matplotlib", "scipy", "pint", "openpyxl"]
+HEAVY = ["numpy", "jax", "pandas", "xarray", "matplotlib", "scipy", "pint", "openpyxl"]
 
 
 def test_help_is_shown_without_importing_a_heavy_library():
@@ -38,13 +41,20 @@ def test_help_is_shown_without_importing_a_heavy_library():
         "datasets",
         "study",
         "export",
-        "simulate",
+        "structure",
     ],
 )
 def test_every_command_has_help(cli, name):
     said = cli(name, "--help")
     assert (said.status, said.err) == (0, "")
     assert f"Usage: tissuq {name}" in said.out
+
+
+def test_the_former_name_of_structure_still_runs_it_and_is_not_listed(cli):
+    said = cli("simulate", "--help")
+    assert said.status == 0
+    assert "Usage: tissuq simulate" in said.out
+    assert "simulate" not in cli("--help").out
 
 
 @pytest.mark.parametrize(
@@ -73,5 +83,49 @@ def test_ctrl_c_ends_with_status_130_and_leaves_nothing(cli, here, specimen, mon
     monkeypatch.setattr("tissuq.report.specimen.write_tables", interrupt)
     said = cli("fit", specimen, "--discrepancy", "none", "--no-figures")
     assert said.status == 130
-    assert said.err == "tissuq: stopped; no run was written (a campaign goes on with the same command).\n"
+    assert said.err == "tissuq: stopped; no run was written (the same command resumes a campaign).\n"
     assert [path.name for path in here.iterdir()] == [specimen.name]
+
+
+def test_the_version_is_that_of_the_installed_package(cli):
+    said = cli("--version")
+    assert (said.status, said.out) == (0, f"tissuq {version('tissuq')}\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
+def test_a_request_to_terminate_ends_with_status_143_and_leaves_nothing(cli, here, specimen, monkeypatch):
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr("tissuq.report.specimen.write_tables", lambda *_, **__: os.kill(os.getpid(), signal.SIGTERM))
+    try:
+        said = cli("fit", specimen, "--discrepancy", "none", "--no-figures")
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert said.status == 143
+    assert said.err == "tissuq: stopped; no run was written (the same command resumes a campaign).\n"
+    assert [path.name for path in here.iterdir()] == [specimen.name]
+
+
+def test_a_terminal_that_shows_ascii_only_shows_question_marks():
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-m", "tissuq", "materials"]
+    said = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert (said.returncode, said.stderr) == (0, "")
+    assert "?" in said.stdout
+    assert said.stdout.isascii()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
+def test_ctrl_c_while_modules_are_loaded_is_no_traceback():
+    code = (
+        "import sys, os, signal\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'tissuq.cli.study':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "sys.argv = ['tissuq', '--help']\n"
+        "from tissuq.__main__ import main\n"
+        "main()"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (said.returncode, said.stdout, said.stderr) == (130, "", "")

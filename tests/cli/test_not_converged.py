@@ -1,12 +1,13 @@
 """A sampler that has not converged: exit status 3, and the result says so wherever it is read."""
 
 import json
+from dataclasses import replace
 from math import nan
 
 import pytest
 
-from tissuq.inference import sampled
-from tissuq.inference.exact import solve_exactly
+from tissuq.inference.enumerators import sampled
+from tissuq.inference.enumerators.adaptive_cells import solve_exactly
 from tissuq.inference.solution import Diagnostics
 
 VERDICT = "4 chains of 1000 draws have NOT converged: R-hat of C10 is 1.73."
@@ -20,9 +21,8 @@ def stuck(monkeypatch):
         def sample(model, seed):
             (solution,) = solve_exactly([model], seed)
             rhats, sizes = dict.fromkeys(model.symbols, rhat), dict.fromkeys(model.symbols, 12.0)
-            solution.route, solution.log_evidence, solution.log_evidence_error = "joint", None, None
-            solution.diagnostics = Diagnostics(False, VERDICT, rhats, sizes, sizes, divergences=3)
-            return solution
+            found = Diagnostics(False, VERDICT, rhats, sizes, sizes, divergences=3)
+            return replace(solution, route="joint", log_evidence=None, log_evidence_error=None, diagnostics=found)
 
         monkeypatch.setattr(sampled, "sample_joint", sample)
 

@@ -107,6 +107,7 @@ def test_the_table_in_the_terminal_fits_80_columns_and_says_where_the_report_lie
     assert "Report: run/report.html" in said.out
 
 
+@pytest.mark.slow
 def test_a_run_is_repeated_byte_for_byte_from_its_run_toml(paper_run, tmp_path):
     folder, _ = paper_run
     said = command("paper", "--config", folder / "run.toml", "--out", "again", folder=tmp_path)

@@ -8,6 +8,8 @@ import tomllib
 import numpy as np
 import pytest
 
+import tissuq as tq
+
 from .conftest import STRETCH, command
 
 MODULI_KPA = [40.0, 48.0, 52.0, 60.0, 75.0, 45.0]
@@ -52,13 +54,30 @@ def test_a_run_leaves_the_promised_files(population_run):
     found = {path.relative_to(folder / "run").as_posix() for path in (folder / "run").rglob("*") if path.is_file()}
     inputs = {f"input/S{k}.csv" for k in range(5)} | {"input/S5/first.csv", "input/S5/second.csv"}
     figures = {f"figures/{name}.{kind}" for name in ("specimens", "new_patient") for kind in ("svg", "png")}
-    tables = {"data.csv", "population.csv", "specimens.csv", "new_patient.csv", "population.nc"}
+    tables = {
+        "data.csv",
+        "population.csv",
+        "specimens.csv",
+        "new_patient.csv",
+        "population.nc",
+        "posterior/new-patient.nc",
+    }
     assert found == inputs | figures | tables | {"report.html", "run.toml", "contents.txt"}
     assert "A population of 6 specimens" in said.out
-    assert "is no range of patients" in said.out
+    assert "does not describe the range of patients" in said.out
     page = (folder / "run" / "report.html").read_text()
     assert all(f"<td>S{k}</td>" in page for k in range(6))
     assert "kPa" in page
+
+
+def test_predictions_and_cards_start_from_a_new_patient(population_run):
+    folder, _ = population_run
+    row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
+    patient = tq.load(folder / "run")
+    assert float(patient.summary().loc["C10", "median"]) == pytest.approx(float(row["median"]), rel=0.02)
+    for arguments in (["predict", "run", "--mode", "planar", "--points", 3, "--no-figures"], ["export", "run"]):
+        said = command(*arguments, folder=folder)
+        assert said.status == 0, said.err
 
 
 def test_the_numbers_are_those_of_the_specimens(population_run):
@@ -73,6 +92,7 @@ def test_the_numbers_are_those_of_the_specimens(population_run):
     assert len(table(folder / "run" / "data.csv")) == 7 * len(STRETCH)
 
 
+@pytest.mark.slow
 def test_a_run_is_repeated_from_its_own_folder_and_from_one_file(population_run):
     folder, _ = population_run
     expected = (folder / "run" / "population.csv").read_bytes()
@@ -98,7 +118,7 @@ def test_specimens_may_be_tested_in_several_modes(cli, here):
         (here / "all" / f"S{k}" / "planar.csv").write_text("\n".join(["stretch,stress_kPa", *lines]) + "\n")
     lines = ["# mode: planar", "stretch,stress_kPa", *(f"{a},{100 * (a - a**-3):.3f}" for a in STRETCH)]
     (here / "all" / "S3.csv").write_text("\n".join(lines) + "\n")
-    said = cli("population", "all", *OPTIONS, "--out", "run")
+    said = cli("population", "all", *OPTIONS, "--no-figures", "--out", "run")
     assert said.status == 0, said.err
     assert {row["mode"] for row in table(here / "run" / "data.csv")} == {"uniaxial", "planar"}
     assert {row["mode"] for row in table(here / "run" / "new_patient.csv")} == {"uniaxial", "planar"}
@@ -109,7 +129,7 @@ def test_specimens_may_be_tested_in_several_modes(cli, here):
     assert (here / "again" / "population.csv").read_bytes() == (here / "run" / "population.csv").read_bytes()
 
 
-def test_doubts_about_files_are_told_with_their_specimens(cli, here):
+def test_warnings_about_files_are_shown_with_their_specimens(cli, here):
     for k, modulus in enumerate(MODULI_KPA[:3]):
         unit = "" if k else "_kPa"
         (here / f"S{k}.csv").write_text("\n".join([f"stretch,stress{unit}", *rows_of(modulus, k)]) + "\n")
@@ -124,7 +144,7 @@ def test_doubts_about_files_are_told_with_their_specimens(cli, here):
         ([], "give the FILES"),
         (["nowhere.csv"], "there is no such file"),
         (["specimens/S0.csv", "specimens/S1.csv"], "needs 3 specimens or more; there are 2 (S0, S1)"),
-        (["specimens", "--specimen", "who"], "a column names the specimens of one file"),
+        (["specimens", "--specimen", "who"], "--specimen names a column of a single file"),
         (["specimens", "--parameter", "C99"], "found: C99"),
         (["specimens", "--spread", "-1"], "spread"),
         (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),

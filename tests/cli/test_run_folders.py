@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import subprocess
 import sys
 
@@ -47,7 +48,7 @@ def test_a_folder_of_other_files_is_never_touched(cli, here, specimen, command, 
     options = [specimen, *ALONE] if command == "fit" else ["--no-figures"]
     said = cli(command, *options, "--out", "mine", *force)
     assert said.status == 2
-    assert "folder 'mine' holds files that are not a run" in said.err
+    assert "folder 'mine' contains files that are not a run" in said.err
     assert tree(here) == before
 
 
@@ -68,8 +69,8 @@ def test_files_that_someone_put_into_a_run_folder_are_not_deleted_by_force(cli, 
     ("out", "words"),
     [
         ("specimen.csv", ["'specimen.csv' is a file", "--out"]),
-        ("specimen.csv/run", ["'specimen.csv/run' cannot be made", "is a file", "--out"]),
-        (".", ["'.' is the folder you are in", "--out"]),
+        ("specimen.csv/run", ["'specimen.csv/run' cannot be created", "is a file", "--out"]),
+        (".", ["'.' is the current folder", "--out"]),
         ("/proc/no/run", ["'/proc/no/run'", "--out"]),
         ("deep/" + "a" * 300, ["aaa'", "too long", "--out"]),
         ("deep/" + "a" * 250, ["aaa'", "too long", "--out"]),
@@ -180,3 +181,36 @@ def test_a_run_is_repeated_into_its_own_folder_with_force(cli, here):
     assert cli("fit", "--config", "run/run.toml", "--no-figures", "--out", "run", "--force").status == 0
     copy = here / "run" / "input" / "rubber-treloar-uniaxial.csv"
     assert copy.read_bytes() == datasets.path("rubber-treloar-uniaxial").read_bytes()
+
+
+NESTED = b"[" * 100_000
+HUGE = b"9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        *((name, content) for name in ("summary.json", "assessment.json") for content in
+          (b"", b"\xff\xfe", b"null", b"[{}]", NESTED, HUGE, b'[{"formulation": 3, "C10_mean": [1]}]')),
+        *(("run.toml", content) for content in
+          (b"\xff\xfe", b"a = " + NESTED, b"a = " + HUGE, b"a.b" * 20_000 + b" = 1")),
+    ],
+)  # fmt: skip
+def test_a_damaged_file_of_a_run_is_one_message(cli, here, fit_run, name, content):
+    folder, _ = fit_run
+    shutil.copytree(folder, here / "run")
+    (here / "run" / name).write_bytes(content)
+    said = cli(*(("fit", "--config", "run/run.toml", "--out", "again") if name == "run.toml" else ("show", "run")))
+    assert said.status == 2
+    assert said.err.startswith("tissuq: ")
+    assert said.err.count("\n") == 1
+    assert any(word in said.err for word in ("damaged", "not TOML"))
+
+
+def test_a_list_of_contents_that_is_no_text_is_no_reason_to_replace_a_run(cli, here, specimen):
+    options = ("--discrepancy", "none", "--no-figures", "--out", "run")
+    assert cli("fit", specimen, *options).status == 0
+    (here / "run" / "contents.txt").write_bytes(b"\xff\xfe\n")
+    said = cli("fit", specimen, *options, "--force")
+    assert said.status == 2
+    assert "also contains files that do not belong to the run" in said.err

@@ -55,7 +55,7 @@ def test_a_folder_is_fitted_with_the_modes_that_files_or_names_say(cli, files, h
     page = (here / "runs" / "tests" / "report.html").read_text()
     assert "planar test, 5 measurements, stretch 1.05 to 1.4" in page
     assert "uniaxial test, 6 measurements, stretch 0.8 to 1.4" in page
-    assert "Whole tests may be off by (standard deviations) 0.18 of the stress" in page
+    assert "Errors of whole tests (standard deviations): 0.18 of the stress" in page
     with (here / "runs" / "tests" / "data.csv").open(newline="") as lines:
         assert [row["mode"] for row in csv.DictReader(lines)] == ["planar"] * 5 + ["uniaxial"] * 6
 
@@ -105,7 +105,7 @@ def test_tests_in_a_toml_file_have_their_own_options(cli, here):
 def test_every_test_is_predicted_from_the_others(cli, files, here):
     said = cli("fit", *files, *ALONE, "--noise-sd", "1.5", "--held-out", "--out", "run")
     assert said.status == 0, said.err
-    assert "Every test predicted from the others" in said.out
+    assert "Each test predicted from the others" in said.out
     parts = [tq.read_experiment(file, mode=mode) for file, mode in zip(files, ("planar", "uniaxial"), strict=True)]
     found = tq.held_out_tests(parts, discrepancy="none", noise_sd=1.5e-3)
     with (here / "run" / "held_out.csv").open(newline="") as lines:
@@ -113,8 +113,8 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
     assert [row["test"] for row in rows] == ["b", "uniaxial"]
     for name in ("inside", "beyond", "half_width", "error", "C10_median"):
         assert [float(row[name]) for row in rows] == pytest.approx(found[name].tolist(), rel=1e-9)
-    assert "Every test predicted from the others" in (here / "run" / "report.html").read_text()
-    assert "Every test predicted from the others" in cli("show", "run").out
+    assert "Each test predicted from the others" in (here / "run" / "report.html").read_text()
+    assert "Each test predicted from the others" in cli("show", "run").out
 
 
 @pytest.mark.parametrize(
@@ -127,11 +127,11 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
         ),
         (["tests/b.csv", "tests/uniaxial.csv", "--noise-sd", "1,2,3"], ["--noise-sd is given 3 times for 2 files"]),
         (["tests/b.csv", "--noise-sd", "1,2"], ["--noise-sd is given 2 times for one file"]),
-        (["tests/b.csv", "--tolerance", "stress"], ["'stress' is no tolerance; write stress=10%"]),
-        (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is no tolerance"]),
+        (["tests/b.csv", "--tolerance", "stress"], ["'stress' is not a tolerance; write stress=10%"]),
+        (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is not a tolerance"]),
         (["tests/b.csv", "--tolerance", "stress=1%", "--tolerance", "stress=2%"], ["given twice for 'stress'"]),
-        (["tests/b.csv", "--held-out"], ["held_out needs two tests or more"]),
-        (["empty"], ["folder 'empty' has no file of measurements"]),
+        (["tests/b.csv", "--held-out"], ["held_out needs two or more tests"]),
+        (["empty"], ["folder 'empty' has no files of measurements"]),
         (["tests", "--config", "x.toml"], ["give FILES or --config, not both"]),
     ],
 )
@@ -150,8 +150,8 @@ def test_what_cannot_be_used_is_said(cli, files, here, arguments, words):
     ("text", "words"),
     [
         ('file = "a.csv"\n[[tests]]\nfile = "b.csv"\n', "give one file, or several tests with a file each"),
-        ('mode = "planar"\n[[tests]]\nfile = "b.csv"\n', "said in each of the tests, not beside them (mode)"),
-        ('[[tests]]\nfile = "a.csv"\nnoise_sd = 1\n[[tests]]\nfile = "b.csv"\n', "noise_sd in each of the tests"),
+        ('mode = "planar"\n[[tests]]\nfile = "b.csv"\n', "belong in each of the tests, not beside them (mode)"),
+        ('[[tests]]\nfile = "a.csv"\nnoise_sd = 1\n[[tests]]\nfile = "b.csv"\n', "noise_sd for each of the tests"),
     ],
 )
 def test_settings_that_contradict_each_other_are_refused(cli, here, text, words):

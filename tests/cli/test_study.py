@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from tissuq.cli.options import _duration
-from tissuq.studies.coverage import PRESETS
+from tissuq.validation.coverage import PRESETS
 
 CAMPAIGN = """
 designs = [{ low = 0.7, high = 2.0, points = 9, noise_sd = 0.1 }]

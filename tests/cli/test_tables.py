@@ -19,3 +19,9 @@ def test_a_title_stands_above_a_table_whose_numbers_end_in_one_column(capsys):
     assert lines[0].strip() == "A title"
     one, two = (next(line for line in lines if name in line) for name in ("one", "two"))
     assert one.rindex("1.0") + len("1.0") == two.rindex("100.0") + len("100.0")
+
+
+def test_brackets_and_colons_in_a_name_are_shown_as_they_are(capsys):
+    print_rows("[red]x.csv", ["[b]name", "C10"], [["[blue]a :smile:", "1.0"]])
+    shown = capsys.readouterr().out
+    assert all(text in shown for text in ("[red]x.csv", "[b]name", "[blue]a :smile:"))

@@ -6,9 +6,9 @@ import pytest
 from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden, runs_at
 from tissuq.emulation import ForwardRuns, emulate
 from tissuq.emulation.basis import basis_of, output_moments
-from tissuq.emulation.design import space_filling
+from tissuq.emulation.run_plan import space_filling
 from tissuq.errors import InputError, ModelError
-from tissuq.priors import LogNormal, LogUniform, Normal, Uniform
+from tissuq.parameters.priors import LogNormal, LogUniform, Normal, Uniform
 
 
 def elsewhere(function, priors, count=200):
@@ -56,7 +56,7 @@ def test_what_the_directions_leave_out_is_part_of_the_error():
     basis = basis_of(outputs)
     assert basis.directions.shape == (5, 1)
     rest = basis.residuals(outputs)
-    np.testing.assert_allclose(basis.left_out, rest.T @ rest / 11, atol=1e-18)
+    np.testing.assert_allclose(basis.truncated, rest.T @ rest / 11, atol=1e-18)
 
 
 def test_moments_of_logarithms_are_those_of_a_log_normal():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tissuq.emulation.kriging import NUGGET, Kriging, _log_posterior, fitted, left_out, moments
+from tissuq.emulation.kriging import NUGGET_BOUNDS, Kriging, _log_posterior, fitted, leave_one_out, moments
 
 
 def dense(kernel, one, other, lengths):
@@ -54,7 +54,7 @@ def test_predictions_are_those_of_the_textbook(kernel):
 @pytest.mark.parametrize("kernel", ["squared-exponential", "matern-5/2"])
 def test_a_run_left_out_is_predicted_as_if_it_had_never_been_made(kernel):
     model, values = case(kernel)
-    error, sd = left_out(model)
+    error, sd = leave_one_out(model)
     for k in range(len(values)):
         others = np.arange(len(values)) != k
         less = Kriging(model.points[others], values[others, None], model.weights, model.lengths, model.nugget, 0.0,
@@ -83,7 +83,7 @@ def test_length_scales_follow_the_function_and_the_weights_are_a_distribution():
     best = found.lengths[0, 0]
     assert best[0] < 0.6 < 2 < best[1]
     assert found.weights.sum() == pytest.approx(1)
-    assert NUGGET[0] <= found.nugget[0] < 1e-6
+    assert NUGGET_BOUNDS[0] <= found.nugget[0] < 1e-6
 
 
 def test_noise_of_a_solver_is_found_in_the_nugget():
@@ -91,5 +91,5 @@ def test_noise_of_a_solver_is_found_in_the_nugget():
     points = generator.random((40, 1))
     values = np.sin(3 * points) + 0.02 * generator.standard_normal((40, 1))
     model = fitted(points, values, "squared-exponential", "linear")
-    variance = float(model.weights[0] @ [part.variance for part in model.parts[0]])
+    variance = float(model.weights[0] @ [terms.variance for terms in model.terms[0]])
     assert np.sqrt(model.nugget[0] * variance) == pytest.approx(0.02, rel=0.5)

@@ -9,12 +9,12 @@ from scipy.stats import binom, multivariate_normal, norm
 
 import tissuq as tq
 from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden
-from tissuq.discrepancy import PinnedProcess
 from tissuq.emulation import emulate
 from tissuq.emulation.likelihood import Likelihood
 from tissuq.emulation.problem import pose
-from tissuq.emulation.sampling import sampled
+from tissuq.emulation.sampling import sample_posterior
 from tissuq.errors import InputError, ModelError
+from tissuq.model.discrepancy import PinnedProcess
 
 TRUTH = {"mu": 1.5, "alpha": -9.0}
 
@@ -78,11 +78,12 @@ def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     assert found.log_evidence == pytest.approx(np.log(weights.sum() * cell) + logs.max(), abs=0.02)
 
 
+@pytest.mark.slow
 def test_importance_sampling_and_nuts_agree():
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)
     problem = pose(DEPTH, data, {"C10": tq.Uniform(0.2, 5.0)})
     likelihood = Likelihood(problem, emulate(designed(neo_hooke, problem.forward_priors, 8), DEPTH))
-    one, other = (sampled(likelihood, 0, method) for method in ("importance", "nuts"))
+    one, other = (sample_posterior(likelihood, 0, method) for method in ("importance", "nuts"))
     assert one.converged
     assert other.converged
     for symbol in ("C10", "noise_sd"):
@@ -101,16 +102,17 @@ def test_the_discrepancy_is_conditioned_on_the_data():
     values = found.draws(200)
     mean, variance = found.likelihood.predictions(values, discrepancy=True, noise=False)
     C10, c, psi = values[17]
-    process = PinnedProcess(reference=0.0).correlation(DEPTH, DEPTH, {"c": c, "psi": psi}) * c**2
+    process = PinnedProcess(references=(0.0,)).kernel(0, DEPTH, DEPTH, {"c": c, "psi": psi}) * c**2
     gain = process @ np.linalg.inv(process + 0.01**2 * np.eye(len(DEPTH)))
     model = neo_hooke({"C10": C10})
     np.testing.assert_allclose(mean[17], model + gain @ (wrong - model), atol=1e-4)
     np.testing.assert_allclose(variance[17], np.diag(process - gain @ process), atol=1e-6)
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emulator_knows_why():
+@pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.statistical)])
+def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emulator_knows_why(count):
     """Truths from the prior, an emulator of seven runs each: a correct 95 % fails this once in 1e4."""
-    generator, inside, exact, count = np.random.default_rng(11), [], [], 20
+    generator, inside, exact = np.random.default_rng(11), [], []
     for number in range(count):
         truth = {symbol: float(prior.quantile(generator.random())) for symbol, prior in OGDEN.items()}
         emulator = emulate(designed(ogden, OGDEN, 7, seed=number), DEPTH)
@@ -125,6 +127,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emu
     assert sum(exact) < least
 
 
+@pytest.mark.slow
 def test_further_runs_are_made_where_the_posterior_is_until_the_emulator_is_good_enough():
     data = measured(ogden, TRUTH, 0.02)
     few = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.02, runs=8)
@@ -198,7 +201,7 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     assert any("emulator's error is large beside the noise" in text for text in poor.warnings)
     narrow = {"mu": tq.Uniform(0.2, 1.4), "alpha": tq.Uniform(-25.0, -1.0)}
     found = tq.calibrate(DEPTH, data, ogden, narrow, noise_sd=0.02, runs=16)
-    assert any("reaches the end of what was simulated for mu (upper)" in text for text in found.warnings)
+    assert any("reaches the end of the simulated range of mu (upper)" in text for text in found.warnings)
 
 
 def test_measurements_are_simulated_together():
@@ -236,17 +239,17 @@ def test_a_saved_calibration_is_read_by_xarray(tmp_path):
     ("changes", "words"),
     [
         ({"control": DEPTH[:4]}, "4 controls and 15 measured"),
-        ({"measured": np.zeros_like(DEPTH)}, "measured is zero"),
+        ({"measured": np.zeros_like(DEPTH)}, "measured values are zero"),
         ({"measured": [1.0, np.nan] * 8, "control": np.arange(16)}, "measured is nan"),
         ({"priors": {}}, "give a prior for every parameter"),
         ({"priors": {"C10": tq.Flat()}}, "flat and improper"),
         ({"priors": {"C10": 3.0}}, "must be a prior"),
         ({"noise_sd": -1.0}, "noise_sd must be a positive number"),
-        ({"discrepancy": "auto"}, "'auto' cannot stand beside a forward model"),
+        ({"discrepancy": "auto"}, "'auto' cannot be used with a forward model"),
         ({"forward": 3}, "must be a function"),
         ({"forward": lambda parameters: [1.0, 2.0]}, r"shape \(2,\); there are 15 measurements"),
         ({"forward": lambda parameters: "words"}, "no array of numbers"),
-        ({"runs": 3}, "needs 6 runs or more, and 3 are asked for"),
+        ({"runs": 3}, "needs 6 runs or more, and 3 are requested"),
         ({"rnus": 3}, "no option 'rnus'"),
         ({"refine": -1}, "further runs"),
         ({"workers": 2, "forward": lambda parameters: DEPTH}, "cannot be sent to other processes"),

@@ -12,7 +12,7 @@ from tissuq.emulation.forward import CallableForward, as_forward
 from tissuq.emulation.problem import pose
 from tissuq.emulation.runs import ForwardRun, carry_out
 from tissuq.errors import InputError
-from tissuq.studies.forward_runs import runs_of
+from tissuq.studies.calibrate import runs_of
 
 PRIORS = {"C10": tq.Uniform(0.2, 5.0)}
 PROBLEM = pose(DEPTH, neo_hooke({"C10": 1.0}), PRIORS)
@@ -96,15 +96,15 @@ def runs_with(points, failed):
 def test_the_region_of_failure_is_told():
     points = np.random.default_rng(0).random((30, 2))
     beyond = points[:, 1] > 0.7
-    text = runs_with(points, beyond).told_failures
+    text = runs_with(points, beyond).failure_summary
     assert f"{beyond.sum()} of 30 runs of the forward model failed" in text
     assert f"all those with b from {points[beyond, 1].min():.4g} and none below {points[~beyond, 1].max():.4g}" in text
     assert "it broke" in text
     below = points[:, 0] < 0.3
-    assert "all those with a up to" in runs_with(points, below).told_failures
+    assert "all those with a up to" in runs_with(points, below).failure_summary
     corner = (points > 0.5).all(axis=1)
-    assert f"(where {0} others did not)" in runs_with(points, corner).told_failures
-    assert runs_with(points, np.zeros(30, bool)).told_failures == ""
+    assert f"(where {0} others did not)" in runs_with(points, corner).failure_summary
+    assert runs_with(points, np.zeros(30, bool)).failure_summary == ""
 
 
 def test_runs_are_kept_and_not_made_again_but_failed_ones_are(tmp_path):
@@ -178,7 +178,7 @@ def test_failed_runs_are_told_in_the_result():
     assert found.runs.failed.sum() == (found.runs.points[:, 0] > 3.5).sum() > 0
     text = " ".join(found.warnings)
     assert "all those with C10 from" in text
-    assert "the solver has not converged. The posterior keeps away from them." in text
+    assert "the solver has not converged. The posterior is not near them." in text
     near = neo_hooke({"C10": 3.49}) + 0.05 * np.random.default_rng(0).standard_normal(len(DEPTH))
     found = tq.calibrate(DEPTH, near, fragile, PRIORS, noise_sd=0.5, runs=16)
-    assert "the emulator is a guess" in " ".join(found.warnings)
+    assert "the emulator is unreliable" in " ".join(found.warnings)

@@ -4,8 +4,8 @@ import pytest
 from machine_files import cycles as made
 from machine_files import neo_hookean
 from tissuq.errors import InputError
-from tissuq.experiments.cycles import find_cycles
-from tissuq.experiments.reading import read_experiment, read_file
+from tissuq.experiments.reading.cycles import find_cycles
+from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_one_row_is_one_cycle():
 
 
 def _table():
-    from tissuq.experiments.table import Table
+    from tissuq.experiments.reading.table import Table
 
     return Table("none", ("stretch", "stress"), ("", ""), ",", ["1.1,0.5"], [1])
 

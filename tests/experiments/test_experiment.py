@@ -1,4 +1,4 @@
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_an_experiment_does_not_follow_changes_of_the_array_it_was_made_from():
 
 
 def test_a_copy_with_another_name_keeps_the_values():
-    data = replace(Experiment("uniaxial", [1.1], [0.1], stress_unit="kPa"), name="other")
+    data = Experiment("uniaxial", [1.1], [0.1], stress_unit="kPa").labelled(name="other")
     assert (data.name, data.stress[0], data.stress_unit) == ("other", 0.1, "kPa")
 
 

@@ -3,7 +3,7 @@ import pytest
 
 import tissuq as tq
 from machine_files import biotester, cycles, instron, neo_hookean, wintest
-from tissuq.experiments.inspection import noise_between_neighbours
+from tissuq.experiments.reading.inspection import noise_between_neighbours
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.experiments import table
+from tissuq.experiments.reading import table
 
 ROWS = table.LONG + 500
 

@@ -7,7 +7,7 @@ import pytest
 
 from machine_files import LAYOUTS, biotester, instron, instron_compression, univert, wintest, zwick
 from tissuq.errors import InputError
-from tissuq.experiments.reading import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 
 
 def message(path, **options):
@@ -156,6 +156,15 @@ def test_a_biaxial_files_other_axis_has_its_own_length(tmp_path):
     reading = read_file(biotester().written(tmp_path), axis="y", mode="equibiaxial", dimensions=section)
     assert "5.1 mm (length from column 'YSize_um' less the displacement)" in reading.used.steps[0]
     assert [cycle.label for cycle in reading.cycles] == ["Precondition 1", "Precondition 2", "Test 1 1"]
+
+
+def test_the_length_is_the_size_less_the_displacement_at_the_first_row(tmp_path):
+    """A record that begins 0.5 mm after the reference, at a size of 10.5 mm."""
+    path = tmp_path / "univertData.csv"
+    path.write_text("Time_S,Size_mm,Displacement_mm,Force_N\n0,10.5,0.5,1\n1,11,1,2\n2,12,2,4\n")
+    data = read_experiment(path, dimensions={"area": "2 mm2"})
+    np.testing.assert_allclose(data.stretch, [1.05, 1.1, 1.2])
+    np.testing.assert_allclose(data.stress, [0.5, 1.0, 2.0])
 
 
 def test_a_size_that_is_not_needed_is_not_used(tmp_path):

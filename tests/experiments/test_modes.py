@@ -29,9 +29,9 @@ def test_every_mode_is_undeformed_at_its_reference(mode):
 
 
 def test_every_mode_has_a_path_for_each_stress_at_its_own_states(mode):
-    assert len(mode.channels) == len(mode.stresses)
+    assert len(mode.paths) == len(mode.stresses)
     points = mode.excursion([-0.3, 0.2, 0.6])
-    for path in mode.channels:
+    for path in mode.paths:
         np.testing.assert_array_equal(path.abscissa(points).shape, (3,))
         states = path.moved(points, 0.0).stretches, mode.principal_stretches(points)
         found, own = (np.sort(np.broadcast_arrays(*state), axis=0) for state in states)
@@ -93,13 +93,13 @@ def test_the_stresses_of_a_tube_are_in_equilibrium_with_pressure_and_force():
     r, h = radius * hoop, thickness / (hoop * axial)
     expected = pressure * r / h, (force + pressure * np.pi * r**2) / (2 * np.pi * r * h)
     stress = ThinTube.engineering_stresses(PAIRS, pressure, force, radius, thickness)
-    for path, own, cauchy in zip(ThinTube().channels, stress.T, expected, strict=True):
+    for path, own, cauchy in zip(ThinTube().paths, stress.T, expected, strict=True):
         np.testing.assert_allclose(own * path.cauchy_ratio(PAIRS), cauchy, rtol=1e-14)
 
 
 def test_a_mode_with_several_stresses_has_no_single_path():
-    with pytest.raises(ModelError, match=r"'biaxial' measures engineering stress of axis 1 and .* one of its channels"):
-        loading_mode("biaxial").moved(PAIRS, 0.0)
+    with pytest.raises(ModelError, match=r"'biaxial' measures engineering stress of axis 1 and .* one of its paths"):
+        loading_mode("biaxial").at(PAIRS)
 
 
 def test_every_mode_says_what_it_is(mode):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading import read_experiment, read_file
+from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 
 LENGTH, SLACK, STIFFNESS = 20.0, 1.5, 0.4
 SPECIMEN = {"length": "20 mm", "area": "2 mm2"}

@@ -9,7 +9,8 @@ import pytest
 
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from tissuq.experiments.reading import read_experiment, read_file
+from tissuq.experiments.reading import workbook
+from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
 
@@ -105,3 +106,24 @@ def test_percentages_of_excel_are_asked_about_because_their_values_are_not_what_
 def test_without_openpyxl_it_is_said_what_to_install(book, monkeypatch):
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     assert "reading it needs openpyxl: pip install 'tissuq[excel]'" in message(book, sheet=1)
+
+
+def test_a_stray_cell_in_the_last_column_does_not_make_every_row_that_long(tmp_path, monkeypatch):
+    book = openpyxl.Workbook()
+    stretch = specimen_sheet(book.active)
+    book.active["XFD1"] = "x"
+    book.save(tmp_path / "stray.xlsx")
+    cells = []
+    text = workbook._text
+    monkeypatch.setattr(workbook, "_text", lambda cell: cells.append(cell) or text(cell))
+    found = read_experiment(tmp_path / "stray.xlsx")
+    np.testing.assert_allclose(found.stretch, stretch, rtol=1e-12)
+    assert len(cells) < 16_384 + 4 * (len(stretch) + 6)
+
+
+def test_a_stray_cell_beside_the_data_is_told(tmp_path):
+    book = openpyxl.Workbook()
+    specimen_sheet(book.active)
+    book.active["XFD10"] = 7
+    book.save(tmp_path / "stray.xlsx")
+    assert "line 10 has 16384 cells" in message(tmp_path / "stray.xlsx")

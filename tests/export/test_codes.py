@@ -80,8 +80,16 @@ def test_a_law_that_the_code_has_is_written_exactly(given, code, parts, keyword)
     cards = card_format(code).cards(ensemble, CardSettings())
     assert [READERS[code](text).law for text in cards.files.values()] == [keyword] * 2
     assert relative_errors(ensemble, cards, code).max() < 1e-8
-    assert "exactly" in cards.notes[0]
+    assert "exactly" in cards.warnings[0]
     assert all(row["error_states_max"] < 1e-8 for row in cards.index)
+
+
+def test_the_bulk_modulus_of_a_mixture_is_the_sum_of_its_solids(given):
+    ensemble = given([("rivlin:C10,C20+ogden-2", [0.4, 0.05, 0.1, 1.3, 0.05, 5.0])])
+    cards = card_format("febio").cards(ensemble, CardSettings(law="mixture", bulk_modulus=700.0))
+    (read,) = map(READERS["febio"], cards.files.values())
+    assert read.law == "uncoupled solid mixture"
+    assert read.bulk == pytest.approx(700, rel=1e-6)
 
 
 @pytest.mark.parametrize(("code", "name"), [("abaqus", "van-der-waals"), ("ansys", "gent")])
@@ -124,7 +132,7 @@ def test_the_bulk_modulus_is_that_of_all_draws_or_follows_from_poissons_ratio(gi
 def test_a_law_that_no_code_has_is_never_called_exact(given, code, name):
     values = {"demiray": [1.0, 0.5], "arruda-boyce": [1.0, 30.0], "hencky": [1.0]}.get(name, [0.5, 30.0, 0.1, 0.1])
     cards = card_format(code).cards(given([(name, values)]), CardSettings())
-    assert "nearest" in cards.notes[0]
+    assert "nearest" in cards.warnings[0]
     (text,) = cards.files.values()
     assert "PROJECTION" in text
 
@@ -176,7 +184,7 @@ def test_a_draw_without_stiffness_has_no_bulk_modulus_by_poissons_ratio(given):
         ({"bulk_modulus": 1.0, "poisson": 0.4}, "not both"),
         ({"bulk_modulus": 0.0}, "must be positive"),
         ({"poisson": 0.5}, "between 0 and 0.5"),
-        ({"order": 3}, "name the law"),
+        ({"order": 3}, "give the law"),
         ({"name": "my tissue"}, "cannot name a material"),
     ],
 )

@@ -123,9 +123,9 @@ def test_a_card_that_is_not_stable_is_told(given):
     ensemble = given([("ogden-1", [1.0, -9.0])], [("ogden-1", [1.0, 2.0])])
     cards = card_format("abaqus").cards(ensemble, CardSettings(law="reduced-polynomial", order=2))
     assert [row["card_is_stable"] for row in cards.index] == [False, True]
-    assert any("NOT stable" in note and "draws 1." in note for note in cards.notes)
-    assert "CAUTION" in cards.files["draw-1.inp"]
-    assert "CAUTION" not in cards.files["draw-2.inp"]
+    assert any("draws 1 are NOT stable" in warning for warning in cards.warnings)
+    assert "WARNING" in cards.files["draw-1.inp"]
+    assert "WARNING" not in cards.files["draw-2.inp"]
 
 
 def test_orders_name_the_coefficients_as_fe_codes_do():

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.export.states import ANGLES, POINTS, SeenStates, are_stable, differences, moduli
+from tissuq.export.states import ANGLES, POINTS_PER_PATH, SeenStates, are_stable, differences, moduli
 
 
 def test_states_keep_the_volume_and_end_where_an_invariant_was_largest(auto):
     states = SeenStates(auto.most)
-    count = len(ANGLES) * POINTS
+    count = len(ANGLES) * POINTS_PER_PATH
     stretches = states.base[:, :count]
     assert stretches.prod(axis=0) == pytest.approx(np.ones(count))
     first, second = (stretches**2).sum(axis=0) - 3, (stretches**-2).sum(axis=0) - 3
-    ends = np.arange(POINTS - 1, count, POINTS)
+    ends = np.arange(POINTS_PER_PATH - 1, count, POINTS_PER_PATH)
     reached = np.maximum(first / auto.most[0], second / auto.most[1])
     assert reached[ends] == pytest.approx(np.ones(len(ends)), abs=1e-9)
     assert reached.max() <= 1 + 1e-9
@@ -31,7 +31,7 @@ def test_stresses_are_rivlins_differences(given):
     """t_i - t_j = 2 (l_i^2 - l_j^2) (W1 + l_k^2 W2)."""
     ensemble = given([("mooney-rivlin", [0.3, 0.2])])
     states = SeenStates(ensemble.most)
-    one, two, three = states.base[:, : len(ANGLES) * POINTS] ** 2
+    one, two, three = states.base[:, : len(ANGLES) * POINTS_PER_PATH] ** 2
     first, second, third = (0.3 + 0.2 * each for each in (one, two, three))
     wanted = 2 * np.concatenate([(one - two) * third, (one - three) * second, (two - three) * first])
     (found,) = ensemble.stress(states, states.points)

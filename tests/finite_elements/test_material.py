@@ -9,9 +9,9 @@ from scipy.stats import ortho_group
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements import FElupeMaterial
-from tissuq.finite_elements.distortional import distortional_energy
+from tissuq.finite_elements.material import distortional_energy
 from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus, material_named
-from tissuq.parameters import Parameter
+from tissuq.parameters.parameter import Parameter
 
 BULK = 3.0
 LAWS = {
@@ -132,7 +132,7 @@ def test_the_initial_shear_modulus_is_that_of_the_material(draws):
 @pytest.mark.parametrize("mode", ["uniaxial", "equibiaxial", "planar"])
 def test_a_draw_has_the_engineering_stress_that_its_ensemble_says(draws, mode):
     path, stretch = loading_mode(mode), np.array([0.9, 1.1, 1.15])
-    F = np.array([[np.diag([float(each) for each in path.moved(at, 0.0).stretches])] for at in stretch])[:, 0]
+    F = np.array([[np.diag([float(each) for each in path.deformation(at).stretches])] for at in stretch])[:, 0]
     for number, draw in enumerate(draws):
         P = FElupeMaterial(draw).gradient([F.transpose(1, 2, 0), None])[0]
         free = P[2, 2] * F[:, 2, 2] / F[:, 0, 0]  # the pressure that keeps the third axis free

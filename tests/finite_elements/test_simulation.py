@@ -9,9 +9,9 @@ import pytest
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements import ClampedBar, Indentation, bar_force, respond, simulate
-from tissuq.finite_elements.cautions import simulation_warnings
-from tissuq.finite_elements.optional import felupe
-from tissuq.finite_elements.tasks import Solve, each_in_turn, solved
+from tissuq.finite_elements.solver import felupe
+from tissuq.finite_elements.tasks import Solve, run_in_turn, solved
+from tissuq.finite_elements.warnings import simulation_warnings
 from tissuq.mechanics import material_named
 
 pytest.importorskip("felupe", reason="FElupe is not installed")
@@ -40,7 +40,7 @@ def test_materials_that_differ_by_a_factor_are_computed_once(posterior, without)
 
     def counted(given):
         tasks.extend(given)
-        return each_in_turn(given)
+        return run_in_turn(given)
 
     simulate(posterior, BAR, draws=3, without=without, steps=1, check_mesh=False, run=counted)
     assert len(tasks) == 3 + 1  # the neo-Hookean ones, alone and without, are one
@@ -93,11 +93,11 @@ def test_a_posterior_without_discrepancy_has_one_family(without):
 
 def ended_early(tasks):
     """Carry tasks out, and let the second draw with discrepancy end at the first step."""
-    results = list(each_in_turn(tasks))
+    results = list(run_in_turn(tasks))
     place = [task.draw.number for task in tasks].index(1)
     whole = results[place]
     results[place] = whole | {
-        "force": [whole["force"][0], None], "beyond": [0.0, None], "energy_beyond": [0.0, None], "reached": 0.6,
+        "force": [whole["force"][0], None], "volume_beyond": [0.0, None], "energy_beyond": [0.0, None], "reached": 0.6,
         "problem": "cells turned inside out",
     }  # fmt: skip
     return results
@@ -116,11 +116,11 @@ def test_a_draw_that_ends_early_is_listed_and_counted_and_its_steps_are_kept(pos
 def test_a_reader_is_warned_of_strains_beyond_the_measurements_and_of_few_draws(found):
     texts = " ".join(simulation_warnings(replace(found, energy_beyond=np.full((4, 2), 0.4))))
     assert "with 40 % of the strain energy, is strained beyond what was measured" in texts
-    assert "4 draws are too few for a band of 95 %: it is their range, which holds 60 %" in texts
+    assert "4 draws are too few for a 95 % band: the band is their range, a 60 % band" in texts
     assert "compensate" in " ".join(
         simulation_warnings(replace(found, forces=found.forces | {"alone": -found.forces["complete"]}))
     )
-    assert "is coarse" in " ".join(simulation_warnings(replace(found, mesh_change=(-0.2, 1.0))))
+    assert "too coarse" in " ".join(simulation_warnings(replace(found, mesh_change=(-0.2, 1.0))))
 
 
 def test_it_fails_when_no_draw_gets_anywhere(posterior):
@@ -128,7 +128,7 @@ def test_it_fails_when_no_draw_gets_anywhere(posterior):
         nothing = {"force": [None], "reached": 0.0, "problem": "it is stuck", "seconds": 0.0}
         return [nothing for _ in tasks]
 
-    with pytest.raises(ConvergenceError, match=r"hardly any got to the first elongation of 1 mm \(it is stuck\)"):
+    with pytest.raises(ConvergenceError, match=r"fewer than 2 reached the first elongation of 1 mm \(it is stuck\)"):
         simulate(posterior, BAR, 3, steps=1, check_mesh=False, run=nowhere)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tissuq.errors import InputError
-from tissuq.finite_elements.spread import band_of, held_probability, shares_of, standard_errors
+from tissuq.finite_elements.spread import band_of, band_probability, shares_of, standard_errors
 
 GENERATOR = np.random.default_rng(0)
 
@@ -50,7 +50,7 @@ def test_a_band_holds_a_further_draw_as_often_as_it_says(count):
     draws = np.random.default_rng(count).standard_gamma(2.0, (count + 1, 2000))
     band = band_of(draws[1:])
     held = ((band.low <= draws[0]) & (draws[0] <= band.high)).mean()
-    expected = held_probability(count)
+    expected = band_probability(count)
     assert held == pytest.approx(expected, abs=3 * np.sqrt(expected * (1 - expected) / 2000))
 
 

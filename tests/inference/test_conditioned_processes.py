@@ -14,15 +14,15 @@ import conditioned as oracle
 import tissuq as tq
 from against import assert_agrees, neo_hookean, parts, uniform_priors
 from dense import Problem, columns
-from tissuq.discrepancy import discrepancy_named
 from tissuq.inference.densities import joint_density
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.lowrank import correlation_spectrum
-from tissuq.inference.solution import Components
 from tissuq.mechanics import NeoHookean
 from tissuq.mechanics.stress import differentiator
-from tissuq.model import StatisticalModel
+from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import stress_moments
-from tissuq.studies.coverage.truths import FAMILIES, draw_truth
+from tissuq.validation.coverage.truths import FAMILIES, draw_truth
 
 NAMES = ["gp-pinned", "gp-orthogonal", "gp-scaled"]
 STRETCH = np.linspace(0.7, 2.0, 11)
@@ -63,8 +63,8 @@ def test_predictions_are_those_of_dense_conditioning(name):
     new, values = np.array([0.5, 0.7, 1.0, 1.33, 2.0, 2.5]), {"C10": 1.1, "c": 0.8, "psi": 0.6}
     model = StatisticalModel(DATA, NeoHookean(), discrepancy_named(name), NOISE)
     settings = np.array([[values[symbol] for symbol in model.nonlinear]])
-    part = Components(np.ones(1), settings, np.array([[values["C10"]]]), np.zeros((1, 1, 1)))
-    mean, variance = stress_moments(model, part, new, discrepancy=True, noise=False)
+    part = GaussianMixture(np.ones(1), settings, np.array([[values["C10"]]]), np.zeros((1, 1, 1)))
+    mean, variance = stress_moments(model, part, model.experiment.states_at(new), discrepancy=True, noise=False)
     every = np.concatenate([STRETCH, new])
     K = values["c"] ** 2 * kernel(name, every, values["psi"])
     n = len(STRETCH)
@@ -80,10 +80,14 @@ def test_many_points_have_the_spectrum_of_the_whole_matrix(name, psi):
     points = np.linspace(*ENDS, 300)
     process = discrepancy_named(name).adapted_to(NeoHookean(), tq.Experiment("uniaxial", points, points))
     model = SimpleNamespace(
-        experiment=SimpleNamespace(stretch=points), discrepancy=process, is_repeated=False, is_joint=False
+        experiment=SimpleNamespace(states=DATA.mode.path.at(points, 0)),
+        discrepancy=process,
+        is_repeated=False,
+        whitening=None,
+        white=np.asarray,
     )
     found = correlation_spectrum(model, (psi,))
-    dense = process.correlation(points, points, {"psi": psi})
+    dense = process.kernel(0, points, points, {"psi": psi})
     np.testing.assert_allclose((found.vectors * found.values) @ found.vectors.T, dense, atol=1e-10)
 
 

@@ -8,8 +8,8 @@ from scipy.special import factorial
 from scipy.stats import halfcauchy
 
 import tissuq as tq
-from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import TissuqError
+from tissuq.model.discrepancy import discrepancy_named
 
 STRETCH = np.array([0.7, 0.8, 0.9, 0.95, 1.1, 1.2, 1.35, 1.5, 1.7, 1.9, 2.1, 2.4])
 X = STRETCH**2 + 2 / STRETCH - 3
@@ -303,7 +303,7 @@ UNUSUAL = {
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("noise", ["known", "unknown"])
+@pytest.mark.parametrize("noise", ["known", pytest.param("unknown", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", UNUSUAL)
 def test_unusual_data_give_finite_numbers_without_a_murmur(case, noise):
     stretch, sd = UNUSUAL[case]
@@ -329,13 +329,13 @@ def test_noise_that_is_far_too_small_is_told():
 @pytest.mark.parametrize(
     "prior",
     [
-        tq.Uniform(0.06, 0.061),
         tq.Uniform(0.01, 0.02),
-        tq.Uniform(0.0, 2.0),
         tq.LogNormal(0.01, 0.05),
-        tq.LogNormal(0.05, 0.02),
         tq.HalfCauchy(0.05),
-        tq.HalfNormal(0.01),
+        *(
+            pytest.param(each, marks=pytest.mark.slow)
+            for each in (tq.Uniform(0.06, 0.061), tq.Uniform(0, 2), tq.LogNormal(0.05, 0.02), tq.HalfNormal(0.01))
+        ),
     ],
     ids=str,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 import tissuq as tq
 from against import BOXES, NONLINEAR, assert_agrees, both, neo_hookean, parts
@@ -46,7 +47,10 @@ def test_a_bound_of_c10_reaches_the_marginals_of_the_others(wanted):
     assert abs(found.sd / sd - 1) <= 1e-3
 
 
-@pytest.mark.parametrize("discrepancy", ["constant", "mooney-rivlin", "linear", "yeoh"])
+@pytest.mark.parametrize(
+    "discrepancy",
+    ["constant", "mooney-rivlin", *(pytest.param(name, marks=pytest.mark.slow) for name in ("linear", "yeoh"))],
+)
 def test_noise_so_large_that_every_bound_cuts(discrepancy):
     stress = 1.2 * neo_hookean(STRETCH) + WAVE
     posterior, problem = both(discrepancy, STRETCH, stress, 50.0, *parts(discrepancy))
@@ -71,6 +75,31 @@ def test_two_parameters_that_must_be_positive(discrepancy, shift):
     assert_agrees(posterior, problem, refine=2)
 
 
+@pytest.mark.parametrize("shift", [0.01, -0.01])
+def test_three_parameters_that_must_be_positive_under_one_covariance(shift):
+    """Evidence and moments of a Gaussian in an octant, by SciPy and by its draws; the size of the error is known."""
+    boxes = {symbol: tq.Uniform(0, 5) for symbol in ("C10", "m0", "m1")} | {"S": tq.Uniform(0.01, 0.01 + 1e-9)}
+    stress = 0.5 * neo_hookean(SHORT) + shift + 0.3 * (SHORT - 1) ** 2 + ERRORS
+    data = tq.Experiment("uniaxial", SHORT, stress)
+    posterior = tq.fit(data, discrepancy="linear", noise_sd=0.02, priors=boxes, method="exact")
+    X, variance = np.column_stack([neo_hookean(SHORT), np.ones(14), SHORT]), 0.02**2 + 0.01**2
+    covariance = variance * np.linalg.inv(X.T @ X)
+    mean = covariance @ X.T @ stress / variance
+    misfit = stress - X @ mean
+    unbounded = -0.5 * misfit @ misfit / variance - 0.5 * (14 - 3) * np.log(2 * np.pi * variance)
+    unbounded += 0.5 * np.linalg.slogdet(covariance / variance)[1] - 3 * np.log(5)
+    inside = multivariate_normal(-mean, covariance, maxpts=3_000_000, abseps=1e-12, releps=1e-6).cdf(np.zeros(3))
+    assert posterior.log_evidence == pytest.approx(unbounded + np.log(inside), abs=2e-3)
+    drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, 4_000_000)
+    kept = drawn[(drawn > 0).all(axis=1)]
+    assert len(kept) > 2000
+    for symbol, own in zip(("C10", "m0", "m1"), kept.T, strict=True):
+        found, error = posterior.marginals[symbol], own.std() / np.sqrt(len(own))
+        assert abs(found.mean - own.mean()) < 5 * error
+        assert found.sd == pytest.approx(own.std(), rel=5 / np.sqrt(len(own)))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.01, -0.1])
 @pytest.mark.parametrize("discrepancy", ["linear", "yeoh"])
 def test_three_correlated_parameters_that_must_be_positive(discrepancy, shift):
@@ -79,6 +108,7 @@ def test_three_correlated_parameters_that_must_be_positive(discrepancy, shift):
     assert_agrees(posterior, problem, refine=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [-0.03, -0.3])
 def test_bounds_that_no_parameter_breaks_alone_but_all_do_together(shift):
     # m0 + m1 l must be positive and the data want it negative; m0 or m1 by itself may well be positive.

@@ -11,7 +11,7 @@ import tissuq as tq
 from against import TRUTH, columns_of
 from dense import columns
 from tissuq.inference.conditional import ConditionalGaussian
-from tissuq.model import StatisticalModel
+from tissuq.model.statistical_model import StatisticalModel
 
 STRETCH = np.linspace(0.6, 2.0, 500)
 

@@ -99,6 +99,7 @@ def test_two_terms():
     agrees("alpha2", posterior, truth)
 
 
+@pytest.mark.slow
 def test_exact_nuts_and_smc_agree_on_two_terms():
     # Five standard errors each for eight comparisons: false chance below 1e-5.
     data = tq.Experiment("uniaxial", STRETCH, stress())
@@ -116,10 +117,11 @@ def test_exact_nuts_and_smc_agree_on_two_terms():
         assert (np.abs(table["mean"] - reference["mean"]) < 5 * error).all()
 
 
+@pytest.mark.slow
 def test_three_terms_with_everything_unknown_go_to_nuts_with_an_evidence_by_smc(monkeypatch):
     from dataclasses import replace
 
-    from tissuq.inference import sampled
+    from tissuq.inference.enumerators import sampled
 
     few = {"SmcSettings": {"particles": 400, "max_sweeps": 2, "ess_fraction": 0.5}}
     few |= {"NutsSettings": {"warmup": 60, "draws": 30}}

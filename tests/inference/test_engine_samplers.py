@@ -8,8 +8,8 @@ import tissuq as tq
 from against import neo_hookean, uniform_priors
 from dense import Axis, Linear, integrate, problem_of
 from tissuq.inference.densities import given_density
-from tissuq.inference.sampled import _Given
-from tissuq.model import StatisticalModel
+from tissuq.inference.enumerators.sampled import _Given
+from tissuq.model.statistical_model import StatisticalModel
 
 
 def test_samplers_draw_the_linear_parameters_within_several_bounds():

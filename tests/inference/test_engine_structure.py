@@ -9,7 +9,7 @@ from scipy.stats import norm
 import tissuq as tq
 from against import BOXES, assert_agrees, both, neo_hookean, parts
 from dense import Linear
-from tissuq.model import StatisticalModel
+from tissuq.model.statistical_model import StatisticalModel
 
 STRETCH = np.linspace(0.7, 2.0, 12)
 DATA = tq.simulate("yeoh", {"C10": 1.2, "C20": -0.057, "C30": 0.004}, STRETCH, 0.1, seed=4)

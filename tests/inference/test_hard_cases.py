@@ -12,7 +12,9 @@ import tissuq as tq
 TRUTH = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
 
 
-@pytest.mark.parametrize("material", ["neo-hookean", "mooney-rivlin", "yeoh"])
+@pytest.mark.parametrize(
+    "material", ["neo-hookean", *(pytest.param(name, marks=pytest.mark.slow) for name in ("mooney-rivlin", "yeoh"))]
+)
 def test_a_process_with_unknown_noise_is_fitted_to_twelve_points(material):
     data = tq.simulate("yeoh", TRUTH, np.linspace(0.6, 2.5, 12), 0.02, seed=1)
     posterior = tq.fit(data, material=material, discrepancy="gp", method="exact")

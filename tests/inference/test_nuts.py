@@ -16,7 +16,7 @@ from scipy import stats
 from scipy.special import gammaln
 
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.inference.nuts import NutsDraws, NutsSettings, sample_nuts
+from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nuts
 
 ERRORS_ALLOWED = 5.0
 
@@ -36,6 +36,7 @@ def assert_reaches_the_bar(draws):
     assert draws.divergences == 0
 
 
+@pytest.mark.slow
 def test_a_correlated_normal_of_very_different_scales_is_recovered_in_a_wide_box():
     mean, sds = np.array([0.5, -20.0, 0.0, 5.0]), np.array([1e-3, 0.1, 1.0, 10.0])
     precision = np.linalg.inv(np.outer(sds, sds) * (0.2 * np.eye(4) + 0.8))
@@ -52,6 +53,7 @@ def test_a_correlated_normal_of_very_different_scales_is_recovered_in_a_wide_box
     assert np.abs(np.arctanh(correlation[0, 1:]) - np.arctanh(0.8)).max() < ERRORS_ALLOWED / np.sqrt(1000)
 
 
+@pytest.mark.slow
 def test_a_normal_pushed_against_its_bound_is_recovered():
     draws = sample_nuts(lambda x: -0.5 * ((x[0] + 1) / 0.5) ** 2, [0.0], [10.0], [5.0])
     exact = stats.truncnorm(2.0, 22.0, -1.0, 0.5)
@@ -59,6 +61,7 @@ def test_a_normal_pushed_against_its_bound_is_recovered():
     assert_moments(draws, exact.mean(), exact.std())
 
 
+@pytest.mark.slow
 def test_a_density_piled_up_at_zero_is_recovered():
     draws = sample_nuts(lambda x: -x[0] / 1e-3, [0.0], [10.0], [5.0])
     assert_reaches_the_bar(draws)
@@ -77,6 +80,7 @@ def test_half_bounded_and_free_coordinates_are_recovered():
     assert_moments(draws, [2.0 + 3.0, -3.0 - 0.5, 0.0], [np.sqrt(3.0), np.sqrt(0.05), 7.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.05, 1e-4])
 def test_a_stiff_polynomial_with_unknown_noise_reaches_the_bar(noise):
     count, terms = 30, 3
@@ -102,6 +106,7 @@ def test_a_stiff_polynomial_with_unknown_noise_reaches_the_bar(noise):
     assert_moments(draws, np.append(coefficients, mean_noise), np.sqrt(variances))
 
 
+@pytest.mark.slow
 def test_the_amplitude_and_length_of_a_gaussian_process_reach_the_bar():
     count, noise = 30, 0.02
     stretch = np.linspace(1.0, 2.0, count)
@@ -132,11 +137,12 @@ def test_the_amplitude_and_length_of_a_gaussian_process_reach_the_bar():
     assert_moments(draws, mean, np.sqrt((points - mean[:, None]) ** 2 @ mass))
 
 
-def test_two_far_modes_are_reported_as_not_converged():
-    def log_density(x):
-        return jnp.logaddexp(-50 * (x[0] + 5) ** 2, -50 * (x[0] - 5) ** 2)
+def two_modes(x):
+    return jnp.logaddexp(-50 * (x[0] + 5) ** 2, -50 * (x[0] - 5) ** 2)
 
-    draws = sample_nuts(log_density, [-10.0], [10.0], [1.0], names=["C10"])
+
+def test_two_far_modes_are_reported_as_not_converged():
+    draws = sample_nuts(two_modes, [-10.0], [10.0], [1.0], names=["C10"])
     assert not draws.converged
     assert draws.verdict.startswith("Not converged: R-hat is ")
     assert "for C10" in draws.verdict
@@ -144,15 +150,12 @@ def test_two_far_modes_are_reported_as_not_converged():
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
-    short = NutsSettings(warmup=50, draws=20)
-
-    def draw(seed):
-        return sample_nuts(lambda x: -0.5 * x @ x, [-9.0] * 2, [9.0] * 2, [1.0] * 2, replace(short, seed=seed))
-
-    first = draw(3).values
-    assert first.shape == (4, 20, 2)
-    assert np.array_equal(first, draw(3).values)
-    assert not np.array_equal(first, draw(4).values)
+    first, again, other = (
+        sample_nuts(two_modes, [-10.0], [10.0], [1.0], NutsSettings(seed=seed)).values for seed in (3, 3, 4)
+    )
+    assert first.shape == (4, 1000, 1)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
 
 
 def independent_draws(**changes):

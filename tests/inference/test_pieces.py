@@ -6,17 +6,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from scipy.stats import expon, multivariate_normal, norm, truncnorm
 
 import tissuq as tq
-from tissuq.discrepancy import Constant, GaussianProcess
-from tissuq.inference.bounds import bounded
+from tissuq.experiments.modes import Uniaxial
+from tissuq.inference.bounds import Bounded, bounded
 from tissuq.inference.box import Boxes
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.lowrank import correlation_spectrum
-from tissuq.inference.marginal import blended, marginal_of_mixture, marginal_of_points
-from tissuq.inference.solution import Components
+from tissuq.inference.marginal import HermiteCubics, blended, marginal_of_mixture, marginal_of_points
 from tissuq.mechanics import NeoHookean
-from tissuq.model import StatisticalModel
+from tissuq.model.discrepancy import Constant, GaussianProcess
+from tissuq.model.statistical_model import StatisticalModel
 
 ROOT = np.linalg.cholesky([[1.0, 0.6, 0.2], [0.6, 2.0, -0.3], [0.2, -0.3, 0.5]])
 
@@ -34,6 +36,18 @@ def test_the_mass_in_a_box_is_scipys():
     assert abs(log_mass - np.log(truth)) < error + 1e-6  # SciPy's own error is 1e-7
     assert box.beyond(np.zeros((1, 3)), ROOT[None]).sum() >= 1 - truth
     assert box.ceiling(np.zeros((1, 3)), ROOT[None])[0] >= np.log(truth)
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-4])
+def test_what_a_bound_cuts_counts_in_the_marginal_though_it_weighs_little(share):
+    """A Gaussian far from the bound, and half of one at it, whose mean is 100 sqrt(2 / pi)."""
+    free = GaussianMixture(np.array([1 - share]), np.zeros((1, 0)), np.array([[1000.0]]), np.array([[[1.0]]]))
+    cut = GaussianMixture(np.array([share]), np.zeros((1, 0)), np.array([[0.0]]), np.array([[[100.0]]]))
+    none = GaussianMixture(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((0, 1, 1)))
+    found = Bounded(free, {0: cut}, none, boxes([0.0], [np.inf])).marginal(0)
+    at_bound = 100 * np.sqrt(2 / np.pi)
+    assert found.mean == pytest.approx((1 - share) * 1000 + share * at_bound, rel=1e-7)
+    assert found.quantile(share / 2) < 500 < found.quantile(1.5 * share)
 
 
 def test_the_mass_far_in_the_tail_keeps_its_digits():
@@ -73,9 +87,12 @@ def test_points_in_a_box_have_the_moments_of_the_bounded_gaussian():
 
 def spectrum(points, psi):
     """The spectrum of a squared exponential at any points, also at fewer than a whole model accepts."""
-    measured = SimpleNamespace(stretch=points)
+    measured = SimpleNamespace(states=Uniaxial().path.at(points, 0))
     return correlation_spectrum(
-        SimpleNamespace(experiment=measured, discrepancy=GaussianProcess(), is_repeated=False, is_joint=False), (psi,)
+        SimpleNamespace(
+            experiment=measured, discrepancy=GaussianProcess(), is_repeated=False, whitening=None, white=np.asarray
+        ),
+        (psi,),
     )
 
 
@@ -83,7 +100,7 @@ def test_a_part_that_bounds_cut_and_that_hardly_weighs_is_kept_without_harm():
     box = boxes([0.0, 0.0], [np.inf, np.inf])
     weights = np.array([1 - 7e-8, 7e-8])
     mean, root = np.array([[9.0, 9.0], [0.5, 0.5]]), np.repeat(np.eye(2)[None], 2, axis=0)
-    parts = Components(weights, np.zeros((2, 0)), mean, root)
+    parts = GaussianMixture(weights, np.zeros((2, 0)), mean, root)
     found = bounded(parts, box.beyond(mean, root), box)
     assert len(found.crossed.weights) == 1
     for place in range(2):
@@ -152,3 +169,13 @@ def test_a_blend_is_the_mixture_of_its_parts():
     assert found.mean == pytest.approx(both.mean)
     assert found.sd == pytest.approx(both.sd)
     assert found.hdi() == pytest.approx(both.hdi(), abs=5e-3)
+
+
+def test_cubics_of_given_slopes_are_scipys():
+    generator = np.random.default_rng(4)
+    points = np.cumsum(generator.uniform(0.1, 2.0, 12))
+    values, slopes = generator.standard_normal((2, 12))
+    at = np.sort(np.append(generator.uniform(points[0], points[-1], 200), points))
+    ours, scipys = HermiteCubics(points, values, slopes), CubicHermiteSpline(points, values, slopes)
+    np.testing.assert_allclose(ours(at), scipys(at), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(ours.integral(at), scipys.antiderivative()(at), rtol=0, atol=1e-13)

@@ -8,10 +8,10 @@ from scipy.special import ndtr
 from scipy.stats import norm
 
 from tissuq.errors import ConvergenceError
-from tissuq.inference.quadrature import integrate
-from tissuq.inference.survey import survey
-from tissuq.inference.warp import Warp, warp_along
-from tissuq.priors import HalfNormal, Normal, Uniform
+from tissuq.inference.enumerators.quadrature import integrate
+from tissuq.inference.enumerators.survey import survey
+from tissuq.inference.enumerators.warp import Warp, warp_along
+from tissuq.parameters.priors import HalfNormal, Normal, Uniform
 
 
 def narrow(centre, sd):

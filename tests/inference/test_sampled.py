@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+import gallery
 import tissuq as tq
-from tissuq.discrepancy import discrepancy_named
 from tissuq.inference.conditional import ConditionalGaussian
 from tissuq.inference.densities import given_density, joint_density
-from tissuq.inference.exact import solve_exactly
-from tissuq.inference.sampled import sample_joint, sample_nuts_given
+from tissuq.inference.enumerators.adaptive_cells import solve_exactly
+from tissuq.inference.enumerators.sampled import sample_joint, sample_nuts_given
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3
-from tissuq.model import StatisticalModel
-from tissuq.studies.paper import FORMULATIONS
+from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.validation.paper import FORMULATIONS
 
 
 def model_of(settings, formulation):
@@ -27,7 +28,9 @@ def model_of(settings, formulation):
     )
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize(
+    "formulation", [name if name == "none" else pytest.param(name, marks=pytest.mark.slow) for name in FORMULATIONS]
+)
 def test_nuts_converges_and_agrees_with_the_exact_route(paper, formulation):
     model = model_of(paper, formulation)
     sampled, (exact,) = sample_joint(model, seed=1, draws=4000), solve_exactly([model])
@@ -42,6 +45,7 @@ def test_nuts_converges_and_agrees_with_the_exact_route(paper, formulation):
     assert b.hdi() == pytest.approx(a.hdi(), abs=0.15 * a.sd)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["quadratic", "yeoh"])
 def test_the_stiff_formulations_converge_in_four_thousand_draws(paper, formulation):
     found = sample_joint(model_of(paper, formulation), seed=2).diagnostics
@@ -82,7 +86,11 @@ def test_the_density_with_linear_parameters_integrated_is_that_of_the_exact_rout
     np.testing.assert_allclose(root @ root.T, covariance, atol=1e-8 * np.abs(covariance).max())
 
 
-@pytest.mark.parametrize("material", [Ogden1(), Ogden2(), Ogden3()], ids=lambda material: material.name)
+@pytest.mark.parametrize(
+    "material",
+    [Ogden1(), *(pytest.param(own, marks=pytest.mark.slow) for own in (Ogden2(), Ogden3()))],
+    ids=lambda material: material.name,
+)
 def test_the_integrated_density_keeps_its_digits_for_every_exponent(material):
     data = tq.simulate("yeoh", {"C10": 1.2, "C20": -0.057, "C30": 0.004}, np.linspace(0.5, 2.5, 25), 0.05, seed=1)
     moduli = {p.symbol: tq.Uniform(-50, 50) for p in material.parameters if p.is_linear}
@@ -95,6 +103,7 @@ def test_the_integrated_density_keeps_its_digits_for_every_exponent(material):
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["constant", "yeoh", "gp"])
 def test_nuts_on_the_nonlinear_parameters_alone_agrees_with_the_exact_route(paper, formulation):
     model = model_of(paper, formulation)
@@ -112,13 +121,26 @@ def test_nuts_on_the_nonlinear_parameters_alone_agrees_with_the_exact_route(pape
         assert b.sd == pytest.approx(a.sd, rel=0.15)
 
 
-def test_the_joint_method_gives_no_evidence_and_says_how_it_converged(paper):
-    posterior = tq.fit(paper.experiment(), discrepancy="none", noise_sd=0.5, method="joint")
+def test_the_joint_method_gives_no_evidence_and_says_how_it_converged():
+    posterior = gallery.sampled_jointly()
     assert posterior.log_evidence is None
     assert {"ess", "rhat"} <= set(posterior.summary().columns)
     assert "onverged" in posterior.solution.diagnostics.verdict
 
 
+def test_four_nonlinear_parameters_go_to_nuts_on_auto(paper, monkeypatch):
+    class Asked(Exception):
+        pass
+
+    def asked(model, seed, refusal):
+        raise Asked(refusal)
+
+    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_nuts_given", asked)
+    with pytest.raises(Asked, match="at most 3 nonlinear parameters"):
+        tq.fit(paper.experiment(), discrepancy="gp", priors={"C10": tq.LogNormal(1.0, 1.0)})
+
+
+@pytest.mark.slow
 def test_four_nonlinear_parameters_are_sampled_on_auto(paper):
     priors = {"C10": tq.LogNormal(1.0, 1.0)}
     posterior = tq.fit(paper.experiment(), discrepancy="gp", priors=priors)

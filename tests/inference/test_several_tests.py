@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import halfcauchy, multivariate_normal
 
 import tissuq as tq
-from tissuq.experiments.reading import STRESS_TYPES
+from tissuq.experiments.reading.experiment_file import STRESS_TYPES
 from tissuq.prediction.densities import leave_one_out
 from tissuq.prediction.moments import level_of_errors
 
@@ -36,7 +36,7 @@ def fit(discrepancy, **options):
 def between(model):
     """What the difference of two specimens adds to the covariance, along the model's own curve."""
     sign = 1 - 2.0 * TEST
-    return model.tolerances.stress**2 / 2 * np.outer(sign * model.curve, sign * model.curve)
+    return model.tolerances.stress**2 / 2 * np.outer(sign * model.fitted_errors.curve, sign * model.fitted_errors.curve)
 
 
 def given(covariance, columns, prior_width=1.0):
@@ -70,8 +70,8 @@ def test_without_discrepancy_it_is_generalised_least_squares(tolerances):
 def test_the_curve_along_which_tests_err_is_that_of_the_fit_itself():
     model = fit("none").model
     again = given(np.diag(SIZE**2) + between(model), X[:, None])[0]
-    assert np.allclose(model.curve / X, model.curve[0] / X[0], rtol=1e-10)
-    assert model.curve[0] / X[0] == pytest.approx(again, rel=0.02)
+    assert np.allclose(model.fitted_errors.curve / X, model.fitted_errors.curve[0] / X[0], rtol=1e-10)
+    assert model.fitted_errors.curve[0] / X[0] == pytest.approx(again, rel=0.02)
 
 
 @pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
@@ -225,7 +225,7 @@ def autoregressive(seed, lag, count=80, sd=0.05):
 def test_correlated_noise_is_generalised_least_squares_at_the_likeliest_lag():
     data = autoregressive(3, 0.8)
     posterior = tq.fit(data, discrepancy="none", noise="autoregressive")
-    lag, x = posterior.model.lag, 2 * (data.stretch - data.stretch**-2)
+    lag, x = posterior.model.fitted_errors.lag, 2 * (data.stretch - data.stretch**-2)
     assert 0.6 < lag < 0.95
     place = np.arange(len(x))
 
@@ -246,12 +246,12 @@ def test_correlated_noise_is_generalised_least_squares_at_the_likeliest_lag():
     assert lag == pytest.approx(grid[np.argmax([profile(each)[0] for each in grid])], abs=0.03)
 
 
-def test_residuals_that_hang_together_are_told():
+def test_autocorrelated_residuals_give_a_warning():
     warnings = tq.fit(autoregressive(3, 0.8), discrepancy="none").warnings
-    assert any("consecutive residuals hang together" in text for text in warnings)
-    assert not any("hang together" in text for text in tq.fit(autoregressive(3, 0.0), discrepancy="none").warnings)
+    assert any("residuals are autocorrelated (lag-1 correlation" in text for text in warnings)
+    assert not any("autocorrelated" in text for text in tq.fit(autoregressive(3, 0.0), discrepancy="none").warnings)
     mended = tq.fit(autoregressive(3, 0.8), discrepancy="none", noise="autoregressive").warnings
-    assert not any("hang together" in text for text in mended)
+    assert not any("autocorrelated" in text for text in mended)
 
 
 def test_errors_of_single_stretches_count_as_noise_where_the_curve_is_steep():
@@ -268,7 +268,7 @@ def test_errors_of_single_stretches_count_as_noise_where_the_curve_is_steep():
 
 
 def test_a_process_and_correlated_noise_do_not_go_together():
-    with pytest.raises(tq.ModelError, match="takes up correlated noise itself"):
+    with pytest.raises(tq.ModelError, match="cannot be separated from autocorrelated noise"):
         tq.fit(autoregressive(1, 0.5), discrepancy="gp", noise="autoregressive")
 
 
@@ -292,9 +292,9 @@ def test_tolerances_are_what_they_say_whatever_the_noise_turns_out_to_be(discrep
     posterior = tq.fit(parts, discrepancy=discrepancy, noise_sd=noise_sd, tolerances=tq.Tolerances(stress=0.1))
     model = posterior.model
     actual = level_of_errors(posterior.solution)
-    assert model.level == pytest.approx(actual, rel=0.03)
+    assert model.fitted_errors.level == pytest.approx(actual, rel=0.03)
     spread = model.whitening.spread * actual**2
-    expected = 0.1**2 * sum(float(own @ own) for own in np.split(model.curve, 3)) / 3
+    expected = 0.1**2 * sum(float(own @ own) for own in np.split(model.fitted_errors.curve, 3)) / 3
     assert np.allclose(spread, expected, rtol=0.1)
 
 

@@ -16,11 +16,11 @@ from scipy import stats
 
 from bridge import bridge_log_evidence
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.inference import smc
 from tissuq.inference.coordinates import Box, log_density_on_line
-from tissuq.inference.mutation import compiled_program
+from tissuq.inference.enumerators import smc
+from tissuq.inference.enumerators.mutation import compiled_program
+from tissuq.inference.enumerators.smc import SmcDraws, SmcSettings, sample_smc
 from tissuq.inference.resampling import resampled_at_random
-from tissuq.inference.smc import SmcDraws, SmcSettings, sample_smc
 
 ERRORS_ALLOWED = 5.0
 RUNS = 8
@@ -79,7 +79,7 @@ class Line:
         return best - normal.logpdf(self.mean) + np.log(inside) - np.log(self.upper - self.lower).sum()
 
 
-@pytest.mark.parametrize(("terms", "largest_error"), [(2, 0.2), (6, 0.3)])
+@pytest.mark.parametrize(("terms", "largest_error"), [(2, 0.2), pytest.param(6, 0.3, marks=pytest.mark.slow)])
 def test_a_posterior_a_thousandth_as_wide_as_the_prior_is_found_with_its_evidence(terms, largest_error):
     line = Line(terms, noise=0.01, half_width=500.0)
     draws = sample_uniform(line.log_likelihood, line.lower, line.upper)
@@ -100,6 +100,7 @@ def test_a_posterior_cut_by_the_walls_of_its_box_has_the_evidence_that_scipy_int
     assert_log_evidence(draws, line.log_evidence, 0.1)
 
 
+@pytest.mark.slow
 def test_a_missing_jacobian_would_be_caught(monkeypatch):
     line = Line(3, noise=0.1, half_width=1.0, centre=1.5)
     monkeypatch.setattr(Box, "log_jacobian", lambda self, line: 0.0)
@@ -107,6 +108,7 @@ def test_a_missing_jacobian_would_be_caught(monkeypatch):
     assert abs(draws.log_evidence - line.log_evidence) > ERRORS_ALLOWED * draws.log_evidence_error
 
 
+@pytest.mark.slow
 def test_a_normal_pushed_against_its_bound_is_recovered():
     draws = sample_uniform(lambda x: -0.5 * ((x[0] + 1) / 0.5) ** 2, [0.0], [10.0])
     exact = stats.truncnorm(2.0, 22.0, -1.0, 0.5)
@@ -117,6 +119,7 @@ def test_a_normal_pushed_against_its_bound_is_recovered():
     assert stats.kstest(draws.values.ravel(), exact.cdf).statistic < 0.06
 
 
+@pytest.mark.slow
 def test_a_banana_agrees_with_quadrature():
     lower, upper = [-5.0, -5.0], [5.0, 15.0]
 
@@ -134,6 +137,7 @@ def test_a_banana_agrees_with_quadrature():
     assert_moments(draws, mean, np.sqrt(spread))
 
 
+@pytest.mark.slow
 def test_two_far_modes_keep_their_masses():
     def log_likelihood(x):
         squares = jnp.array([jnp.sum((x - centre) ** 2) for centre in (0.25, 0.7)])
@@ -153,6 +157,7 @@ def test_two_far_modes_keep_their_masses():
     assert narrow.std(0) == pytest.approx(0.01, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_likelihood_without_slope_that_is_zero_or_undefined_on_most_of_the_prior_is_integrated():
     def log_likelihood(x):
         steps = -jnp.floor(jnp.sum(jnp.abs(x - 0.8)) * 40.0)
@@ -167,6 +172,7 @@ def test_a_likelihood_without_slope_that_is_zero_or_undefined_on_most_of_the_pri
     assert draws.values.min() > 0.5
 
 
+@pytest.mark.slow
 def test_bridge_sampling_agrees_on_a_correlated_posterior_with_unknown_noise():
     line = Line(4, noise=0.1, half_width=100.0)
     lower, upper = np.append(line.lower, 0.0), np.append(line.upper, np.inf)
@@ -274,6 +280,24 @@ def test_resampling_follows_the_weights_and_keeps_relatives_together():
     counts = np.stack([np.bincount(run, minlength=250) for run in chosen])
     # Systematic resampling rounds every expected count up or down.
     assert np.all(np.abs(counts - 250 * weights / weights.sum(1, keepdims=True)) < 1)
+
+
+def test_runs_whose_means_differ_a_little_have_not_converged():
+    """Centres 0.3 standard deviations apart: R-hat is about sqrt(1 + 0.3^2) = 1.044, over the threshold of 1.01."""
+    values = np.random.default_rng(0).standard_normal((RUNS, 1000, 1))
+    apart = made_draws(values + 0.3 * np.array([-1.0, 1.0] * (RUNS // 2))[:, None, None])
+    assert apart.rhat[0] == pytest.approx(np.sqrt(1 + 0.3**2), abs=0.01)
+    assert not apart.converged
+    assert "R-hat between runs is 1.05" in apart.verdict
+    assert made_draws(values).converged
+
+
+def test_the_error_of_the_evidence_is_the_jackknife_over_the_runs():
+    """Temperatures that err alike: to first order in so small a spread the jackknife is the plain standard error."""
+    alike = np.tile(np.random.default_rng(2).normal(0.0, 1e-4, RUNS), (3, 1))
+    student = stats.t(RUNS - 1).ppf(stats.norm.cdf(1))
+    expected = student * 3 * alike[0].std(ddof=1) / np.sqrt(RUNS)
+    assert made_draws(np.zeros((RUNS, 4, 1)), alike).log_evidence_error == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_error_of_the_evidence_shows_disagreement_luck_and_drift():

@@ -12,8 +12,8 @@ from closed_forms import (
     OF_INVARIANTS,
     OF_STRETCHES,
     RELATIVE,
-    STRESSES,
     TURN,
+    in_every_mode,
     inverse_langevin,
     langevin,
     tensor_stress,
@@ -25,9 +25,6 @@ from tissuq.mechanics.contract import checked
 
 EVERY_MATERIAL = pytest.mark.parametrize("material", EVERY, ids=lambda material: material.name)
 EVERY_ISOTROPIC = pytest.mark.parametrize("material", ISOTROPIC, ids=lambda material: material.name)
-EVERY_STRESS = pytest.mark.parametrize(
-    ("material", "measured"), STRESSES, ids=lambda each: getattr(each, "name", None) or str(each)
-)
 
 
 def test_every_material_has_a_closed_form():
@@ -37,21 +34,25 @@ def test_every_material_has_a_closed_form():
     assert {name for name in names if "fibres" not in name} <= OF_INVARIANTS.keys() | OF_STRETCHES.keys()
 
 
-@EVERY_STRESS
-@pytest.mark.parametrize("seed", range(3))
-def test_stress_is_that_of_the_full_tensors(material, measured, seed):
+@in_every_mode
+def test_stress_is_that_of_the_full_tensors(material, measured):
     # In turned axes a component has the rounding errors of the largest one; in those of the test it has its own. A
     # stress of next to nothing has those of the moduli, which are of size one.
-    values = values_of(material, seed)
-    found = engineering_stress(material, measured.path, measured.points, values)
-    for turn, rounding in ((np.eye(3), 1e-13), (TURN, RELATIVE)):
-        tensors = [tensor_stress(material.name, values, measured.gradient(each), turn) for each in measured.points]
-        for stress, tensor in zip(found, tensors, strict=True):
-            least = rounding * np.abs(tensor).max() + 1e-14
-            assert stress == pytest.approx(tensor[measured.component], RELATIVE, least)
+    for seed in range(3):
+        values = values_of(material, seed)
+        found = engineering_stress(material, measured.path, measured.points, values)
+        for turn, rounding in ((np.eye(3), 1e-13), (TURN, RELATIVE)):
+            tensors = [tensor_stress(material.name, values, measured.gradient(each), turn) for each in measured.points]
+            for stress, tensor in zip(found, tensors, strict=True):
+                least = rounding * np.abs(tensor).max() + 1e-14
+                assert stress == pytest.approx(tensor[measured.component], RELATIVE, least)
 
 
-@EVERY_MATERIAL
+@pytest.mark.parametrize(
+    "material",
+    [own if k % 3 == 0 else pytest.param(own, marks=pytest.mark.slow) for k, own in enumerate(EVERY)],
+    ids=lambda material: material.name,
+)
 def test_the_contract_for_materials_holds(material):
     assert [check for check in checked(material) if check.problem] == []
 

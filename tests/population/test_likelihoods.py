@@ -9,10 +9,10 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
 import tissuq as tq
-from tissuq.population.coordinates import Coordinates, coordinates_of
-from tissuq.population.hierarchy import _population, _terms
-from tissuq.population.likelihoods import _split, likelihoods_of, mixtures_of
-from tissuq.population.mixture import Mixture, reduced
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.population.hierarchy import Hierarchy, _log_posterior, _population, _terms
+from tissuq.population.likelihoods import Coordinates, _split, coordinates_of, likelihoods_of, mixtures_of
+from tissuq.population.mixture import reduced
 
 STRETCH = np.linspace(0.8, 1.5, 12)
 
@@ -29,7 +29,7 @@ def random_mixture(count=400, seed=1):
     score = generator.standard_normal(count)
     root = np.array([[1.0, 0.0], [0.7, 0.3]]) * np.exp(0.7 * score)[:, None, None]
     means = np.array([0.5, -0.2]) * score[:, None] + 0.1 * generator.standard_normal((count, 2))
-    return Mixture(generator.random(count), means, root @ root.swapaxes(1, 2))
+    return GaussianMixture.of_covariances(generator.random(count), means, root @ root.swapaxes(1, 2))
 
 
 @pytest.mark.parametrize("count", [1, 16, 200])
@@ -46,12 +46,10 @@ def test_more_gaussians_come_nearer_to_the_density():
     many = random_mixture()
     generator = np.random.default_rng(2)
     chosen = generator.choice(len(many.weights), 500, p=many.weights / many.weights.sum())
-    points = np.array([generator.multivariate_normal(many.means[k], many.covariances[k]) for k in chosen])
+    points = np.array([generator.multivariate_normal(many.mean[k], many.covariance[k]) for k in chosen])
 
     def log_density(mixture):
-        each = [
-            multivariate_normal(m, c).logpdf(points) for m, c in zip(mixture.means, mixture.covariances, strict=True)
-        ]
+        each = [multivariate_normal(m, c).logpdf(points) for m, c in zip(mixture.mean, mixture.covariance, strict=True)]
         return logsumexp(np.log(mixture.weights / mixture.weights.sum())[:, None] + each, axis=0)
 
     errors = [np.std(log_density(reduced(many, count)) - log_density(many)) for count in (1, 8, 64)]
@@ -84,7 +82,7 @@ def test_a_gaussian_that_is_split_keeps_its_weight_and_its_moments_under_the_log
     """Against quadrature of log b and its products with a correlated c over the Gaussian of both."""
     mean, covariance = np.array([0.5, 1.0]), np.array([[0.0025, 0.003], [0.003, 0.01]])
     coordinates = Coordinates(("C10", "C01"), np.array([True, False]), np.array([1.0, 2.0]), np.array([-0.5, 0.25]))
-    found = _split(Mixture(np.array([3.0]), mean[None], covariance[None]), coordinates)
+    found = _split(GaussianMixture.of_covariances(np.array([3.0]), mean[None], covariance[None]), coordinates)
     score, weights = np.polynomial.hermite_e.hermegauss(20)
     b, c = mean[0] + 0.05 * score, mean[1] + 0.06 * score
     log_mean, c_mean = (weights @ each / weights.sum() for each in (np.log(b), c / 2))
@@ -105,7 +103,7 @@ def test_two_parameters_under_an_energy_are_represented_jointly():
     coordinates = coordinates_of([posterior], ["C10", "C20"])
     found = likelihoods_of(*mixtures_of([posterior], coordinates), 200)
     draws = np.column_stack([posterior.solution.draws[s].ravel()[::20] for s in ("C10", "C20")])
-    parts = posterior.solution.components
+    parts = posterior.solution.mixture
     own = parts.root[:, :2] @ parts.root[:, :2].swapaxes(1, 2)
     is_wide = np.linalg.eigvalsh(own)[:, 0] > 0
     assert parts.weights[is_wide].sum() > 0.999
@@ -159,3 +157,41 @@ def test_partial_correlations_make_a_correlation_matrix():
     assert correlation[1, 0] == pytest.approx(first)
     assert correlation[2, 0] == pytest.approx(second)
     assert correlation[2, 1] == pytest.approx(expected)
+
+
+def test_a_new_specimen_has_the_covariance_of_the_population():
+    """20,000 of them: each entry of the sample covariance within five of its standard errors."""
+    root, shape = np.array([[1.0, 0.0], [2.0, 0.5]]), (4, 5000)
+    mean = np.array([3.0, -1.0])
+    population = Hierarchy(np.broadcast_to(mean, (*shape, 2)), np.broadcast_to(root, (*shape, 2, 2)),
+                           np.zeros((*shape, 0, 2)), None, 1.0)  # fmt: skip
+    drawn = population.new(np.random.default_rng(0)).reshape(-1, 2)
+    covariance = np.array([[1.0, 2.0], [2.0, 4.25]])
+    sds = np.sqrt(np.diag(covariance))
+    error = np.sqrt((covariance**2 + np.outer(sds, sds) ** 2) / len(drawn))
+    assert (np.abs(drawn.mean(axis=0) - mean) < 5 * sds / np.sqrt(len(drawn))).all()
+    assert (np.abs(np.cov(drawn.T) - covariance) < 5 * error).all()
+
+
+def test_correlations_have_the_prior_of_lewandowski_kurowicka_and_joe():
+    """Its density is det(Omega)^(2 - 1) over the correlations, here brought to the partial ones by their Jacobian."""
+    generator, spread = np.random.default_rng(4), 0.7
+    flat = {name: np.zeros(shape) for name, shape in
+            (("log_factor", (1, 1)), ("pull", (1, 1, 3)), ("precision", (1, 1, 3, 3)))}  # fmt: skip
+    lower = np.tril_indices(3, -1)
+
+    def correlations(point):
+        root = np.asarray(_population(jnp.asarray(point))[1]) / point[3:6, None]
+        return root @ root.T
+
+    def expected(point):
+        steps = 1e-5 * np.eye(9)[6:]
+        jacobian = [(correlations(point + step) - correlations(point - step))[lower] / 2e-5 for step in steps]
+        of_correlations = np.linalg.slogdet(correlations(point))[1] + np.linalg.slogdet(jacobian)[1]
+        return of_correlations + norm.logpdf(point[:3], 0, 5).sum() + norm.logpdf(point[3:6], 0, spread).sum()
+
+    points = np.column_stack([generator.normal(size=(6, 3)), generator.random((6, 3)) + 0.1,
+                              generator.uniform(-0.9, 0.9, (6, 3))])  # fmt: skip
+    found = [float(_log_posterior(jnp.asarray(point), flat | {"spread": spread})) for point in points]
+    wanted = [expected(point) for point in points]
+    assert np.diff(found) == pytest.approx(np.diff(wanted), abs=1e-6)

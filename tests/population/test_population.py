@@ -54,7 +54,7 @@ def by_quadrature(specimens, noise_sd, spread):
     return mean, np.sqrt(square - mean**2)
 
 
-@pytest.mark.parametrize("noise_sd", [NOISE_SD, 0.4])
+@pytest.mark.parametrize("noise_sd", [NOISE_SD, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_one_parameter_agrees_with_quadrature(found, noise_sd):
     """The second noise is such that some moduli may be zero.
 
@@ -84,6 +84,7 @@ def test_without_a_spread_it_is_complete_pooling():
     assert found.complete.marginals["C10"].hdi() == pytest.approx(joined.marginals["C10"].hdi(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_specimens_that_differ_widely_keep_their_own_posteriors():
     specimens = specimens_of([0.2, 0.5, 1.2, 3.0, 8.0, 20.0], noise_sd=0.005)
     table = neo_hookean(specimens, noise_sd=0.005, spread=3.0).specimen_summary()
@@ -102,6 +103,7 @@ def test_specimens_move_towards_the_population_and_the_poorly_measured_ones_most
     assert (moved[list(good)].abs() < 0.02).all()
 
 
+@pytest.mark.statistical
 def test_the_truth_is_recovered():
     """Six populations of 20: of 12 central 99 % intervals at most one may miss; two do by chance in 0.6 % of cases."""
     missed = 0
@@ -115,6 +117,7 @@ def test_the_truth_is_recovered():
     assert missed <= 1
 
 
+@pytest.mark.slow
 def test_a_correlation_is_found():
     """C10 and C01 of 20 specimens, a logarithm and not, that go together with 0.9 in the sample."""
     generator = np.random.default_rng(2)
@@ -167,6 +170,7 @@ def test_a_new_patient_has_the_model_error_that_specimens_have():
         found.new_patient([1.2, 1.8])
 
 
+@pytest.mark.slow
 def test_some_parameters_may_be_pooled_and_others_not():
     stretch = np.linspace(0.7, 1.8, 15)
     specimens = {
@@ -191,6 +195,7 @@ def test_it_is_saved_with_names(found, tmp_path):
     assert tree.attrs["converged"] == "True"
 
 
+@pytest.mark.slow
 def test_tests_of_one_specimen_are_joined():
     named = [
         tq.Experiment("uniaxial", each.stretch, each.stress, name)
@@ -241,6 +246,7 @@ def test_tests_of_a_specimen_in_several_modes_are_fitted_together():
     assert sorted(set(modes)) == ["planar", "simple-shear", "uniaxial"]
 
 
+@pytest.mark.slow
 def test_tests_in_one_mode_give_what_the_joined_test_gives_and_specimens_may_be_named():
     tests = in_modes(MODULI[:4], [("uniaxial", "uniaxial")])
     found = neo_hookean(tests)
@@ -253,6 +259,7 @@ def test_tests_in_one_mode_give_what_the_joined_test_gives_and_specimens_may_be_
         assert (other.specimens == found.specimens).all()
 
 
+@pytest.mark.slow
 def test_a_new_patient_has_the_model_error_of_those_who_were_tested_in_the_mode():
     """Under an error in stress, which says nothing of another mode: only planar tests give that of a planar one."""
     tests = in_modes(MODULI[:4], [("uniaxial",), ("uniaxial", "planar")])
@@ -263,6 +270,7 @@ def test_a_new_patient_has_the_model_error_of_those_who_were_tested_in_the_mode(
         found.new_patient([1.1], mode="equibiaxial")
 
 
+@pytest.mark.slow
 def test_a_new_patient_under_an_energy_is_predicted_in_every_mode():
     tests = in_modes([0.4, 0.5, 0.6], [("uniaxial", "planar"), ("simple-shear",)], 0.01)
     found = tq.fit_population(tests, noise_sd=0.01)
@@ -276,7 +284,7 @@ def test_a_new_patient_under_an_energy_is_predicted_in_every_mode():
 def test_few_specimens_are_warned_about(found):
     few = dict(list(found.posteriors.items())[:4])
     rest = found.complete, found.coordinates, found.hierarchy, found.spread_prior, found.seed
-    assert any("4 specimens hardly tell a spread" in text for text in tq.Population(few, *rest).warnings)
+    assert any("4 specimens determine the spread poorly" in text for text in tq.Population(few, *rest).warnings)
     assert not found.warnings
 
 
@@ -295,3 +303,19 @@ def test_few_specimens_are_warned_about(found):
 def test_what_cannot_be_pooled_is_refused_in_one_message(change, options, words):
     with pytest.raises(tq.InputError, match=words):
         neo_hookean(change(specimens_of(MODULI)), **options)
+
+
+def test_a_new_patient_is_a_posterior_that_is_saved_predicts_and_becomes_materials(found, tmp_path):
+    patient, new = found.patient, found.new[..., 0]
+    np.testing.assert_array_equal(patient.solution.draws["C10"], new)
+    band = patient.predict([1.2], noise=False, prob=0.5)
+    exact = 2 * (1.2 - 1.2**-2) * np.quantile(new, [0.25, 0.75])
+    np.testing.assert_allclose(band[["low", "high"]].to_numpy()[0], exact, rtol=0.1)
+    moduli = np.array([draw.values["C10"] for draw in patient.ensemble(64)])
+    np.testing.assert_allclose(np.quantile(moduli, [0.25, 0.5, 0.75]), np.quantile(new, [0.25, 0.5, 0.75]), rtol=0.1)
+    patient.save(tmp_path / "patient.nc")
+    loaded = tq.load(tmp_path / "patient.nc")
+    np.testing.assert_array_equal(loaded.solution.draws["C10"], new)
+    assert loaded.warnings == patient.warnings
+    assert loaded.summary().equals(patient.summary())
+    assert "log_likelihood" not in loaded.data.children  # of other specimens' measurements

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.special
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import norm
@@ -76,3 +77,13 @@ def test_a_quantile_is_where_the_distribution_reaches_it(probability):
         expected = brentq(lambda x, w=weights, m=means, s=sds: w @ norm.cdf(x, m, s) - probability, -40, 40, xtol=1e-12)
         found = one_place(weights, means, sds).quantile(probability)[0]
         assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_places_that_have_converged_stay_while_others_do_not(monkeypatch):
+    weights, sds = np.array([0.3, 0.7]), np.linspace(0.02, 2, 60) * np.ones((2, 1))
+    means = np.array([[-1.0], [1.0]]) * np.ones(60)
+    evaluated, ndtr = [], scipy.special.ndtr
+    monkeypatch.setattr(scipy.special, "ndtr", lambda scores: evaluated.append(scores) or ndtr(scores))
+    quantiles = Mixtures(weights, means, sds**2).quantile(0.25)
+    assert len(evaluated) < 15  # by halving an interval of many sds to 1e-9, more than thirty
+    np.testing.assert_allclose(weights @ ndtr((quantiles - means) / sds), 0.25, rtol=0, atol=1e-9)

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 import tissuq as tq
 from tissuq.experiments.modes import loading_mode
-from tissuq.mechanics.path import invariant_rates, invariants
+from tissuq.mechanics.invariants import invariant_rates, invariants
 
 STRETCH = np.linspace(0.6, 2.2, 24)
 TRUTH = {"C10": 0.4, "C20": 0.03, "C30": 0.002}
@@ -27,12 +27,12 @@ def test_an_energy_of_i1_is_the_same_wherever_i1_is(data, mode):
     uniaxial = np.array([1.3, 1.6, 2.0])
     same = np.array(
         [
-            brentq(lambda end, x=x: invariants(other, [end])[0][0] - x, 1.0001, 3)
-            for x in invariants(data.mode, uniaxial)[0]
+            brentq(lambda end, x=x: invariants(other.at([end]))[0][0] - x, 1.0001, 3)
+            for x in invariants(data.mode.at(uniaxial))[0]
         ]
     )
     first, second = posterior.predict(uniaxial, noise=False), posterior.predict(same, noise=False, mode=mode)
-    rates = invariant_rates(data.mode, uniaxial)[0], invariant_rates(other, same)[0]
+    rates = invariant_rates(data.mode.at(uniaxial))[0], invariant_rates(other.at(same))[0]
     for end in ("mean", "low", "high"):
         np.testing.assert_allclose(first[end] / rates[0], second[end] / rates[1], rtol=1e-5)
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
+import gallery
 import tissuq as tq
-from tissuq.inference.solution import Components
-from tissuq.prediction.moments import stress_moments
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.prediction.moments import borne, drawn_curves, stress_moments
 from tissuq.prediction.replicates import pointwise_log_likelihood
 
 TRUTH = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
@@ -28,7 +29,7 @@ def kernel(first, second, c, psi):
 @pytest.mark.parametrize("prob", [0.5, 0.95])
 @pytest.mark.parametrize("noise", [False, True])
 def test_without_discrepancy_the_band_is_the_normal_one(noise, prob):
-    posterior = tq.fit(DATA, discrepancy="none", noise_sd=0.2, priors={"C10": tq.Uniform(0, 10)})
+    posterior = gallery.fit(DATA, discrepancy="none", noise_sd=0.2, priors={"C10": tq.Uniform(0, 10)})
     centre = x(STRETCH) @ DATA.stress / (x(STRETCH) @ x(STRETCH))
     sd = np.sqrt(0.04 / (x(STRETCH) @ x(STRETCH)) * x(NEW) ** 2 + noise * 0.04)
     table = posterior.predict(NEW, noise=noise, prob=prob)
@@ -40,13 +41,13 @@ def test_without_discrepancy_the_band_is_the_normal_one(noise, prob):
 
 @pytest.mark.parametrize("noise", [False, True])
 def test_a_conditioned_process_agrees_with_dense_linear_algebra(noise):
-    model = tq.fit(DATA, discrepancy="gp", noise_sd=0.2, priors={"C10": tq.Normal(1.0, 0.7)}).model
+    model = gallery.fit(DATA, discrepancy="gp", noise_sd=0.2, priors={"C10": tq.Normal(1.0, 0.7)}).model
     psi, c = 0.6, 0.8
     V = kernel(STRETCH, STRETCH, c, psi) + 0.04 * np.eye(14)
     precision = x(STRETCH) @ np.linalg.solve(V, x(STRETCH)) + 0.7**-2
     b = (x(STRETCH) @ np.linalg.solve(V, DATA.stress) + 0.7**-2) / precision
-    components = Components(np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]]))
-    mean, variance = stress_moments(model, components, NEW, discrepancy=True, noise=noise)
+    components = GaussianMixture(np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]]))
+    mean, variance = stress_moments(model, components, model.experiment.states_at(NEW), discrepancy=True, noise=noise)
 
     joint = kernel(STRETCH, STRETCH, c, psi) + 0.49 * np.outer(x(STRETCH), x(STRETCH)) + 0.04 * np.eye(14)
     cross = kernel(NEW, STRETCH, c, psi) + 0.49 * np.outer(x(NEW), x(STRETCH))
@@ -57,9 +58,38 @@ def test_a_conditioned_process_agrees_with_dense_linear_algebra(noise):
     np.testing.assert_allclose(variance[0], np.diag(covariance) + noise * 0.04, atol=1e-8)
 
 
+def test_drawn_curves_have_the_covariance_of_the_posterior():
+    """20,000 curves under one setting of a process: each entry within five of its standard errors."""
+    model = gallery.fit(DATA, discrepancy="gp", noise_sd=0.2, priors={"C10": tq.Normal(1.0, 0.7)}).model
+    psi, c, count = 0.6, 0.8, 20_000
+    V = kernel(STRETCH, STRETCH, c, psi) + 0.04 * np.eye(14)
+    precision = x(STRETCH) @ np.linalg.solve(V, x(STRETCH)) + 0.7**-2
+    b = (x(STRETCH) @ np.linalg.solve(V, DATA.stress) + 0.7**-2) / precision
+    one = GaussianMixture(np.ones(1), np.array([[psi, c]]), np.array([[b]]), np.array([[[precision**-0.5]]]))
+    alone, other = drawn_curves(model, one[np.zeros(count, dtype=int)], model.experiment.states_at(NEW), seed=3)
+    joint = V + 0.49 * np.outer(x(STRETCH), x(STRETCH))
+    cross = kernel(NEW, STRETCH, c, psi) + 0.49 * np.outer(x(NEW), x(STRETCH))
+    own = kernel(NEW, NEW, c, psi) + 0.49 * np.outer(x(NEW), x(NEW))
+    whole = own - cross @ np.linalg.solve(joint, cross.T)
+    for drawn, expected in ((alone, np.outer(x(NEW), x(NEW)) / precision), (alone + other, whole)):
+        sds = np.sqrt(np.diag(expected))
+        error = np.sqrt((expected**2 + np.outer(sds, sds) ** 2) / count)
+        assert (np.abs(np.cov(drawn.T) - expected) <= 5 * error + 1e-12).all()
+
+
+def test_a_stress_is_predicted_only_where_the_material_locks_with_a_probability_below_one_in_a_million():
+    model = gallery.fit(DATA, discrepancy="none", noise_sd=0.2).model
+    basis = np.array([[[1.0], [2.0]], [[1.0], [np.inf]]])
+    for share in (2e-6, 1e-3, 0.5):
+        with pytest.raises(tq.ModelError, match=r"has no stress at a stretch of 2: .*a probability of"):
+            borne(model, np.array([1.0, 2.0]), basis, np.array([1 - share, share]))
+    kept = borne(model, np.array([1.0, 2.0]), basis, np.array([1 - 5e-7, 5e-7]))
+    np.testing.assert_array_equal(kept[:, :, 0], [[1.0, 2.0], [1.0, 0.0]])
+
+
 @pytest.mark.parametrize("name", ["constant", "yeoh", "gp"])
 def test_bands_agree_with_replicated_data(name):
-    posterior = tq.fit(DATA, discrepancy=name, noise_sd=0.2)
+    posterior = gallery.fit(DATA, discrepancy=name, noise_sd=0.2)
     replicated = posterior.data["posterior_predictive"]["stress"].values.reshape(-1, 14)
     band = posterior.predict(STRETCH)
     below, above = (
@@ -72,7 +102,7 @@ def test_bands_agree_with_replicated_data(name):
 
 
 def test_the_model_alone_has_no_share_of_the_discrepancy():
-    posterior = tq.fit(DATA, discrepancy="yeoh", noise_sd=0.2)
+    posterior = gallery.fit(DATA, discrepancy="yeoh", noise_sd=0.2)
     table = posterior.predict(NEW, discrepancy=False, noise=False)
     c10 = posterior.solution.marginals["C10"]
     np.testing.assert_allclose(table["mean"], c10.mean * x(NEW), rtol=1e-6, atol=1e-9)
@@ -83,7 +113,7 @@ def test_the_model_alone_has_no_share_of_the_discrepancy():
 
 @pytest.mark.parametrize("name", ["none", "constant", "gp"])
 def test_the_pointwise_density_is_that_of_leaving_one_out(name):
-    posterior = tq.fit(DATA, discrepancy=name, noise_sd=0.2)
+    posterior = gallery.fit(DATA, discrepancy=name, noise_sd=0.2)
     draws = {symbol: values[2, 5] for symbol, values in posterior.solution.draws.items()}
     mean = draws["C10"] * x(STRETCH) + draws.get("m0", 0.0)
     covariance = (0.04 + draws.get("S", 0.0) ** 2) * np.eye(14)
@@ -98,7 +128,7 @@ def test_the_pointwise_density_is_that_of_leaving_one_out(name):
 
 
 def test_coverage_counts_the_measurements_inside():
-    posterior = tq.fit(DATA, discrepancy="none", noise_sd=0.2)
+    posterior = gallery.fit(DATA, discrepancy="none", noise_sd=0.2)
     table = posterior.predict(STRETCH)
     inside = ((table["low"] <= DATA.stress) & (DATA.stress <= table["high"])).mean()
     assert posterior.predictive_coverage() == inside
@@ -107,4 +137,4 @@ def test_coverage_counts_the_measurements_inside():
 @pytest.mark.parametrize(("stretch", "prob"), [([0.0], 0.95), ([-1.0], 0.95), ([np.nan], 0.95), ([1.0], 1.0)])
 def test_bad_requests_are_refused(stretch, prob):
     with pytest.raises(tq.InputError):
-        tq.fit(DATA, discrepancy="none", noise_sd=0.2).predict(stretch, prob=prob)
+        gallery.fit(DATA, discrepancy="none", noise_sd=0.2).predict(stretch, prob=prob)

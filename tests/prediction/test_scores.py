@@ -47,7 +47,7 @@ def test_scores_are_those_of_the_gaussian_that_predicts(posterior, fitted, unsee
     x, at, y = uniaxial(STRETCH), planar(OTHER[1:]), unseen.stress[1:]
     b, variance = x @ fitted.stress / (x @ x), NOISE_SD**2 / (x @ x)
     mean, sd = b * at, np.sqrt(NOISE_SD**2 + variance * at**2)
-    found, half = judged(posterior.solution, unseen, 0, prob=0.9).summary(), norm.ppf(0.95) * sd
+    found, half = judged(posterior.solution, unseen.curves[0], prob=0.9).summary(), norm.ppf(0.95) * sd
     outside = np.maximum(np.abs(y - mean) - half, 0)
     z, size = (y - mean) / sd, np.sqrt((y**2).mean())
     crps = sd * (z * (2 * norm.cdf(z) - 1) + 2 * norm.pdf(z) - 1 / np.sqrt(np.pi))
@@ -60,13 +60,13 @@ def test_scores_are_those_of_the_gaussian_that_predicts(posterior, fitted, unsee
 
 def test_a_measurement_without_stress_is_left_out(posterior, unseen):
     at_rest = tq.Experiment("planar", [1.0, 1.2], [0.0, unseen.stress[2]])
-    assert len(judged(posterior.solution, at_rest, 0).measured) == 1
+    assert len(judged(posterior.solution, at_rest.curves[0]).measured) == 1
     with pytest.raises(tq.InputError, match="no stress other than zero"):
-        judged(posterior.solution, tq.Experiment("planar", [1.0], [0.0]), 0)
+        judged(posterior.solution, tq.Experiment("planar", [1.0], [0.0]).curves[0])
 
 
 def test_a_band_of_the_same_measurements_is_that_of_predict(posterior, unseen):
-    found, band = judged(posterior.solution, unseen, 0), posterior.predict(unseen.stretch, mode="planar")
+    found, band = judged(posterior.solution, unseen.curves[0]), posterior.predict(unseen.stretch, mode="planar")
     for end in ("mean", "low", "high"):
         np.testing.assert_allclose(getattr(found, end), band[end].to_numpy()[1:], rtol=1e-12)
 
@@ -74,7 +74,7 @@ def test_a_band_of_the_same_measurements_is_that_of_predict(posterior, unseen):
 def test_many_measurements_are_judged_in_blocks(posterior):
     stretch = np.linspace(1.05, 1.4, 4500)
     noise = NOISE_SD * np.random.default_rng(5).standard_normal(len(stretch))
-    found = judged(posterior.solution, tq.Experiment("planar", stretch, TRUE * planar(stretch) + noise), 0)
+    found = judged(posterior.solution, tq.Experiment("planar", stretch, TRUE * planar(stretch) + noise).curves[0])
     assert len(found.measured) == len(found.crps) == 4500
     # The expected score of a right Gaussian is sd / sqrt(pi); C10 is known so well that it hardly matters.
     assert found.crps.mean() == pytest.approx(NOISE_SD / np.sqrt(np.pi), rel=0.1)
@@ -83,5 +83,5 @@ def test_many_measurements_are_judged_in_blocks(posterior):
 def test_an_error_of_the_stress_is_not_judged_in_another_mode(fitted, unseen):
     posterior = tq.fit(fitted, discrepancy="constant", noise_sd=NOISE_SD)
     with pytest.raises(tq.InputError, match="says nothing about the planar one"):
-        judged(posterior.solution, unseen, 0)
-    assert judged(posterior.solution, unseen, 0, discrepancy=False).summary()["error"] < 0.3
+        judged(posterior.solution, unseen.curves[0])
+    assert judged(posterior.solution, unseen.curves[0], discrepancy=False).summary()["error"] < 0.3

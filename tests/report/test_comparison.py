@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.experiments.units import StressUnit
+from tissuq.experiments.reading.units import StressUnit
 from tissuq.report.comparison import comparison_figure, readable_comparison, write_comparison
 
 KPA = StressUnit("kPa", 1e-3)
@@ -59,6 +59,6 @@ def test_parameters_of_different_names_are_named_one_by_one(table):
 def test_the_page_says_what_a_comparison_does_not_tell(table, tmp_path):
     write_comparison(table, ["first", "second"], KPA, tmp_path)
     page = (tmp_path / "report.html").read_text()
-    assert "say nothing of parameters" in page
+    assert "do not apply to parameters" in page
     assert "tissuq compare first second" in page
     assert page.count("<tr>") == 1 + len(table)

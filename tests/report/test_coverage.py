@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tissuq.report.coverage import readable_coverage, write_campaign
+from tissuq.report.campaigns import readable_coverage, write_campaign
 from tissuq.report.run_folder import RECIPE
-from tissuq.studies.coverage import CoverageSettings
-from tissuq.studies.coverage.campaign import tasks_of
+from tissuq.validation.coverage import CoverageSettings
+from tissuq.validation.coverage.campaign import tasks_of
 
 DESIGN = {"low": 0.7, "high": 2.0, "points": 12, "noise_sd": 0.1}
 
@@ -25,7 +25,7 @@ def made_up(settings):
     for task in tasks_of(settings):
         low = generator.uniform(0.8, 1.1, task.count)
         fits = [[each, each + 0.1, each + 0.05, 0.02] for each in low]
-        own = task.place | {"truth": [1.0] * task.count, "oracle_sd": [0.01] * task.count, "fits": fits}
+        own = task.indices | {"truth": [1.0] * task.count, "oracle_sd": [0.01] * task.count, "fits": fits}
         more = {mode: [[0.9, 0.05]] * task.count for mode in settings.unseen}
         found.append(own | more | {"predictive": [0.94] * task.count})
     return found
@@ -34,10 +34,10 @@ def made_up(settings):
 @pytest.mark.parametrize(
     "changes",
     [
-        {},
-        {"formulations": ["auto"], "families": ["gent"]},
+        pytest.param({}, marks=pytest.mark.slow),
+        pytest.param({"formulations": ["auto"], "families": ["gent"]}, marks=pytest.mark.slow),
         {"replicates": 1, "families": ["gent"]},
-        {"strengths": [0.0, 0.5, 1.0], "noise": ["known", "unknown"]},
+        pytest.param({"strengths": [0.0, 0.5, 1.0], "noise": ["known", "unknown"]}, marks=pytest.mark.slow),
         {"predictive": True, "unseen": ["equibiaxial", "planar"], "designs": [DESIGN, DESIGN | {"points": 30}]},
     ],
 )

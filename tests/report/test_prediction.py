@@ -132,7 +132,7 @@ def test_a_folder_holds_tables_arrays_figure_and_page(found, planar, tmp_path):
     assert 'file = "input/other.csv"' in recipe
     page = (folder / "report.html").read_text()
     assert "Of 3 measurements of other in the calibrated range" in page
-    assert "1 of 4 points and 1 of 4 measurements lie beyond" in page
+    assert "1 of 4 points and 1 of 4 measurements lie outside the measured range" in page
     assert "data:image/svg+xml" in page
 
 

@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tissuq.report.page import LIBRARIES
 from tissuq.report.paper import write_paper_run
+from tissuq.report.run_folder import LIBRARIES
 from tissuq.report.specimen import write_specimen_run
-from tissuq.studies.paper.claims import CLAIMS
+from tissuq.validation.paper.claims import CLAIMS
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 

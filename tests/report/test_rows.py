@@ -3,9 +3,8 @@ from math import nan
 
 import pytest
 
-from tissuq.experiments.units import StressUnit
-from tissuq.report.rows import interval, readable_stability, readable_summary, significant
-from tissuq.report.tables import write_csv, write_json
+from tissuq.experiments.reading.units import StressUnit
+from tissuq.report.tables import interval, readable_stability, readable_summary, significant, write_csv, write_json
 
 ROW = {
     "formulation": "none",

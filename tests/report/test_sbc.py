@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from tissuq.report.campaigns import readable_ranks, write_sbc
 from tissuq.report.run_folder import RECIPE
-from tissuq.report.sbc import readable_ranks, write_sbc
-from tissuq.studies.sbc import SbcSettings
+from tissuq.validation.sbc import SbcSettings
 
 
 def test_the_page_says_what_is_wrong_and_what_failed(tmp_path):

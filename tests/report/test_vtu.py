@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from tissuq.finite_elements.grading import grid
-from tissuq.report.vtu import write_collection, write_vtu
+from tissuq.finite_elements.case import grid
+from tissuq.report.simulation_figures import write_collection, write_vtu
 
 
 def numbers(array):

@@ -30,7 +30,7 @@ def test_a_run_is_taken_up_and_tests_of_any_stretches_are_ranked(run):
     settings = DesignSettings(run="run", discrepancy="none", candidates=tests, targets=("C10", "modulus"))
     announced = []
     study = run_design(settings, run, announced.append)
-    assert announced[0] == "the earlier run"
+    assert announced[0] == "fitting the run again"
     assert set(announced[1:]) == set(study.table["candidate"])
     own = study.table.set_index(["target", "candidate"])
     x = 2 * (np.linspace(0.8, 1.3, 12) - np.linspace(0.8, 1.3, 12) ** -2)
@@ -38,7 +38,7 @@ def test_a_run_is_taken_up_and_tests_of_any_stretches_are_ranked(run):
     assert own.loc[("C10", "two"), "sd_after"] == pytest.approx(0.02 / np.sqrt(x @ x + z @ z), rel=1e-8)
     assert own.loc[("modulus", "two"), "sd_after"] == pytest.approx(0.04 / np.sqrt(x @ x + z @ z), rel=1e-8)
     assert (study.unit.name, study.specimen) == ("kPa", "same")
-    assert not any("Rough" in note for note in study.notes)
+    assert not study.warnings
 
 
 def test_an_other_specimen_is_told(run):
@@ -46,7 +46,7 @@ def test_an_other_specimen_is_told(run):
         DesignSettings(run="run", discrepancy="none", candidates=("planar 1.05:1.2 6",), specimen="other"), run
     )
     assert study.error == 0.18
-    assert any("off by 18%" in note for note in study.notes)
+    assert any("differ by about 18%" in text for text in study.explanations)
 
 
 def test_what_was_not_fitted_is_refused(run):

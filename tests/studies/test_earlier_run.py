@@ -1,22 +1,31 @@
-"""A run is gone on with: its posterior is that of the run."""
+"""A run is gone on with: its posterior is the one that it saved."""
 
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 
 import tissuq as tq
 from tissuq.report.specimen import write_specimen_run
+from tissuq.studies.earlier_run import load_without_discrepancy, recipe_of
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
 STRETCH = np.linspace(0.7, 1.6, 15)
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(written_run, tmp_path):
+    """A copy of it that a test may damage."""
+    return shutil.copytree(written_run, tmp_path / "run")
+
+
+@pytest.fixture(scope="module")
+def written_run(tmp_path_factory):
     """A run in kPa, with priors of parameters that only some of its discrepancies have."""
+    tmp_path = tmp_path_factory.mktemp("earlier")
     data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.06, "C30": 0.01}, STRETCH, noise_sd=0.02, seed=3)
     source = tmp_path / "specimen.csv"
     rows = [f"{at!r},{1000 * stress!r}\n" for at, stress in zip(STRETCH.tolist(), data.stress.tolist(), strict=True)]
@@ -33,46 +42,63 @@ def run(tmp_path):
 
 
 @pytest.mark.parametrize("discrepancy", ["none", "constant", "auto"])
-def test_the_posterior_of_a_run_is_fitted_again_from_its_own_files(run, discrepancy):
+def test_the_posterior_of_a_run_is_that_which_was_saved(run, discrepancy, monkeypatch):
+    monkeypatch.setattr("tissuq.posterior.solver.Solver.solve", lambda *_: pytest.fail("fitted again"))
     rows = {row["formulation"]: row for row in json.loads((run / "summary.json").read_text())}
-    found = tq.load_run(run, discrepancy)
-    assert found.summary().loc["C10", "mean"] == pytest.approx(rows[discrepancy]["C10_mean"], rel=1e-9)
-    assert found.log_evidence == pytest.approx(rows[discrepancy]["log_evidence"], rel=1e-9)
+    (run / "input" / "specimen.csv").unlink()
+    found = tq.load(run, discrepancy)
+    assert found.summary().loc["C10", "mean"] == rows[discrepancy]["C10_mean"]
+    assert found.log_evidence == rows[discrepancy]["log_evidence"]
     assert found.model.experiment.stress_unit == "kPa"
+    with pytest.deprecated_call():
+        assert tq.load_run(run, discrepancy).log_evidence == found.log_evidence
 
 
 def test_auto_is_taken_unless_another_is_named(run):
-    assert tq.load_run(run).model.discrepancy.name == "auto"
-    with pytest.raises(tq.InputError, match="has no discrepancy 'gp': choose one of none, constant, auto"):
-        tq.load_run(run, "gp")
-
-
-def test_a_run_whose_files_have_changed_warns(run):
-    copy = run / "input" / "specimen.csv"
-    copy.write_text(copy.read_text().replace("stress_kPa", "stress_kPa", 1).replace("0.7,", "0.71,", 1))
-    with pytest.warns(UserWarning, match="have changed since"):
-        tq.load_run(run)
+    assert tq.load(run).model.discrepancy.name == "auto"
+    assert tq.load(run, tq.discrepancies()["constant"]()).model.discrepancy.name == "constant"
+    assert tq.load(run / "posterior" / "none.nc").model.discrepancy.name == "none"
+    with pytest.raises(tq.InputError, match="has no discrepancy 'gp': choose one of auto, constant, none"):
+        tq.load(run, "gp")
 
 
 def test_other_folders_are_refused(run, tmp_path):
     with pytest.raises(tq.InputError, match="there is no run folder"):
-        tq.load_run(tmp_path / "none")
+        tq.load(tmp_path / "none")
     with pytest.raises(tq.InputError, match="not a complete run"):
-        tq.load_run(tmp_path)
+        tq.load(tmp_path)
     recipe = run / "run.toml"
     recipe.write_text(recipe.read_text().replace("tissuq fit", "tissuq paper"))
-    with pytest.raises(tq.InputError, match="is not one of tissuq fit"):
-        tq.load_run(run)
+    with pytest.raises(tq.InputError, match="is not a run of tissuq fit"):
+        recipe_of(run)
 
 
-@pytest.mark.parametrize(("content", "words"), [("{", "is damaged"), ("[3]", "is damaged"), ("[]", "has no rows")])
-def test_a_damaged_summary_is_said(run, content, words):
-    (run / "summary.json").write_text(content)
-    with pytest.raises(tq.InputError, match=words):
-        tq.load_run(run)
+def test_a_damaged_posterior_is_said(run):
+    (run / "posterior" / "auto.nc").write_bytes(b"{")
+    with pytest.raises(tq.InputError, match="is damaged or no posterior of tissuq"):
+        tq.load(run)
+
+
+def test_without_discrepancy_what_was_saved_is_taken_and_fitted_where_nothing_was(run, monkeypatch):
+    saved = load_without_discrepancy(run).summary()
+    (run / "posterior" / "none.nc").unlink()
+    assert load_without_discrepancy(run).summary().loc["C10", "mean"] == pytest.approx(
+        saved.loc["C10", "mean"], rel=1e-9
+    )
 
 
 def test_another_material_than_that_of_the_run_is_refused(run):
     with pytest.raises(tq.InputError, match="is of the material 'neo-hookean', not 'yeoh'"):
-        tq.load_run(run, material=tq.materials()["yeoh"]())
-    assert tq.load_run(run, material=tq.materials()["neo-hookean"]()).model.material.name == "neo-hookean"
+        tq.load(run, material=tq.materials()["yeoh"]())
+    assert tq.load(run, material=tq.materials()["neo-hookean"]()).model.material.name == "neo-hookean"
+
+
+@pytest.mark.parametrize("outside", ["../specimen.csv", "/etc/hostname", "link.csv"])
+def test_a_run_that_names_a_file_outside_of_its_folder_is_refused(run, tmp_path, outside):
+    (tmp_path / "specimen.csv").write_text((run / "input" / "specimen.csv").read_text())
+    (run / "link.csv").symlink_to(tmp_path / "specimen.csv")
+    (run / "posterior" / "none.nc").unlink()
+    recipe = run / "run.toml"
+    recipe.write_text(recipe.read_text().replace("input/specimen.csv", outside))
+    with pytest.raises(tq.InputError, match=f"names the file '{outside}', which does not lie in the folder"):
+        load_without_discrepancy(run)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.assessment.measurements import factors_of_tests
 
 STRETCH = {"uniaxial": np.linspace(0.8, 1.4, 12), "planar": np.linspace(1.02, 1.4, 9)}
 UNIT = {
@@ -55,7 +56,7 @@ def test_what_lies_beyond_the_other_tests_is_told_and_left_out(tests_of_two):
 
 
 def test_one_test_cannot_be_predicted_from_others(tests_of_two):
-    with pytest.raises(tq.InputError, match="there must be two or more"):
+    with pytest.raises(tq.InputError, match="needs two or more tests"):
         tq.held_out_tests(tests_of_two[:1])
 
 
@@ -66,6 +67,15 @@ def test_how_far_tests_are_apart_is_told(tests_of_two):
     assert ratio == pytest.approx(1.1 / 0.95, rel=0.06)
     assert posterior.model.tolerances.stress > 0
     assert tq.fit(tests_of_two[0], noise_sd=NOISE_SD).assess().factors == {}
+
+
+def test_tests_of_one_name_are_numbered_in_their_order(tests_of_two):
+    first, second = tests_of_two
+    stiffer = tq.Experiment("uniaxial", first.stretch, 1.2 * first.stress, first.name)
+    posterior = tq.fit([first, second, stiffer], discrepancy="none", noise_sd=NOISE_SD)
+    factors = factors_of_tests(posterior.solution)
+    assert list(factors) == ["uniaxial (1)", "planar", "uniaxial (3)"]
+    assert factors["uniaxial (3)"] / factors["uniaxial (1)"] == pytest.approx(1.2, rel=1e-3)
 
 
 def specimens(spread):

@@ -65,7 +65,7 @@ def test_the_usual_stretches_are_the_calibrated_ones(fits, data):
     ends = calibrated_range(data, loading_mode("planar"))
     np.testing.assert_allclose(found.points, np.linspace(*ends, 7), rtol=1e-12)
     assert found.is_calibrated.all()
-    assert not found.notes
+    assert not found.warnings
     assert predicted(fits["none"], points=7).mode.name == "uniaxial"
 
 
@@ -81,9 +81,9 @@ def test_what_is_beyond_the_data_is_marked_and_told_once(fits, data, planar):
     low, high = calibrated_range(data, loading_mode("planar"))
     assert found.is_calibrated.tolist() == [False, True, True, False]
     assert found.table["is_calibrated"].tolist() == found.is_calibrated.tolist()
-    (told,) = [note for note in found.notes if "calibrated" in note]
+    (told,) = [text for text in found.warnings if "calibrated" in text]
     outside = int((planar.stretch > high).sum())
-    assert told.startswith(f"2 of 4 points and {outside} of 8 measurements lie beyond")
+    assert told.startswith(f"2 of 4 points and {outside} of 8 measurements lie outside the measured range")
     assert f"from {low:.4g} to {high:.4g}" in told
     assert found.is_data_calibrated.sum() == 8 - outside
 
@@ -91,11 +91,11 @@ def test_what_is_beyond_the_data_is_marked_and_told_once(fits, data, planar):
 def test_an_error_of_the_stress_is_left_out_elsewhere_and_that_is_said(fits):
     found = predicted(fits["constant"], mode="planar", stretch=[1.2])
     assert found.kinds == (False,)
-    assert any("says nothing about the planar one" in note for note in found.notes)
+    assert any("does not apply to the planar stress" in text for text in found.warnings)
     assert "mean" not in found.table
     own = predicted(fits["constant"], stretch=[1.2])
     assert own.kinds == (True, False)
-    assert not own.notes
+    assert not own.warnings
 
 
 def test_without_a_discrepancy_there_is_one_prediction(fits):
@@ -111,11 +111,11 @@ def test_measurements_are_scored_with_the_discrepancy_and_without(fits, planar):
 
 
 def test_a_reader_is_told_what_the_comparison_cannot_say(fits, data, planar):
-    assert any("--tolerance" in note for note in predicted(fits["none"], data=planar).notes)
-    (only,) = predicted(fits["none"], data=data).notes
-    assert "very measurements" in only
+    assert any("--tolerance" in text for text in predicted(fits["none"], data=planar).warnings)
+    (only,) = predicted(fits["none"], data=data).warnings
+    assert "fitted to these measurements" in only
     tolerant = tq.fit(data, discrepancy="none", noise_sd=NOISE_SD, tolerances=tq.Tolerances(stress=0.1))
-    assert not any("--tolerance" in note for note in predicted(tolerant, data=planar).notes)
+    assert not any("--tolerance" in text for text in predicted(tolerant, data=planar).warnings)
 
 
 def test_labelled_arrays_hold_every_band_in_mpa(fits, planar, tmp_path):
@@ -180,14 +180,14 @@ def test_of_several_modes_one_must_be_chosen(data, planar):
 
 
 def test_what_cannot_be_compared_is_refused(fits, data, planar):
-    with pytest.raises(tq.InputError, match="are of mode planar, and equibiaxial is predicted"):
+    with pytest.raises(tq.InputError, match="are of mode planar, but the predicted mode is equibiaxial"):
         predicted(fits["none"], mode="equibiaxial", data=planar)
     with pytest.raises(tq.InputError, match="several tests"):
         predicted(fits["none"], data=tq.fit([data, planar], discrepancy="none").model.experiment)
 
 
 def test_a_stress_beyond_all_numbers_is_refused(fits):
-    with pytest.raises(tq.ModelError, match="too large for a number at a stretch of 1e\\+160"):
+    with pytest.raises(tq.ModelError, match="overflows at a stretch of 1e\\+160"):
         predicted(fits["auto"], mode="equibiaxial", stretch=[1.1, 1e160])
 
 
@@ -208,7 +208,7 @@ def test_texts_say_stretches(text, expected):
 
 @pytest.mark.parametrize("text", ["", "a", "1:", ":2", "2:1", "1:1", "1:2:3", "1,,2", "0.7-2", "nan", "1:inf"])
 def test_other_texts_are_refused(text):
-    with pytest.raises(tq.InputError, match="says no stretches"):
+    with pytest.raises(tq.InputError, match="is not a range or list of stretches"):
         stretches(text)
 
 
@@ -240,5 +240,5 @@ def test_a_file_says_its_mode(run, tmp_path):
     found = run_prediction(settings)
     assert found.mode.name == "planar"
     np.testing.assert_allclose(found.data.stress, [0.21, 0.38], rtol=1e-12)
-    with pytest.raises(tq.InputError, match="measured in mode planar, and mode equibiaxial"):
+    with pytest.raises(tq.InputError, match="measured in mode planar, but mode equibiaxial"):
         run_prediction(settings.model_copy(update={"mode": "equibiaxial"}))

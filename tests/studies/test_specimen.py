@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from tissuq import fitting
 from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.posterior import fitting
 from tissuq.studies import specimen
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Average", "average"]
 
-NEGLIGIBLE = 1e-9
-"""Weight below which a fit is left out of marginals and predictions."""
+NEGLIGIBLE_WEIGHT = 1e-9
+"""Weight below which a fit is omitted from marginals and predictions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Average:
     @cached_property
     def marginals(self) -> Mapping[str, Marginal]:
         """The marginal posterior of every parameter of the material: density, quantiles, HDI."""
-        first = next(iter(self.solutions.values()))
-        return Marginals(first.model.material_symbols, self._marginal)
+        solution = next(iter(self.solutions.values()))
+        return Marginals(solution.model.material_symbols, self._marginal)
 
     def summary(self, prob: float = 0.95) -> pd.DataFrame:
         """Return mean, sd and the highest-density interval of every parameter of the material.
@@ -80,29 +80,33 @@ class Average:
         import pandas as pd
 
         options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
-        return pd.DataFrame(vars(predict_average(self._parts, stretch, **options)))
+        return pd.DataFrame(vars(predict_average(self._weighted_fits, stretch, **options)))
 
     def __repr__(self) -> str:
         return f"<Average of {', '.join(f'{name} {weight:.0%}' for name, weight in self.weights.items())}>"
 
     @property
-    def _parts(self) -> list[tuple[float, Solution]]:
+    def _weighted_fits(self) -> list[tuple[float, Solution]]:
         """The fits that matter, with weights that sum to one."""
-        parts = [(self.weights[name], each) for name, each in self.solutions.items() if self.weights[name] > NEGLIGIBLE]
-        total = sum(weight for weight, _ in parts)
-        return [(weight / total, each) for weight, each in parts]
+        weighted = [
+            (self.weights[name], solution)
+            for name, solution in self.solutions.items()
+            if self.weights[name] > NEGLIGIBLE_WEIGHT
+        ]
+        total = sum(weight for weight, _ in weighted)
+        return [(weight / total, solution) for weight, solution in weighted]
 
     def _marginal(self, symbol: str) -> Marginal:
-        ends = np.array([each.model.priors[symbol].support for _, each in self._parts])
-        parts = [(weight, each.marginals[symbol]) for weight, each in self._parts]
-        return blended(parts, (float(ends[:, 0].min()), float(ends[:, 1].max())))
+        ends = np.array([solution.model.priors[symbol].support for _, solution in self._weighted_fits])
+        marginals = [(weight, solution.marginals[symbol]) for weight, solution in self._weighted_fits]
+        return blended(marginals, (float(ends[:, 0].min()), float(ends[:, 1].max())))
 
 
 def average(fits: Mapping[str, Any]) -> Average:
     """Return the average of fits of the same data by their evidence, each as probable as the others before the data.
 
-    What the parameters mean is what they mean in the fits: a fit whose discrepancy takes a share of the initial
-    stiffness brings that into the average with its weight.
+    The parameters keep their meaning in the fits: a fit whose discrepancy takes a share of the initial stiffness
+    contributes that to the average with its weight.
 
     Parameters
     ----------
@@ -144,20 +148,17 @@ def _check(fits: Mapping[str, Any]) -> None:
     for name, fit in fits.items():
         if fit.log_evidence is None:
             raise InputError(
-                f"'{name}' has no evidence, which the average weights by: fit it with the method 'auto', 'exact' or "
-                "'smc', and with no flat prior."
+                f"'{name}' has no evidence, by which the average is weighted: fit it with the method 'auto', 'exact' "
+                "or 'smc', and with no flat prior."
             )
         if fit.solution.is_approximate:
             raise InputError(f"'{name}' has not converged: leave it out, or fit it with another method.")
-    one, first = next(iter(fits.items()))
+    first_name, first_fit = next(iter(fits.items()))
     for name, fit in fits.items():
-        data, same = fit.model.experiment, first.model.experiment
-        if data.mode != same.mode or not all(
-            np.array_equal(*pair, equal_nan=True) for pair in ((data.stretch, same.stretch), (data.stress, same.stress))
-        ):
-            raise InputError(f"'{one}' and '{name}' are fits of different data: only those of the same average.")
-        if fit.model.material != first.model.material:
+        if not fit.model.experiment.has_measurements_of(first_fit.model.experiment):
+            raise InputError(f"'{first_name}' and '{name}' are fits of different data: average fits of the same data.")
+        if fit.model.material != first_fit.model.material:
             raise InputError(
-                f"'{one}' and '{name}' are fits of different materials ({first.model.material.name} and "
+                f"'{first_name}' and '{name}' are fits of different materials ({first_fit.model.material.name} and "
                 f"{fit.model.material.name}), whose parameters mean different things: average fits of one material."
             )

@@ -1,4 +1,4 @@
-"""Fits of the same data side by side: evidence, predictive density, and weights for predictions."""
+"""Fits of the same data side by side, and the scores of a fit for a test that it has not seen."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.sensitivity import SCALES
+from tissuq.assessment.sensitivity import SCALE_FACTORS
+from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
-from tissuq.prediction.densities import MOST_KHAT
+from tissuq.experiments.experiment import Experiment
+from tissuq.inference.solution import Solution
+from tissuq.prediction.bands import stress_ratio
+from tissuq.prediction.densities import MAX_KHAT
+from tissuq.prediction.scores import judged
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["compare"]
+__all__ = ["compare", "scores_of"]
 
 FloatArray = NDArray[np.float64]
 
-CHANGES = (*SCALES, "boxes")
-"""Changes of priors under which the log evidence is told."""
+EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
+"""Changes of priors for which the change of the log evidence is given."""
 
 
 def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
@@ -36,19 +41,19 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Indexed by name; missing is what is not known, as all that follows from an evidence that is not.
+        Indexed by name; unknown numbers are missing, such as all that follow from an unknown evidence.
 
         - log_evidence, log_bayes_factor against the best, and probability, were all as probable before the data.
         - log_bayes_factor_low and _high: its least and largest values with the prior scales of the discrepancies'
           random parts a quarter or fourfold, and with the uniform boxes of linear parameters four times as wide, each
           in all fits at once. evidence_change_quarter, _fourfold and _boxes are the changes of the log evidence from
           which they come. Other fits of the same data give the first two, unless a sampler would be needed; of saved
-          trees they are known where an attribute of that name says them.
+          trees they are known where the tree has an attribute of that name.
         - elpd, the expected log density of new measurements by leave-one-out; elpd_difference, by how much it falls
           short of the best, and its standard error. Each measurement's density given the others is a closed form
           at given nonlinear parameters, whose posterior without it follows by importance weights
-          (`tissuq.prediction.densities`). is_rough marks fits in which these weights leave too few.
-        - stacking: weights for an average of *predictions*, which say nothing of parameters.
+          (`tissuq.prediction.densities`). is_rough marks fits in which too few of these weights are effective.
+        - stacking: weights for an average of *predictions*, not of parameters.
         - parameter, median, hdi_low, hdi_high: the material's first parameter and its 95 % interval, MPa.
 
     Raises
@@ -76,7 +81,7 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
     _check(trees)
     evidence = _numbers(trees, "log_evidence")
     factor = evidence - np.nanmax([*evidence, -np.inf])
-    changes = {f"evidence_change_{name}": _numbers(trees, f"evidence_change_{name}") for name in CHANGES}
+    changes = {f"evidence_change_{name}": _numbers(trees, f"evidence_change_{name}") for name in EVIDENCE_CHANGES}
     best = int(np.argmax(np.nan_to_num(factor, nan=-np.inf)))
     factors = np.array([factor, *(factor + change - change[best] for change in changes.values())])
     table = pd.DataFrame(
@@ -97,13 +102,13 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def _tree(fit: Any) -> xr.DataTree:
-    """Return what is known of a fit as a tree; of one in memory, also what other fits of its data tell."""
+    """Return a fit as a tree; for one in memory, with the changes of its evidence from other fits of its data."""
     import xarray as xr
 
     if isinstance(fit, xr.DataTree):
         return fit
     tree: xr.DataTree = fit.data.copy()
-    if fit.diagnostics is None and not all(f"evidence_change_{name}" in tree.attrs for name in CHANGES):
+    if fit.diagnostics is None and not all(f"evidence_change_{name}" in tree.attrs for name in EVIDENCE_CHANGES):
         tree.attrs |= {f"evidence_change_{name}": value for name, value in fit.assess().evidence_changes.items()}
     return tree
 
@@ -118,16 +123,16 @@ def _by_leave_one_out(trees: Mapping[str, xr.DataTree]) -> dict[str, NDArray[Any
     from arviz_stats import compare as compare_by_loo
     from arviz_stats.utils import ELPDData
 
-    found = {}
+    elpds = {}
     for name, tree in trees.items():
         density, is_rough = tree["leave_one_out"]["log_density"], tree["leave_one_out"]["is_rough"]
         n = density.size
         elpd, error = float(density.sum()), float(np.sqrt(n * density.var()))
         rough = bool(is_rough.any())
-        found[name] = ELPDData("loo", elpd, error, np.nan, 0, n, "log", rough, MOST_KHAT, density)
+        elpds[name] = ELPDData("loo", elpd, error, np.nan, 0, n, "log", rough, MAX_KHAT, density)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what they say is in the column is_rough
-        table = compare_by_loo(found).loc[list(trees)]
+        warnings.simplefilter("ignore")  # the column is_rough has their content
+        table = compare_by_loo(elpds).loc[list(trees)]
     return {
         "elpd": table["elpd"].to_numpy(float),
         "elpd_difference": table["elpd_diff"].to_numpy(float),
@@ -144,15 +149,43 @@ def _check(trees: Mapping[str, Any]) -> None:
     for name, tree in trees.items():
         if not {"observed_data", "constant_data", "leave_one_out"} <= set(tree.children):
             raise InputError(
-                f"'{name}' is no posterior of tissuq: it has no measurements or no leave-one-out densities."
+                f"'{name}' is not a posterior of tissuq: it has no measurements or no leave-one-out densities."
             )
-    first = trees[names[0]]
+    first_tree = trees[names[0]]
     for name in names[1:]:
-        if trees[name].attrs.get("loading_mode") != first.attrs.get("loading_mode"):
+        if trees[name].attrs.get("loading_mode") != first_tree.attrs.get("loading_mode"):
             raise InputError(f"'{names[0]}' and '{name}' are fits of different loading modes.")
         for group, variable in (("observed_data", "stress"), ("constant_data", "stretch")):
-            one, other = first[group][variable].to_numpy(), trees[name][group][variable].to_numpy()
-            if one.shape != other.shape or not np.array_equal(one, other):
+            values, other_values = first_tree[group][variable].to_numpy(), trees[name][group][variable].to_numpy()
+            if values.shape != other_values.shape or not np.array_equal(values, other_values):
                 raise InputError(
-                    f"'{names[0]}' and '{name}' are fits of different measurements: only those of the same compare."
+                    f"'{names[0]}' and '{name}' are fits of different measurements: compare fits of the same ones."
                 )
+
+
+def scores_of(
+    solution: Solution, test: Experiment, *, discrepancy: bool, prob: float, stress_type: str
+) -> pd.DataFrame:
+    """Return the scores of a test, or of several joined; `Posterior.scores` defines them."""
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = []
+    for curve in test.curves:
+        ratio = stress_ratio(stress_type, curve.mode, curve.channel)
+        predicted = judged(solution, curve, discrepancy=discrepancy, prob=prob)
+        predicted = predicted.times(ratio(predicted.points))
+        labels = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity}
+        for name, in_range in _ranges(is_calibrated(solution.model.experiment, curve.mode, predicted.points)).items():
+            rows.append(labels | {"range": name, "count": int(in_range.sum())} | predicted.where(in_range).summary())
+    return pd.DataFrame(rows)
+
+
+def _ranges(calibrated: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
+    """Return all measurements, and where some are beyond the calibrated range those on either side of its ends."""
+    all_points = {"all": np.ones_like(calibrated)}
+    ranges = {"calibrated": calibrated, "beyond": ~calibrated}
+    return (
+        all_points
+        if calibrated.all()
+        else all_points | {name: in_range for name, in_range in ranges.items() if in_range.any()}
+    )

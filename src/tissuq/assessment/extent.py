@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.between_tests import factors_of_tests
-from tissuq.assessment.design import design_warnings
+from tissuq.assessment.measurements import factors_of_tests, measurement_warnings
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.sensitivity import (
-    SCALES,
+    SCALE_FACTORS,
     PowerScaling,
     known_evidence_changes,
     power_scaling,
@@ -22,13 +20,15 @@ from tissuq.assessment.sensitivity import (
     scale_symbols,
 )
 from tissuq.assessment.stability import StableRange
-from tissuq.discrepancy import discrepancy_named
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.experiments.units import stress_unit
+from tissuq.experiments.modes import States
+from tissuq.experiments.reading.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
-from tissuq.model import StatisticalModel
+from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.fitted_errors import FittedErrors
+from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
 __all__ = ["Assessment", "assess", "has_energy"]
@@ -36,68 +36,68 @@ __all__ = ["Assessment", "assess", "has_energy"]
 FloatArray = NDArray[np.float64]
 Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
 
-DRAWS = 2000
-POINTS = 60
-"""Measured stretches, at most, over which the share is taken."""
-STEP = 1e-4
-"""Of the stretch, for the initial slope."""
-NOTHING = 1e-3
-"""Share of the initial stiffness that is as good as none."""
-LITTLE, MUCH = 0.2, 0.5
-"""Shifts of the mean, in standard deviations, from which the discrepancy's prior scales matter a little, and much."""
+SHARE_DRAWS = 2000
+MAX_SHARE_POINTS = 60
+"""Largest number of measured stretches over which the share is averaged."""
+STRETCH_STEP = 1e-4
+"""Step of the stretch for the initial slope."""
+NEGLIGIBLE_INITIAL_SHARE = 1e-3
+"""Largest share of the initial stiffness that counts as none."""
+MIN_NOTICEABLE_SHIFT, MIN_IMPORTANT_SHIFT = 0.2, 0.5
+"""Smallest shifts of the mean, in standard deviations, by which prior scales matter a little, and much."""
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """What a discrepancy does in a posterior.
+    """The effect of a discrepancy on a posterior.
 
     Attributes
     ----------
     parameter : str
         The headline parameter, to which the numbers refer.
     share : tuple of float
-        Root mean square of the discrepancy's stress over that of the whole, at the measurements: mean, and the ends
-        of its 95 % interval.
+        Root mean square of the discrepancy's stress over that of the total stress at the measurements: mean, and the
+        ends of its 95 % interval.
     initial_share : tuple of float
-        Share of the initial stiffness that the discrepancy carries, likewise: what it could have taken from the
-        parameter. Zero for an energy discrepancy.
+        Share of the initial stiffness that the discrepancy carries, likewise: the largest error of the parameter.
+        Zero for an energy discrepancy.
     modulus : tuple of float
         The material's initial shear modulus, MPa: mean, and the ends of its 95 % HDI.
     modulus_symbols, other_symbols : tuple of str
-        The material's parameters that it is made of, and the others. Beside an energy discrepancy it keeps its meaning
-        (and a parameter that alone makes it), and the others share theirs.
+        The material's parameters on which the modulus depends, and the others. Beside an energy discrepancy the modulus
+        keeps its meaning (as does a parameter that alone determines it), and the others share theirs.
     unit : str
-        Of stress, in which sentences speak.
+        Unit of stress in sentences.
     amplitudes : dict of str to float
         Posterior median of each amplitude of an energy discrepancy over the mean of the parameter.
     members : dict of str to float
-        Posterior probabilities of the sums that an average is made of.
+        Posterior probabilities of the sums of energies in an average.
     between : float
         Share of the parameter's variance that is between these.
     probability_of_none : float or None
-        Of no discrepancy, were it as probable as this one before the data. For information: intervals that drop the
-        discrepancy on that ground miss the parameter where a small discrepancy hides in the noise.
+        Posterior probability of no discrepancy, if it is as probable as this one before the data. For information:
+        intervals that drop the discrepancy for that reason miss the parameter where the noise hides a small one.
     width_against_none : float or None
         Standard deviation of the parameter over that without discrepancy.
     scales : tuple of str
         The parameters that set the size of the discrepancy's random part.
     shifts : dict of float to float
         Shift of the parameter's mean, in standard deviations, when the prior scales of these are multiplied by a
-        factor. Empty where that would need other runs of a sampler.
+        factor. Empty where that would need further runs of a sampler.
     evidence_changes : dict of str to float
         Change of the log evidence when these scales are a quarter or fourfold, and when the uniform boxes of the linear
-        parameters are four times as wide (boxes); without what is not known.
+        parameters are four times as wide (boxes); unknown changes are missing.
     has_energy : bool
-        Whether the discrepancy has an energy, which takes part in the stability.
+        Whether the discrepancy has an energy, which influences the stability.
     stable : dict of str to float
         For every loading mode, the probability that material and energy discrepancy are stable over the measured range;
-        empty where the material's energy does not tell.
+        empty where it cannot be computed from the material's energy.
     factors : dict of str to float
-        By what factor the stress of each of several tests is larger than the common material says.
+        Factor of the stress of each of several tests over that of the common material.
     power_scaling : PowerScaling or None
         Sensitivity of the parameter to the powers of prior and likelihood.
     warnings : tuple of str
-        What the design of the test leaves open, and what to measure next.
+        Warnings about the measured range, with advice what to measure next.
     """
 
     parameter: str
@@ -123,51 +123,53 @@ class Assessment:
 
     @property
     def sentences(self) -> list[str]:
-        """The numbers as a person reads them."""
-        found = [*self._shares(), self._modulus()]
+        """The numbers in sentences."""
+        clauses = [*self._shares(), self._modulus()]
         if self.width_against_none is not None:
-            found.append(f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy")
+            clauses.append(
+                f"the sd of {self.parameter} is {self.width_against_none:.1f} times that without discrepancy"
+            )
         if self.probability_of_none is not None:
-            found.append(
-                f"were no discrepancy as probable before the data, it would have {_percent(self.probability_of_none)} "
-                "now (for information: that is no reason to drop it)"
+            clauses.append(
+                f"if no discrepancy were as probable before the data, its probability would now be "
+                f"{_percent(self.probability_of_none)} (for information: that is no reason to drop the discrepancy)"
             )
         if len(self.members) > 1:
             named = ", ".join(f"{name} {weight:.0%}" for name, weight in self.members.items() if weight >= 0.005)
-            found.append(f"the energies have the weights {named}; {self.between:.0%} of the variance is between them")
+            clauses.append(f"the energies have the weights {named}; {self.between:.0%} of the variance is between them")
         if self.shifts:
             worst = max(self.shifts, key=lambda factor: abs(self.shifts[factor]))
-            found.append(
-                f"the prior scale of {' and '.join(self.scales)} {_weight(self.shifts[worst])}: times {worst:g} it "
-                f"moves {self.parameter} by {self.shifts[worst]:+.2f} sd"
+            clauses.append(
+                f"the prior scale of {' and '.join(self.scales)} {_influence(self.shifts[worst])}: multiplied by "
+                f"{worst:g}, it shifts {self.parameter} by {self.shifts[worst]:+.2f} sd"
             )
         if self.stable:
-            found.append(self._stability())
+            clauses.append(self._stability())
         if self.factors:
             named = ", ".join(f"{name} {factor - 1:+.0%}" for name, factor in self.factors.items())
-            found.append(f"of the material that they have in common the stresses of the tests differ by {named}")
+            clauses.append(f"the stresses of the tests differ from those of their common material by {named}")
         if self.power_scaling is not None:
-            found.append(self.power_scaling.sentence(self.parameter))
-        return [f"{text[0].upper()}{text[1:]}." for text in found]
+            clauses.append(self.power_scaling.sentence(self.parameter))
+        return [f"{text[0].upper()}{text[1:]}." for text in clauses]
 
     def _shares(self) -> Iterator[str]:
-        """Yield what the discrepancy carries of the stress and of the initial stiffness, in words."""
+        """Yield the discrepancy's shares of the stress and of the initial stiffness, in words."""
         mean, low, high = self.share
         if not high:
             yield (
-                "there is no discrepancy: whatever the material lacks is taken for noise, and the interval of "
-                f"{self.parameter} knows nothing of it"
+                "there is no discrepancy: errors of the material are taken for noise, and the interval of "
+                f"{self.parameter} does not include them"
             )
             return
         if high < 1:
             yield f"the discrepancy carries {mean:.0%} of the stress (95 % interval {low:.0%} to {high:.0%})"
         else:
             yield (
-                "the data do not tell how much of the stress the discrepancy carries (95 % interval "
+                "the data do not determine how much of the stress the discrepancy carries (95 % interval "
                 f"{low:.0%} to {high:.0%}: it may oppose the material)"
             )
-        if max(map(abs, self.initial_share)) < NOTHING:
-            yield f"it has no initial stiffness, so none of {self.parameter} can hide in it"
+        if max(map(abs, self.initial_share)) < NEGLIGIBLE_INITIAL_SHARE:
+            yield f"it has no initial stiffness, so it takes none from {self.parameter}"
             return
         mean, low, high = self.initial_share
         yield (
@@ -176,22 +178,22 @@ class Assessment:
         )
 
     def _stability(self) -> str:
-        """Return how probable stability is over the measured range, in words."""
+        """Return the probability of stability over the measured range, in words."""
         worst = min(self.stable, key=lambda mode: self.stable[mode])
-        what = "material and discrepancy together are" if self.has_energy else "the material is"
-        text = f"over the measured range of the invariants {what} stable with a probability of"
+        subject = "material and discrepancy together are" if self.has_energy else "the material is"
+        text = f"over the measured range of the invariants {subject} stable with a probability of"
         return (
             f"{text} {_percent(self.stable[worst])} (Baker-Ericksen, Drucker, rising stress; least in {worst} loading)"
         )
 
     def _modulus(self) -> str:
-        """Return what is known of the initial shear modulus, in words."""
+        """Return the initial shear modulus, in words."""
         mean, low, high = (value / stress_unit(self.unit).to_mpa for value in self.modulus)
         text = f"the material's initial shear modulus is {mean:.3g} {self.unit} (95 % interval {low:.3g} to {high:.3g})"
         if len(self.modulus_symbols) == 1:
-            text += f", by {self.modulus_symbols[0]} alone"
+            text += f", determined by {self.modulus_symbols[0]} alone"
         else:
-            text += f", by {' and '.join(self.modulus_symbols)} together, which say less one by one"
+            text += f", determined by {' and '.join(self.modulus_symbols)} together, each of which is less certain"
         if self.amplitudes and self.other_symbols:
             verb = "shares its" if len(self.other_symbols) == 1 else "share their"
             text += f"; {' and '.join(self.other_symbols)} {verb} meaning with the discrepancy"
@@ -199,30 +201,30 @@ class Assessment:
 
 
 def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) -> Assessment:
-    """Return what the discrepancy does in a posterior.
+    """Return the effect of the discrepancy on a posterior.
 
     Parameters
     ----------
     solution : Solution
     solve : callable
         Returns the solutions of models by the method that gave this one: for the same model without discrepancy, and
-        with other prior scales of what sets the discrepancy's size.
+        with other prior scales of the discrepancy.
     ranges : mapping of str to StableRange
-        Where it is stable, by loading mode.
+        Stable range by loading mode.
     """
     model, marginal = solution.model, solution.marginals[solution.model.headline]
     none = _without(model, solve)
     share, initial_share = _shares(solution)
     stiffness = modulus(solution)
     scales = scale_symbols(model)
-    others = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
+    rescaled_solutions = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
     return Assessment(
         parameter=model.headline,
         share=share,
         initial_share=initial_share,
         modulus=(stiffness.mean, *stiffness.hdi()),
-        modulus_symbols=(own := modulus_symbols(model)),
-        other_symbols=tuple(symbol for symbol in model.material_symbols if symbol not in own),
+        modulus_symbols=(symbols := modulus_symbols(model)),
+        other_symbols=tuple(symbol for symbol in model.material_symbols if symbol not in symbols),
         unit=model.experiment.stress_unit,
         amplitudes={
             symbol: float(solution.marginals[symbol].quantile(0.5)) / marginal.mean for symbol in model.energy_symbols
@@ -233,20 +235,20 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
         width_against_none=marginal.sd / none.marginals[model.headline].sd if none else None,
         scales=scales,
         shifts={
-            SCALES[name]: float((each.marginals[model.headline].mean - marginal.mean) / marginal.sd)
-            for name, each in others.items()
+            SCALE_FACTORS[name]: float((solution_rescaled.marginals[model.headline].mean - marginal.mean) / marginal.sd)
+            for name, solution_rescaled in rescaled_solutions.items()
         },
-        evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, others),
+        evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, rescaled_solutions),
         has_energy=has_energy(model),
-        stable={mode: found.probability for mode, found in ranges.items()},
+        stable={mode: stable_range.probability for mode, stable_range in ranges.items()},
         factors=factors_of_tests(solution),
         power_scaling=power_scaling(solution),
-        warnings=tuple(design_warnings(model.experiment)),
+        warnings=tuple(measurement_warnings(model.experiment)),
     )
 
 
 def has_energy(model: StatisticalModel) -> bool:
-    """Return whether there is a discrepancy with an energy of its own."""
+    """Return whether there is a discrepancy with an energy."""
     return model.discrepancy.is_energy and bool(model.discrepancy.parameters)
 
 
@@ -255,43 +257,65 @@ def _without(model: StatisticalModel, solve: Solve) -> Solution | None:
     nothing = discrepancy_named("none")
     if model.discrepancy == nothing:
         return None
-    kept = (*model.material_symbols, *(parameter.symbol for parameter in model.noise.parameters))
-    own = {symbol: prior for symbol, prior in model.priors.items() if symbol in kept}
+    retained = (*model.material_symbols, *(parameter.symbol for parameter in model.noise.parameters))
+    priors = {symbol: prior for symbol, prior in model.priors.items() if symbol in retained}
     try:
-        unknown: dict[str, Any] = dict.fromkeys(("known_statistics", "curve", "level", "lag"))
-        return solve([replace(model, discrepancy=nothing, chosen_priors=own, **unknown)])[0]
-    except ModelError:  # a sampler that was asked for has nothing left to sample, or nothing is stable
+        return solve([replace(model, discrepancy=nothing, chosen_priors=priors, fitted_errors=FittedErrors())])[0]
+    except ModelError:  # the requested sampler has nothing to sample, or nothing is stable
         return None
 
 
 def _rescaled(model: StatisticalModel, solve: Solve) -> dict[str, Solution]:
     """Return the solutions with other prior scales of the discrepancy's random part, where there are any."""
-    found = {}
-    for name, factor in SCALES.items():
+    solutions = {}
+    for name, factor in SCALE_FACTORS.items():
         with suppress(ConvergenceError, ModelError):
-            found[name] = solve([rescaled(model, factor)])[0]
-    return found
+            solutions[name] = solve([rescaled(model, factor)])[0]
+    return solutions
 
 
-def _evidence_changes(solution: Solution, others: Mapping[str, Solution]) -> dict[str, float]:
+def _evidence_changes(solution: Solution, rescaled_solutions: Mapping[str, Solution]) -> dict[str, float]:
     """Return by how much the log evidence of other solutions exceeds that of one, where both have any."""
-    known = {name: each.log_evidence for name, each in others.items() if each.log_evidence is not None}
-    own = solution.log_evidence
-    return {} if own is None else {name: float(value - own) for name, value in known.items()}
+    evidences = {
+        name: rescaled.log_evidence
+        for name, rescaled in rescaled_solutions.items()
+        if rescaled.log_evidence is not None
+    }
+    log_evidence = solution.log_evidence
+    return {} if log_evidence is None else {name: float(value - log_evidence) for name, value in evidences.items()}
 
 
 def _shares(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals."""
-    experiment, components = solution.model.experiment, solution.components
-    data = np.unique(experiment.stretch, axis=0)
-    some = data[np.linspace(0, len(data) - 1, min(len(data), POINTS)).astype(int)]
-    mode = experiment.parts[0].mode
-    _, reference = experiment.along(mode, mode.excursion([-STEP, STEP]))
-    at = np.concatenate([some, reference])
-    alone, other = drawn_curves(solution.model, components[systematic(components.weights[None], DRAWS)[0]], at)
-    size = np.sqrt((other[:, :-2] ** 2).mean(axis=1) / ((alone + other)[:, :-2] ** 2).mean(axis=1))
-    slope, own = (curve[:, -1] - curve[:, -2] for curve in (other, alone))
-    return _mean_and_ends(size), _mean_and_ends(slope / (slope + own))
+    experiment, components = solution.model.experiment, solution.mixture
+    mode = experiment.curves[0].mode
+    reference = experiment.states_at(mode.excursion([-STRETCH_STEP, STRETCH_STEP]), mode)
+    states = States.joined([_even(experiment.states), reference])
+    material_stress, discrepancy_stress = drawn_curves(
+        solution.model, components[systematic(components.weights[None], SHARE_DRAWS)[0]], states
+    )
+    size = np.sqrt(
+        (discrepancy_stress[:, :-2] ** 2).mean(axis=1)
+        / ((material_stress + discrepancy_stress)[:, :-2] ** 2).mean(axis=1)
+    )
+    slope, material_slope = (curve[:, -1] - curve[:, -2] for curve in (discrepancy_stress, material_stress))
+    return _mean_and_ends(size), _mean_and_ends(slope / (slope + material_slope))
+
+
+def _even(states: States) -> States:
+    """Return few states that stand for all different ones."""
+    different = []
+    for path, points in zip(states.paths, states.points, strict=True):
+        unique = np.unique(points, axis=0)
+        different.append(unique[np.argsort(path.abscissa(unique), kind="stable")])
+    ends = np.cumsum([len(points) for points in different])
+    chosen = np.linspace(0, ends[-1] - 1, min(int(ends[-1]), MAX_SHARE_POINTS)).astype(int)
+    starts = ends - [len(points) for points in different]
+    points = [
+        unique[chosen[(start <= chosen) & (chosen < end)] - start]
+        for unique, start, end in zip(different, starts, ends, strict=True)
+    ]
+    return States(states.paths, tuple(points), states.curves)
 
 
 def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
@@ -301,18 +325,18 @@ def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
 
 def _between(solution: Solution, marginal: Marginal) -> float:
     """Return the share of the headline parameter's variance that is between the members of an average."""
-    parts = solution.components
-    if parts.member is None:
+    mixture = solution.mixture
+    if mixture.member is None:
         return 0.0
     model = solution.model
-    columns = dict(zip((*model.nonlinear, *model.linear), np.hstack([parts.settings, parts.mean]).T, strict=False))
+    columns = dict(zip((*model.nonlinear, *model.linear), np.hstack([mixture.settings, mixture.mean]).T, strict=False))
     values = columns[model.headline]
-    names = np.array([member.name for member in model.energy_members])[parts.member]
+    names = np.array([member.name for member in model.energy_members])[mixture.member]
     explained = 0.0
     for name in np.unique(names):
-        own = names == name
-        mean = float(np.average(values[own], weights=parts.weights[own]))
-        explained += float(parts.weights[own].sum()) * (mean - marginal.mean) ** 2
+        is_member = names == name
+        mean = float(np.average(values[is_member], weights=mixture.weights[is_member]))
+        explained += float(mixture.weights[is_member].sum()) * (mean - marginal.mean) ** 2
     return explained / marginal.sd**2
 
 
@@ -328,6 +352,12 @@ def _percent(probability: float) -> str:
     return f"{probability:.0%}"
 
 
-def _weight(shift: float) -> str:
-    """Return in words how much a shift of some standard deviations matters."""
-    return "matters" if abs(shift) > MUCH else "matters a little" if abs(shift) > LITTLE else "hardly matters"
+def _influence(shift: float) -> str:
+    """Return in words how much a shift in standard deviations matters."""
+    return (
+        "matters"
+        if abs(shift) > MIN_IMPORTANT_SHIFT
+        else "matters a little"
+        if abs(shift) > MIN_NOTICEABLE_SHIFT
+        else "matters little"
+    )

@@ -1,4 +1,4 @@
-"""What priors do to a parameter and to the evidence: power-scaling, and other widths of the priors."""
+"""Sensitivity of a parameter and of the evidence to the priors: power-scaling, and other widths of the priors."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.solution import Solution
-from tissuq.model import StatisticalModel
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Flat, Prior, Uniform
 from tissuq.prediction.densities import joint_log_likelihood
 from tissuq.prediction.replicates import stride
-from tissuq.priors import Flat, Prior, Uniform
 
-__all__ = ["SCALES", "PowerScaling", "known_evidence_changes", "power_scaling", "rescaled", "scale_symbols"]
+__all__ = ["SCALE_FACTORS", "PowerScaling", "known_evidence_changes", "power_scaling", "rescaled", "scale_symbols"]
 
 FloatArray = NDArray[np.float64]
 
-SCALES: dict[str, float] = {"quarter": 0.25, "fourfold": 4.0}
-"""Factors of the scales of the discrepancy's amplitudes with which their priors' influence is told."""
-ALPHAS = (0.99, 1.01)
+SCALE_FACTORS: dict[str, float] = {"quarter": 0.25, "fourfold": 4.0}
+"""Factors of the prior scales of the discrepancy's amplitudes for which the influence of these priors is given."""
+POWERS = (0.99, 1.01)
 """Powers of prior and likelihood from which the sensitivities are taken; those of ArviZ."""
-THRESHOLD = 0.05
-"""Sensitivity from which it counts (Kallioinen, Paananen, Bürkner & Vehtari 2024)."""
-SHUT = 1e-3
-"""Density at the end of a box, relative to the largest, below which the box is as good as infinite."""
+MIN_SENSITIVITY = 0.05
+"""Smallest sensitivity that matters (Kallioinen, Paananen, Bürkner & Vehtari 2024)."""
+MAX_END_DENSITY = 1e-3
+"""Largest density at the end of a uniform prior, over the maximum, for which the end has no influence."""
 
 
 @dataclass(frozen=True)
@@ -39,19 +39,20 @@ class PowerScaling:
     likelihood: float
 
     def sentence(self, parameter: str) -> str:
-        """Return the numbers and what they mean, for a person."""
+        """Return the numbers and their meaning in words."""
         numbers = f"power-scaling sensitivity: prior {self.prior:.2f}, likelihood {self.likelihood:.2f}"
-        if self.prior < THRESHOLD:
-            if self.likelihood < THRESHOLD:
-                return f"neither the priors nor the data move {parameter} much ({numbers}): read its interval as it is"
-            return f"the data decide {parameter}, the shapes of the priors hardly ({numbers})"
-        if self.likelihood < THRESHOLD:
+        if self.prior < MIN_SENSITIVITY:
+            if self.likelihood < MIN_SENSITIVITY:
+                return f"neither the priors nor the data have much influence on {parameter} ({numbers})"
+            return f"the data determine {parameter}, the shapes of the priors have little influence ({numbers})"
+        if self.likelihood < MIN_SENSITIVITY:
             return (
-                f"the priors decide {parameter} more than the data do ({numbers}): measure more, or defend the priors"
+                f"the priors influence {parameter} more than the data do ({numbers}): measure more, or justify the "
+                "priors"
             )
         return (
-            f"both the priors and the data move {parameter} ({numbers}), which may be at odds: "
-            "give priors that you can defend, or measure more"
+            f"both the priors and the data influence {parameter} ({numbers}), and they may contradict each other: "
+            "give priors that you can justify, or measure more"
         )
 
 
@@ -61,13 +62,13 @@ def power_scaling(solution: Solution) -> PowerScaling | None:
     The likelihood is the joint one of linear and nonlinear parameters, with the discrepancy's random part among
     the errors: the amplitudes and noise are parameters, the discrepancy itself is none, and its distribution
     given them is not scaled with the priors. Sums and length scales of an average have uniform priors, which no
-    power changes. Nor does a power move the ends of a uniform box: those are told by other widths.
+    power changes. Nor does a power move the ends of a uniform box: their influence is given by other widths.
 
     References
     ----------
     Kallioinen, Paananen, Bürkner & Vehtari (2024), Statistics and Computing 34, 57.
     """
-    if stride(solution) > 1:
+    if solution.model.condensed is None and stride(solution) > 1:
         return None
     values = solution.draws[solution.model.headline].ravel()
     return PowerScaling(
@@ -83,27 +84,27 @@ def scale_symbols(model: StatisticalModel) -> tuple[str, ...]:
 
 def rescaled(model: StatisticalModel, factor: float) -> StatisticalModel:
     """Return the model with the prior scales of its discrepancy's random part multiplied by a factor."""
-    other = {symbol: model.priors[symbol].scaled(factor) for symbol in scale_symbols(model)}
-    return replace(model, chosen_priors=model.priors | other)
+    scaled_priors = {symbol: model.priors[symbol].scaled(factor) for symbol in scale_symbols(model)}
+    return replace(model, chosen_priors=model.priors | scaled_priors)
 
 
 def known_evidence_changes(solution: Solution) -> dict[str, float]:
     """Return changes of the log evidence with the priors that need no other fit.
 
-    boxes: were the uniform boxes of the linear parameters four times as wide, where they do not cut and nothing but
-    them bounds the prior. quarter and
-    fourfold, of the prior scales of the discrepancy's random part: zero where it has none.
+    boxes: with uniform priors of the linear parameters four times as wide, where their ends have no influence and
+    nothing else bounds the prior. quarter and fourfold, of the prior scales of the discrepancy's random part: zero
+    where it has none.
     """
     model = solution.model
-    found: dict[str, float] = {}
+    changes: dict[str, float] = {}
     if solution.log_evidence is None:
-        return found
+        return changes
     boxes = [symbol for symbol in model.linear if isinstance(model.priors[symbol], Uniform)]
     if not solution.stable_in and not any(_cuts(solution, symbol) for symbol in boxes):
-        found["boxes"] = -log(4.0) * len(boxes)
+        changes["boxes"] = -log(4.0) * len(boxes)
     if not scale_symbols(model):
-        found |= dict.fromkeys(SCALES, 0.0)
-    return found
+        changes |= dict.fromkeys(SCALE_FACTORS, 0.0)
+    return changes
 
 
 def _cuts(solution: Solution, symbol: str) -> bool:
@@ -111,8 +112,8 @@ def _cuts(solution: Solution, symbol: str) -> bool:
     marginal = solution.marginals[symbol]
     parameter = next(p for p in solution.model.parameters if p.symbol == symbol)
     ends = zip(solution.model.priors[symbol].support, parameter.support, strict=True)
-    at_ends = [float(marginal.pdf(chosen)) for chosen, natural in ends if chosen != natural]
-    return max(at_ends, default=0.0) > SHUT * float(marginal.density.max())
+    at_ends = [float(marginal.pdf(prior_end)) for prior_end, natural_end in ends if prior_end != natural_end]
+    return max(at_ends, default=0.0) > MAX_END_DENSITY * float(marginal.density.max())
 
 
 def _log_prior(solution: Solution) -> FloatArray:
@@ -139,19 +140,19 @@ def _sensitivity(values: FloatArray, log_density: FloatArray) -> float:
     order = np.argsort(values)
     ascending, deviation = values[order], log_density[order] - log_density.max()
     speeds = []
-    for alpha in ALPHAS:
-        weights = np.exp((alpha - 1) * deviation)
+    for power in POWERS:
+        weights = np.exp((power - 1) * deviation)
         weights = weights / float(weights.sum())
         distance = max(_distance(ascending, weights), _distance(-ascending[::-1], weights[::-1]))
-        speeds.append(distance / abs(float(np.log2(alpha))))
+        speeds.append(distance / abs(float(np.log2(power))))
     return float(np.mean(speeds))
 
 
 def _distance(values: FloatArray, weights: FloatArray) -> float:
     """Return the cumulative Jensen-Shannon distance between ascending draws (D,) and the same draws weighted."""
     gaps = np.diff(values)
-    first, second = np.arange(1, len(values)) / len(values), np.cumsum(weights)[:-1]
-    between = 0.5 * (first + second)
-    divergence = float(gaps @ (first * np.log2(first / between) + second * np.log2(second / between)))
-    size = float(gaps @ (first + second))  # the terms that make each divergence positive cancel in their sum
+    empirical, reweighted = np.arange(1, len(values)) / len(values), np.cumsum(weights)[:-1]
+    middle = 0.5 * (empirical + reweighted)
+    divergence = float(gaps @ (empirical * np.log2(empirical / middle) + reweighted * np.log2(reweighted / middle)))
+    size = float(gaps @ (empirical + reweighted))  # the terms that make each divergence positive cancel in their sum
     return float(np.sqrt(max(divergence, 0.0) / size)) if size > 0 else 0.0

@@ -11,16 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
+from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode, loading_modes
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.resampling import systematic
-from tissuq.inference.solution import Components, Solution
+from tissuq.inference.solution import Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
-from tissuq.mechanics.path import farthest_stretch, invariants
-from tissuq.model import StatisticalModel
+from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
+from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
 __all__ = [
-    "LOST",
+    "MIN_LOSS_PROBABILITY",
     "Loss",
     "Stability",
     "StableRange",
@@ -35,18 +36,18 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Curves = Callable[[FloatArray, LoadingMode], FloatArray]
+Curves = Callable[[States], FloatArray]
 
-DRAWS, POINTS = 500, 31
-"""Draws, and stretches on either side of the reference, to whose distance it is known where stability is lost."""
-LOST = 0.05
-"""Probability from which a loss of stability is worth a mark."""
-AT_ONCE = 4000
-"""Draws for which the stresses are computed together."""
-STEP = 1e-4
-"""Of the logarithmic strains, for the tangent."""
-NEUTRAL = 1e-9
-"""Of the initial modulus: differences of stress that count as none."""
+STABILITY_DRAWS, POINTS_PER_SIDE = 500, 31
+"""Number of draws, and of stretches on either side of the reference, with which the loss of stability is located."""
+MIN_LOSS_PROBABILITY = 0.05
+"""Smallest probability of a loss of stability that is marked."""
+DRAWS_PER_BLOCK = 4000
+"""Number of draws for which the stresses are computed together."""
+LOG_STRAIN_STEP = 1e-4
+"""Step of the logarithmic strains for the tangent."""
+NEUTRAL_STRESS_RATIO = 1e-9
+"""Largest difference of stresses that counts as none, over the initial modulus."""
 DIRECTIONS = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
 """Logarithmic strains of the first and of the second axis at constant volume, the third axis free of stress."""
 
@@ -79,7 +80,7 @@ class Stability:
 
 
 class Loss(NamedTuple):
-    """With what probability stability is lost, and where: median and 95 % interval of the draws that lose it."""
+    """Probability of a loss of stability, and its stretch: median and 95 % interval of the draws that lose it."""
 
     probability: float
     median: float
@@ -95,13 +96,13 @@ class StableRange:
     ----------
     mode : str
     low, high : float
-        Stretches between which it was looked at.
+        Stretches between which stability was examined.
     probability : float
-        Of stability at all of them.
+        Probability of stability at all of them.
     surely_low, surely_high : float
         Stretches between which stability is lost with a probability of at most 5 %; both one where there are none.
-    below, above : Loss
-        At stretches below one, and above; of probability zero and without place where no draw loses it there.
+    loss_below, loss_above : Loss
+        Loss at stretches below one, and above; of probability zero, without a stretch, where no draw loses stability.
     """
 
     mode: str
@@ -110,35 +111,35 @@ class StableRange:
     probability: float
     surely_low: float
     surely_high: float
-    below: Loss
-    above: Loss
+    loss_below: Loss
+    loss_above: Loss
 
     @property
     def loss(self) -> Loss:
         """The likelier loss, below or above."""
-        return max(self.below, self.above, key=lambda loss: loss.probability)
+        return max(self.loss_below, self.loss_above, key=lambda loss: loss.probability)
 
 
 def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Stability:
-    """Return how probable stability is at stretches (g,) of a loading mode, for material and energy discrepancy.
+    """Return the probability of stability at stretches (g,) of a loading mode, for material and energy discrepancy.
 
-    A discrepancy that is no energy has no part in it.
+    A discrepancy that is not an energy is ignored.
 
     Raises
     ------
     ModelError
         When the material has directions, or its energy cannot be differentiated at many states at once.
     """
-    found = _criteria(_curves(solution.model, _some(solution)), mode, stretch)
-    stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(found))
-    shares = (each.mean(axis=0) for each in (*found, stable))
+    criteria = _criteria(_curves(solution.model, _sampled_components(solution)), mode, stretch)
+    stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(criteria))
+    shares = (flags.mean(axis=0) for flags in (*criteria, stable))
     return Stability(mode.name, stretch, *shares)
 
 
 def stability_over(
     solution: Solution, mode: str | LoadingMode | None, stretch: ArrayLike | None, points: int
 ) -> Stability:
-    """Return the stability at stretches, or at so many over the range that was measured; unless said in its own mode.
+    """Return the stability at stretches, or at ``points`` of them over the measured range; by default in its own mode.
 
     Raises
     ------
@@ -146,43 +147,47 @@ def stability_over(
         When the mode has several controls; and as `stability`.
     """
     data = solution.model.experiment
-    own = [each for each in data.modes if len(each.controls) == len(each.stresses) == 1]
-    asked = (own or [loading_mode("uniaxial")])[0] if mode is None else loading_mode(mode)
-    if len(asked.controls) > 1:
-        raise InputError(f"stability is told in modes of one control, and '{asked.name}' has several.")
-    usual = np.linspace(*calibrated_range(data, asked), points)
-    return stability(solution, asked, usual if stretch is None else np.atleast_1d(np.asarray(stretch, dtype=float)))
+    if mode is None:
+        simple = (test_mode for test_mode in data.modes if len(test_mode.controls) == len(test_mode.stresses) == 1)
+        mode = next(simple, "uniaxial")
+    loading = loading_mode(mode)
+    if len(loading.controls) > 1:
+        raise InputError(f"stability is computed in modes of one control, and '{loading.name}' has several.")
+    if stretch is None:
+        stretch = np.linspace(*calibrated_range(data, loading), points)
+    return stability(solution, loading, np.atleast_1d(np.asarray(stretch, dtype=float)))
 
 
 def stable_ranges(solution: Solution) -> dict[str, StableRange]:
-    """Return for every mode of one stretch and one stress how far the draws are stable.
+    """Return the range in which the draws are stable, for every mode of one stretch and one stress.
 
-    Nothing where the material's energy does not tell. In the other modes the material passes through the same states,
-    or through states between theirs.
+    Empty where stability cannot be computed from the material's energy. In the other modes the material passes through
+    the same states, or through states between theirs.
     """
-    found = {}
+    ranges = {}
     for mode in (kind() for kind in loading_modes().values()):
         if not mode.is_curve:
             continue
         stretch = _measured(solution.model.experiment, mode)
         try:
-            criteria = _criteria(_curves(solution.model, _some(solution)), mode, stretch)
+            criteria = _criteria(_curves(solution.model, _sampled_components(solution)), mode, stretch)
         except ModelError:
             return {}
         stable = _from_reference(stretch - 1, np.logical_and.reduce(criteria))
         low, high = float(stretch[0]), float(stretch[-1])
-        sure, below, above = _surely(stretch, stable), _loss(stretch, stable, -1), _loss(stretch, stable, 1)
-        found[mode.name] = StableRange(mode.name, low, high, float(stable.all(axis=1).mean()), *sure, below, above)
-    return found
+        probability, sure = float(stable.all(axis=1).mean()), _surely_stable(stretch, stable)
+        losses = _loss(stretch, stable, -1), _loss(stretch, stable, 1)
+        ranges[mode.name] = StableRange(mode.name, low, high, probability, *sure, *losses)
+    return ranges
 
 
-def are_stable(model: StatisticalModel, points: Components, modes: Sequence[LoadingMode]) -> Flags:
+def are_stable(model: StatisticalModel, points: GaussianMixture, modes: Sequence[LoadingMode]) -> Flags:
     """Return whether draws (M,) are stable over the measured range of all of some loading modes.
 
     Parameters
     ----------
     model : StatisticalModel
-    points : Components
+    points : GaussianMixture
         The draws, without width.
     modes : sequence of LoadingMode
 
@@ -191,7 +196,7 @@ def are_stable(model: StatisticalModel, points: Components, modes: Sequence[Load
     ModelError
         As `stability` does.
     """
-    return stable_draws(lambda left: _curves(model, points[left]), len(points.weights), model.experiment, modes)
+    return stable_draws(lambda rows: _curves(model, points[rows]), len(points.weights), model.experiment, modes)
 
 
 def stable_draws(
@@ -202,54 +207,56 @@ def stable_draws(
     Parameters
     ----------
     curves_of : callable
-        From places of M draws, the function of points (n,) and a mode that gives their stresses (M, n).
+        From places of M draws, the function of states (n,) that gives their stresses (M, n).
     count : int
     data : Experiment
     modes : sequence of LoadingMode
     """
     stable = np.ones(count, dtype=bool)
     paths = [(mode, _measured(data, mode)) for mode in modes]
-    first, whole = paths[0]
-    at_few = first, np.unique([whole[0], 1.0, whole[-1]])  # where most draws fail that do, at little cost
-    for mode, stretch in (at_few, *paths):
-        left = np.flatnonzero(stable)
-        if len(left):
-            stable[left] = np.logical_and.reduce(_criteria(curves_of(left), mode, stretch)).all(axis=1)
+    first_mode, first_stretch = paths[0]
+    # The ends first, at little cost: most draws that are not stable fail there.
+    at_ends = first_mode, np.unique([first_stretch[0], 1.0, first_stretch[-1]])
+    for mode, stretch in (at_ends, *paths):
+        remaining = np.flatnonzero(stable)
+        if len(remaining):
+            stable[remaining] = np.logical_and.reduce(_criteria(curves_of(remaining), mode, stretch)).all(axis=1)
     return stable
 
 
 def _measured(data: Experiment, mode: LoadingMode) -> FloatArray:
     """Return stretches of a mode on either side of the reference, and that, over the range that was measured."""
-    return np.unique(np.concatenate([np.linspace(1.0, end, POINTS) for end in calibrated_range(data, mode)]))
+    return np.unique(np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE) for end in calibrated_range(data, mode)]))
 
 
-def _some(solution: Solution) -> Components:
-    """Return components of which one draw each stands for the posterior."""
-    parts = solution.components
-    return parts[systematic(parts.weights[None], DRAWS)[0]]
+def _sampled_components(solution: Solution) -> GaussianMixture:
+    """Return components that represent the posterior by one draw each."""
+    mixture = solution.mixture
+    return mixture[systematic(mixture.weights[None], STABILITY_DRAWS)[0]]
 
 
-def _curves(model: StatisticalModel, parts: Components) -> Curves:
-    """Return the function that gives the stresses (M, n) of one draw of every component at points of a mode."""
+def _curves(model: StatisticalModel, mixture: GaussianMixture) -> Curves:
+    """Return the function that gives the stresses (M, n) of one draw of every component at states (n,)."""
     if not model.material.is_isotropic:
         raise ModelError(
-            f"the stability of material '{model.material.name}' is not known: the criteria are those of isotropic "
+            f"the stability of material '{model.material.name}' is unknown: the criteria are those of isotropic "
             "materials, and it has fibres."
         )
 
-    def stresses(points: FloatArray, path: LoadingMode) -> FloatArray:
-        usual = 20 * POINTS * len(model.column_symbols)  # the same blocks, and so the same draws, at any points
-        count = MOST_VALUES // usual if model.bent_symbols else AT_ONCE
-        blocks = np.array_split(np.arange(len(parts.weights)), -(-len(parts.weights) // max(1, count)))
-        curves = [drawn_curves(model, parts[block], points, seed, path) for seed, block in enumerate(blocks)]
-        return np.concatenate([alone + other for alone, other in curves])
+    def stresses(states: States) -> FloatArray:
+        # The same blocks, and so the same draws, at any points.
+        count = MOST_VALUES // (20 * POINTS_PER_SIDE * len(model.column_symbols))
+        count = count if model.bent_symbols else DRAWS_PER_BLOCK
+        blocks = np.array_split(np.arange(len(mixture.weights)), -(-len(mixture.weights) // max(1, count)))
+        curves = [drawn_curves(model, mixture[block], states, seed) for seed, block in enumerate(blocks)]
+        return np.concatenate([material + discrepancy for material, discrepancy in curves])
 
-    def explained(points: FloatArray, path: LoadingMode) -> FloatArray:
+    def explained(states: States) -> FloatArray:
         try:
-            return stresses(points, path)
+            return stresses(states)
         except TypeError as error:
             raise ModelError(
-                f"the stability of material '{model.material.name}' is not known, because its energy is not plain "
+                f"the stability of material '{model.material.name}' is unknown, because its energy is not plain "
                 "arithmetic of arrays: write it without jax.numpy and branches."
             ) from error
 
@@ -258,33 +265,36 @@ def _curves(model: StatisticalModel, parts: Components) -> Curves:
 
 def _criteria(curves: Curves, mode: LoadingMode, stretch: FloatArray) -> tuple[Flags, Flags, Flags]:
     """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each."""
-    base = np.array([np.broadcast_to(each, len(stretch)) for each in mode.principal_stretches(stretch)])
-    nudges = [np.zeros(3), *(sign * STEP * each for each in DIRECTIONS for sign in (1, -1))]
+    base = np.array([np.broadcast_to(values, len(stretch)) for values in mode.principal_stretches(stretch)])
+    nudges = [np.zeros(3), *(sign * LOG_STRAIN_STEP * direction for direction in DIRECTIONS for sign in (1, -1))]
     paths = [_Path(base * np.exp(nudge)[:, None], direction) for nudge in nudges for direction in DIRECTIONS]
-    whole = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
-    every = curves(np.ones(whole.base.shape[1]), whole)
-    stress = every.reshape(len(every), 5, 2, len(stretch))
-    own, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * STEP)
+    joined = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
+    stress_values = curves(joined.at(np.ones(joined.base.shape[1])))
+    stress = stress_values.reshape(len(stress_values), 5, 2, len(stretch))
+    base_stress, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * LOG_STRAIN_STEP)
     change = stretch - mode.reference
     size = np.abs(np.trace(tangent[..., np.abs(change).argmin()], axis1=1, axis2=2))[:, None]
-    differences = np.stack([own[:, 0], own[:, 1], own[:, 0] - own[:, 1]])
-    apart = np.stack([base[0] - base[2], base[1] - base[2], base[0] - base[1]])
-    baker = ((differences * np.sign(apart)[:, None] > -NEUTRAL * size) | (np.abs(apart)[:, None] < 1e-9)).all(axis=0)
+    differences = np.stack([base_stress[:, 0], base_stress[:, 1], base_stress[:, 0] - base_stress[:, 1]])
+    gaps = np.stack([base[0] - base[2], base[1] - base[2], base[0] - base[1]])
+    baker = (
+        (differences * np.sign(gaps)[:, None] > -NEUTRAL_STRESS_RATIO * size) | (np.abs(gaps)[:, None] < 1e-9)
+    ).all(axis=0)
     determinant = tangent[:, 0, 0] * tangent[:, 1, 1] - tangent[:, 0, 1] * tangent[:, 1, 0]
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
-    near = np.concatenate([stretch - STEP, stretch + STEP])
-    rising = np.diff(curves(near, mode).reshape(len(every), 2, -1), axis=1)[:, 0] > 0
+    nudged = np.concatenate([stretch - LOG_STRAIN_STEP, stretch + LOG_STRAIN_STEP])
+    rising = np.diff(curves(mode.at(nudged)).reshape(len(stress_values), 2, -1), axis=1)[:, 0] > 0
     return baker, drucker, rising
 
 
 def calibrated_range(data: Experiment, mode: LoadingMode) -> tuple[float, float]:
     """Return the stretches of a mode within which I1 and I2 stay in the range that was measured."""
-    own = [part.mode.abscissa(part.stretch) for part in data.parts if part.mode == mode]
-    if own:
-        at_rest = float(mode.reference)
-        return min(at_rest, *(float(each.min()) for each in own)), max(at_rest, *(float(each.max()) for each in own))
-    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
-    return farthest_stretch(mode, most, -1), farthest_stretch(mode, most, 1)
+    measured = [curve.abscissa for curve in data.curves if curve.mode == mode]
+    if measured:
+        reference = float(mode.reference)
+        values = np.concatenate([[reference], *measured])
+        return float(values.min()), float(values.max())
+    largest = largest_invariants(data.states)
+    return farthest_stretch(mode, largest, -1), farthest_stretch(mode, largest, 1)
 
 
 def is_calibrated(data: Experiment, mode: LoadingMode, points: FloatArray) -> Flags:
@@ -296,55 +306,51 @@ def is_calibrated(data: Experiment, mode: LoadingMode, points: FloatArray) -> Fl
         low, high = calibrated_range(data, mode)
         margin = 1e-9 * max(abs(low), abs(high))
         return np.asarray((low - margin <= points) & (points <= high + margin))
-    pairs = zip(invariants(mode.channels[0], points), invariants(data.mode, data.stretch), strict=True)
-    return np.asarray(np.logical_and.reduce([own <= known.max() * (1 + 1e-9) for own, known in pairs]))
+    pairs = zip(invariants(mode.paths[0].at(points)), largest_invariants(data.states), strict=True)
+    return np.asarray(np.logical_and.reduce([values <= largest * (1 + 1e-9) for values, largest in pairs]))
 
 
 def _from_reference(change: FloatArray, is_stable: Flags) -> Flags:
     """Return whether all is stable (M, g) from the reference to each change (g,) of the stretch."""
-    found = np.empty_like(is_stable)
+    stable = np.empty_like(is_stable)
     for outward in (_outward(change, -1), _outward(change, 1)):
-        found[:, outward] = np.logical_and.accumulate(is_stable[:, outward], axis=1)
-    return found
+        stable[:, outward] = np.logical_and.accumulate(is_stable[:, outward], axis=1)
+    return stable
 
 
 def _outward(change: FloatArray, side: int) -> NDArray[np.intp]:
     """Return the places of the changes on one side of the reference, and of the reference, from there outward."""
-    own = np.flatnonzero(side * change >= 0)
-    return own[np.argsort(np.abs(change[own]))]
+    indices = np.flatnonzero(side * change >= 0)
+    return indices[np.argsort(np.abs(change[indices]))]
 
 
-def _surely(stretch: FloatArray, stable: Flags) -> tuple[float, float]:
-    """Return the stretches between which hardly any draw has lost its stability."""
-    sure = stretch[stable.mean(axis=0) >= 1 - LOST]
+def _surely_stable(stretch: FloatArray, stable: Flags) -> tuple[float, float]:
+    """Return the stretches between which the probability of a loss of stability is small."""
+    sure = stretch[stable.mean(axis=0) >= 1 - MIN_LOSS_PROBABILITY]
     return float(sure.min(initial=1.0)), float(sure.max(initial=1.0))
 
 
 def _loss(stretch: FloatArray, stable: Flags, side: int) -> Loss:
-    """Return where the draws (M, g), stable from the reference to some stretch, lose stability on one side of it."""
+    """Return the loss of stability of draws (M, g) on one side of the reference."""
     outward = _outward(stretch - 1, side)
-    first = np.argmin(stable[:, outward], axis=1)[~stable[:, outward[-1]]]
-    if len(outward) == 1 or not len(first):
+    first_unstable = np.argmin(stable[:, outward], axis=1)[~stable[:, outward[-1]]]
+    if len(outward) == 1 or not len(first_unstable):
         return Loss(0.0, np.nan, np.nan, np.nan)
     path = stretch[outward]
-    places = 0.5 * (path[first] + path[np.maximum(first - 1, 0)])
-    return Loss(len(first) / len(stable), *map(float, np.quantile(places, [0.5, 0.025, 0.975])))
+    loss_stretches = 0.5 * (path[first_unstable] + path[np.maximum(first_unstable - 1, 0)])
+    return Loss(len(first_unstable) / len(stable), *map(float, np.quantile(loss_stretches, [0.5, 0.025, 0.975])))
 
 
-class _Path(LoadingMode):
+class _Path(Path):
     """Deformations through given states: base * l^direction, state by state; its stress is the work per log strain."""
 
     def __init__(self, base: FloatArray, direction: FloatArray) -> None:
-        object.__setattr__(self, "base", base)
-        object.__setattr__(self, "direction", direction)
-
-    base: FloatArray
-    direction: FloatArray
+        self.base, self.direction = base, direction
 
     def rates(self, count: int) -> FloatArray:
         """Return the direction (3, count) at every state."""
         return np.repeat(self.direction[:, None], count, axis=1)
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        first, second, third = self.base * stretch**self.direction
-        return first, second, third
+    def moved(self, point: Any, step: Any) -> Deformation:
+        l1, l2, l3 = self.base * (point + step) ** self.direction
+        return Deformation.along_axes((l1, l2, l3))

@@ -1,11 +1,10 @@
-"""A posterior given that material and energy discrepancy are stable: those of its draws that are."""
+"""A posterior under the condition that material and energy discrepancy are stable: its stable draws."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,22 +12,22 @@ from numpy.typing import NDArray
 from tissuq.assessment.stability import are_stable
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
-from tissuq.inference.energies import discrepancy_in_draws, shares_of_members
+from tissuq.inference.gaussian_mixture import CHAINS, GaussianMixture
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.solution import CHAINS, Components, Solution
-from tissuq.model import StatisticalModel
+from tissuq.inference.solution import Marginals, Solution, shares_of_members
+from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["ALL", "StableSolution", "modes_named"]
+__all__ = ["ALL_MODES", "modes_named", "stable_part"]
 
 FloatArray = NDArray[np.float64]
 
-ALL = "all"
-"""In place of loading modes: every one."""
-FEWEST, ROUNDS, HOPELESS = 1000, 250, 10
-"""Stable draws that are enough; rounds of draws among which they must be found, and after how many the search ends
-where it finds fewer than one a round."""
-PRIOR_DRAWS, TOLD = 10_000, 100
-"""Draws from the prior, and how many of them must be stable to tell how much of it is."""
+ALL_MODES = "all"
+"""Name that stands for every loading mode."""
+MIN_STABLE_DRAWS, MAX_ROUNDS, MIN_ROUNDS = 1000, 250, 10
+"""Smallest number of stable draws; largest number of rounds of draws in which they are sought; number of rounds after
+which the search ends if it finds fewer than one a round."""
+PRIOR_DRAWS, MIN_STABLE_PRIOR_DRAWS = 10_000, 100
+"""Number of draws from the prior, and the smallest number of stable ones from which the stable share is computed."""
 
 
 def modes_named(names: str | Sequence[str]) -> tuple[str, ...]:
@@ -37,139 +36,120 @@ def modes_named(names: str | Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     InputError, ModelError
-        When ``"all"`` does not stand alone, or there is no such mode.
+        When ``"all"`` is combined with other names, or there is no such mode.
     """
-    chosen = [names] if isinstance(names, str) else list(names)
-    if ALL in chosen and len(chosen) > 1:
-        raise InputError(f"'{ALL}' stands alone among the loading modes of stable_in; leave out the names beside it.")
+    requested = [names] if isinstance(names, str) else list(names)
+    if ALL_MODES in requested and len(requested) > 1:
+        raise InputError(f"'{ALL_MODES}' cannot be combined with other loading modes in stable_in: omit the others.")
     curves = [name for name, kind in loading_modes().items() if kind().is_curve]
-    found = curves if chosen == [ALL] else list(dict.fromkeys(loading_mode(name).name for name in chosen))
-    other = [name for name in found if name not in curves]
-    if other:
-        known = ", ".join(curves)
-        raise InputError(f"stable_in takes modes of one stretch and one stress ({known}), not '{other[0]}'.")
-    return tuple(found)
+    modes = curves if requested == [ALL_MODES] else list(dict.fromkeys(loading_mode(name).name for name in requested))
+    unsuitable = [name for name in modes if name not in curves]
+    if unsuitable:
+        suitable = ", ".join(curves)
+        raise InputError(f"stable_in takes modes of one stretch and one stress ({suitable}), not '{unsuitable[0]}'.")
+    return tuple(modes)
 
 
-class StableSolution(Solution):
-    """The posterior of a model whose prior leaves out what is not stable over the measured range.
+def stable_part(unconstrained: Solution, modes: Sequence[str], seed: int) -> Solution:
+    """Return the posterior of a model whose prior excludes what is not stable over the measured range.
 
     With density and evidence of the prior p and stable parameters S it is that under p(h) [h in S] / P(S): the draws of
     the posterior under p that lie in S, exactly. The evidence follows from both shares of S,
-    log Z + log P(S | y) - log P(S), of which the latter needs draws from the prior.
+    log Z + log P(S | y) - log P(S), of which the latter needs draws from the prior. It is unknown where the prior is
+    improper, where too few of its draws are stable, or where it reaches materials about to lock.
 
     Parameters
     ----------
-    whole : Solution
-        Under the prior p.
+    unconstrained : Solution
+        Posterior under the prior p.
     modes : sequence of str
         Loading modes in which it must be stable, over the range in which both invariants were measured.
     seed : int
 
-    Attributes
-    ----------
-    share, prior_share : float
-        P(S | y) and P(S); the latter, as the evidence, is not known where the prior is improper, where hardly any of it
-        is stable, or where it reaches materials about to lock.
-
     Raises
     ------
     ModelError
-        When hardly any draw is stable, or the material's energy does not tell.
+        When too few draws are stable, or stability cannot be computed from the material's energy.
     """
+    model, paths = unconstrained.model, [loading_mode(name) for name in modes]
+    mixture, draw_count = _stable_draws(unconstrained, paths, np.random.default_rng([seed, 17]))
+    stable_count, per_chain = len(mixture), len(mixture) // CHAINS
+    share = stable_count / draw_count
+    names = ", ".join(modes)
+    reason = f"{unconstrained.reason}; of {draw_count} draws the {stable_count} that are stable in {names} loading"
 
-    def __init__(self, whole: Solution, modes: Sequence[str], seed: int) -> None:
-        self.model, self.route, self.diagnostics, self._whole = whole.model, whole.route, whole.diagnostics, whole
-        self.stable_in = tuple(modes)
-        paths = [loading_mode(name) for name in modes]
-        self.components, tried = self._kept(paths, np.random.default_rng([seed, 17]))
-        kept = len(self.components.weights)
-        self.share, self.prior_share = kept / tried, np.nan
-        self.reason = f"{whole.reason}; of {tried} draws the {kept} that are stable in {', '.join(modes)} loading"
-        if whole.log_evidence is not None and whole.log_evidence_error is not None:
-            prior = _prior_draws(self.model, PRIOR_DRAWS, np.random.default_rng([seed, 18]))
-            found = 0
-            with suppress(ModelError):  # materials about to lock at one of the stretches
-                found = int(are_stable(self.model, prior, paths).sum())
-            if found < TOLD:
-                self.reason += "; no evidence, because draws from the prior do not tell how much of it is stable"
-                return
-            self.prior_share = found / PRIOR_DRAWS
-            errors = np.sqrt([(1 - self.share) / kept, (1 - self.prior_share) / found])
-            self.log_evidence = whole.log_evidence + float(np.log(self.share / self.prior_share))
-            self.log_evidence_error = whole.log_evidence_error + float(np.hypot(*errors))
-            self.reason += f", {self.prior_share:.2g} of the prior"
-
-    def _kept(self, paths: Sequence[LoadingMode], generator: np.random.Generator) -> tuple[Components, int]:
-        """Return at least `FEWEST` stable draws as points, a multiple of the chains, and of how many they are."""
-        source, kept, tried, found = self._whole.wide_components, [], 0, 0
-        for count in range(1, ROUNDS + 1):
-            chosen, linear = source.drawn(int(generator.integers(2**32)))
-            points = _points(source.settings[chosen.ravel()], linear.reshape(chosen.size, -1))
-            if source.member is not None:
-                points = replace(points, member=source.member[chosen.ravel()])
-            stable = are_stable(self.model, points, paths)
-            kept.append(points[stable])
-            tried, found = tried + chosen.size, found + int(stable.sum())
-            if found >= FEWEST or (count >= HOPELESS and found < count):
-                break
-        if found < FEWEST:
-            raise ModelError(
-                f"only {found} of {tried} draws of material '{self.model.material.name}' are stable in "
-                f"{', '.join(self.stable_in)} loading, too few to tell their posterior: the data contradict a stable "
-                "material of this kind. Choose another one, measure in more loading modes, or fit without stable_in."
-            )
-        whole = kept[0]
-        for more in kept[1:]:
-            whole = whole.joined(more)
-        return whole.weighted(np.full(found, 1 / found)), tried
-
-    @property
-    def component_of_draw(self) -> NDArray[np.intp]:
-        """The component of every draw: there is one for each, in their order."""
-        count = len(self.components.weights) // CHAINS
-        return np.arange(CHAINS * count).reshape(CHAINS, count)
-
-    @cached_property
-    def draws(self) -> dict[str, FloatArray]:
-        """Draws of every parameter, as many in each chain as there are for all."""
-        chosen, parts = self.component_of_draw, self.components
-        columns = np.moveaxis(np.concatenate([parts.settings[chosen], parts.mean[chosen]], axis=2), 2, 0)
-        named = dict(
-            zip((*self.model.nonlinear, *self.model.linear), columns, strict=False)
-        )  # then weights of energies
-        return {symbol: named[symbol] for symbol in self.model.symbols}
-
-    @cached_property
-    def drawn_discrepancy(self) -> FloatArray | None:  # type: ignore[override]  # a cached property
-        """The discrepancy's stress (chains, draws, n) at the measurements in every draw."""
-        chosen, parts = self.component_of_draw, self.components
-        if parts.member is None:
-            return None
-        return discrepancy_in_draws(self.model, parts.member[chosen], parts.mean[chosen])
-
-    @cached_property
-    def members(self) -> dict[str, float]:  # type: ignore[override]  # a cached property
-        """The posterior probability of every sum of blocks, its length scales together."""
-        parts = self.components
-        return {} if parts.member is None else shares_of_members(self.model, parts.member, parts.weights)
-
-    def _marginal(self, symbol: str) -> Marginal:
-        model, parts = self.model, self.components
+    def marginal(symbol: str) -> Marginal:
         if symbol in model.linear:
-            values = parts.mean[:, model.linear.index(symbol)]
+            values = mixture.mean[:, model.linear.index(symbol)]
         else:
-            values = parts.settings[:, model.nonlinear.index(symbol)]
-        return marginal_of_points(values, parts.weights, model.priors[symbol].support)
+            values = mixture.settings[:, model.nonlinear.index(symbol)]
+        return marginal_of_points(values, mixture.weights, model.priors[symbol].support)
+
+    solution = Solution(
+        model,
+        unconstrained.route,
+        reason,
+        lambda: mixture,
+        Marginals.of(model, marginal),
+        sampled=mixture.mean[: CHAINS * per_chain].reshape(CHAINS, per_chain, -1),
+        diagnostics=unconstrained.diagnostics,
+        members={} if mixture.member is None else shares_of_members(model, mixture.member, mixture.weights),
+        stable_in=tuple(modes),
+        stable_share=share,
+    )
+    if unconstrained.log_evidence is None or unconstrained.log_evidence_error is None:
+        return solution
+    prior, stable = _prior_draws(model, PRIOR_DRAWS, np.random.default_rng([seed, 18])), 0
+    with suppress(ModelError):  # materials about to lock at one of the stretches
+        stable = int(are_stable(model, prior, paths).sum())
+    if stable < MIN_STABLE_PRIOR_DRAWS:
+        reason += "; no evidence, because too few draws from the prior are stable"
+        return replace(solution, reason=reason)
+    prior_share = stable / PRIOR_DRAWS
+    errors = np.sqrt([(1 - share) / stable_count, (1 - prior_share) / stable])
+    return replace(
+        solution,
+        reason=f"{reason}, {prior_share:.2g} of the prior",
+        stable_prior_share=prior_share,
+        log_evidence=unconstrained.log_evidence + float(np.log(share / prior_share)),
+        log_evidence_error=unconstrained.log_evidence_error + float(np.hypot(*errors)),
+    )
 
 
-def _points(settings: FloatArray, linear: FloatArray) -> Components:
+def _stable_draws(
+    unconstrained: Solution, paths: Sequence[LoadingMode], generator: np.random.Generator
+) -> tuple[GaussianMixture, int]:
+    """Return at least `FEWEST` stable draws as points, and among how many draws these are."""
+    source, batches, draw_count, stable_count = unconstrained.wide_mixture, [], 0, 0
+    for count in range(1, MAX_ROUNDS + 1):
+        component, linear = source.draw(int(generator.integers(2**32)))
+        points = _as_points(source.settings[component.ravel()], linear.reshape(component.size, -1))
+        if source.member is not None:
+            points = replace(points, member=source.member[component.ravel()])
+        stable = are_stable(unconstrained.model, points, paths)
+        batches.append(points[stable])
+        draw_count, stable_count = draw_count + component.size, stable_count + int(stable.sum())
+        if stable_count >= MIN_STABLE_DRAWS or (count >= MIN_ROUNDS and stable_count < count):
+            break
+    if stable_count < MIN_STABLE_DRAWS:
+        raise ModelError(
+            f"only {stable_count} of {draw_count} draws of material '{unconstrained.model.material.name}' are stable "
+            f"in {', '.join(path.name for path in paths)} loading, too few for their posterior: the data contradict "
+            "a stable material of this kind. Choose another one, measure in more loading modes, or fit without "
+            "stable_in."
+        )
+    draws = batches[0]
+    for batch in batches[1:]:
+        draws = draws.joined(batch)
+    return draws.weighted(np.full(stable_count, 1 / stable_count)), draw_count
+
+
+def _as_points(settings: FloatArray, linear: FloatArray) -> GaussianMixture:
     """Return draws (M, d) and (M, p) as components without width."""
-    count, p = linear.shape
-    return Components(np.full(count, 1 / count), settings, linear, np.broadcast_to(0.0, (count, p, p)))
+    return GaussianMixture.of_points(np.full(len(linear), 1 / len(linear)), settings, linear)
 
 
-def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Generator) -> Components:
+def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Generator) -> GaussianMixture:
     """Return draws of every parameter, and of the weights of an energy discrepancy, from their priors."""
     values = {symbol: np.asarray(prior.quantile(generator.random(count))) for symbol, prior in model.priors.items()}
     settings, linear = (
@@ -177,14 +157,14 @@ def _prior_draws(model: StatisticalModel, count: int, generator: np.random.Gener
         for symbols in (model.nonlinear, model.linear)
     )
     if not model.energy_members:
-        return _points(settings, linear)
-    sizes = [[each.shape[1] for each in model.energy_features(k)] for k in range(len(model.energy_members))]
+        return _as_points(settings, linear)
+    sizes = [[features.shape[1] for features in model.energy_features(k)] for k in range(len(model.energy_members))]
     odds = [member.probability for member in model.energy_members]
-    chosen = generator.choice(len(odds), count, p=np.array(odds) / sum(odds))
+    member = generator.choice(len(odds), count, p=np.array(odds) / sum(odds))
     weights = generator.standard_normal((count, max(map(sum, sizes))))
-    for place in np.unique(chosen):
-        own, start = np.flatnonzero(chosen == place), 0
-        for block, size in zip(model.energy_members[place].places, sizes[place], strict=True):
-            weights[own, start : start + size] *= values[model.energy_symbols[block]][own, None]
+    for index in np.unique(member):
+        rows, start = np.flatnonzero(member == index), 0
+        for block, size in zip(model.energy_members[index].amplitude_indices, sizes[index], strict=True):
+            weights[rows, start : start + size] *= values[model.energy_symbols[block]][rows, None]
             start += size
-    return replace(_points(settings, np.hstack([linear, weights])), member=chosen)
+    return replace(_as_points(settings, np.hstack([linear, weights])), member=member)

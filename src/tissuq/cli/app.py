@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from io import TextIOWrapper
+from types import FrameType
+from typing import Annotated
 
 import typer
 
 from tissuq.cli import (
     calibrate,
     catalogue,
-    check,
     compare,
     design,
     export,
     fit,
-    inspect,
-    paper,
     population,
     predict,
-    show,
-    simulate,
+    reading,
+    structure,
     study,
 )
 from tissuq.errors import TissuqError
@@ -28,6 +29,7 @@ __all__ = ["app", "main"]
 
 INTERRUPTED = 130
 """The exit status that Typer gives to Ctrl-C."""
+TERMINATED = 128 + signal.SIGTERM
 
 app = typer.Typer(
     name="tissuq",
@@ -35,10 +37,28 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    help="Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted.",
 )
-app.command("paper")(paper.paper)
-app.command("inspect")(inspect.inspect)
+
+
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        import tissuq
+
+        print(f"tissuq {tissuq.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _tissuq(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and stop.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
+
+
+app.command("paper")(study.paper)
+app.command("inspect")(reading.inspect)
 app.command("fit")(fit.fit)
 app.command("predict")(predict.predict)
 app.command("population")(population.population)
@@ -46,11 +66,12 @@ app.command("calibrate")(calibrate.calibrate)
 app.command("compare")(compare.compare)
 app.command("design")(design.design)
 app.command("export")(export.export)
-app.command("simulate")(simulate.simulate)
-app.command("show")(show.show)
+app.command("structure")(structure.structure)
+app.command("simulate", hidden=True, deprecated=True)(structure.structure)
+app.command("show")(compare.show)
 app.command("materials")(catalogue.materials)
 app.command("modes")(catalogue.modes)
-app.command("check")(check.check)
+app.command("check")(catalogue.check)
 app.command("discrepancies")(catalogue.discrepancies)
 app.add_typer(study.study)
 app.command("datasets")(catalogue.datasets)
@@ -58,6 +79,10 @@ app.command("datasets")(catalogue.datasets)
 
 def main() -> None:
     """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
+    signal.signal(signal.SIGTERM, _stop)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that shows no ± shows a ? instead
     try:
         app(prog_name="tissuq")
     except TissuqError as error:
@@ -67,6 +92,12 @@ def main() -> None:
         typer.echo(f"tissuq: {error}. Check the path, its permissions and the space on the disk.", err=True)
         sys.exit(2)
     except SystemExit as end:
-        if end.code == INTERRUPTED:
-            typer.echo("tissuq: stopped; no run was written (a campaign goes on with the same command).", err=True)
+        if end.code in (INTERRUPTED, TERMINATED):
+            typer.echo("tissuq: stopped; no run was written (the same command resumes a campaign).", err=True)
         raise
+
+
+def _stop(number: int, _: FrameType | None) -> None:
+    """End on a request to terminate as on an error, so that nothing half written is left."""
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(TERMINATED)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import campaign_progress, not_converged, once_each, parse_prior
+from tissuq.cli.options import Config, Figures, Force, Seed, campaign_progress, not_converged, once_each, parse_prior
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -20,7 +20,7 @@ def calibrate(
     ] = None,
     forward: Annotated[
         str | None,
-        typer.Option(help="Function of the model: file.py:function or package.module:function. It is run."),
+        typer.Option(help="Function of the model: file.py:function or package.module:function. Its code is run."),
     ] = None,
     umbridge: Annotated[
         str | None, typer.Option(help="Instead: address of an UM-Bridge server, such as http://localhost:4242.")
@@ -30,13 +30,13 @@ def calibrate(
         list[str] | None,
         typer.Option(help="Prior of a parameter in the model's units, such as C10=uniform(0.1,5); repeat for each."),
     ] = None,
-    control: Annotated[str | None, typer.Option(help="Column of what was set [the first of two].")] = None,
-    measured: Annotated[str | None, typer.Option(help="Column of what was measured [the second of two].")] = None,
+    control: Annotated[str | None, typer.Option(help="Column of the control [the first of two].")] = None,
+    measured: Annotated[str | None, typer.Option(help="Column of the measured values [the second of two].")] = None,
     discrepancy: Annotated[
         str | None, typer.Option(help="none, gp, or gp-pinned (zero with its slope at zero load) [none].")
     ] = None,
     noise_sd: Annotated[
-        str | None, typer.Option(help="Sd of the noise, in the unit of what was measured, or unknown [unknown].")
+        str | None, typer.Option(help="Sd of the noise, in the unit of the measured values, or unknown [unknown].")
     ] = None,
     zero_load: Annotated[float | None, typer.Option(help="Control at zero load [0].")] = None,
     runs: Annotated[int | None, typer.Option(help="Runs of the model over the priors [40].")] = None,
@@ -50,18 +50,18 @@ def calibrate(
     every: Annotated[int | None, typer.Option(help="Use only every N-th row [1].")] = None,
     sheet: Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")] = None,
     skip_rows: Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of design and draws [0].")] = None,
+    seed: Seed = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes that run the model.")] = 1,
     runs_in: Annotated[
         Path | None,
-        typer.Option(help="Folder that keeps the runs of the model, and is gone on with [OUT-forward-runs]."),
+        typer.Option(help="Folder of the runs of the model, which a repeated command reuses [OUT-forward-runs]."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
-    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
-    figures: Annotated[bool, typer.Option(help="Draw the figures, too.")] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
+    config: Config = None,
+    figures: Figures = True,
+    force: Force = False,
 ) -> None:
-    """Identify the parameters of an expensive model, which an emulator with its own error stands for."""
+    """Identify the parameters of an expensive model, using an emulator whose error is included."""
     from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.calibration import HEADERS, readable_calibration, write_calibration_run
     from tissuq.report.run_folder import check_target, run_folder
@@ -81,22 +81,27 @@ def calibrate(
     settings = load_settings(CalibrationSettings, config, options, rivals=("forward", "umbridge"))
     if settings.forward and not forward:
         raise InputError(
-            f"{config} names the forward model '{settings.forward}', which is run only when you name it: add "
+            f"{config} names the forward model '{settings.forward}', whose code runs only if you name it: add "
             f"--forward {settings.forward}"
+        )
+    if settings.umbridge and not umbridge:
+        raise InputError(
+            f"{config} names the UM-Bridge server {settings.umbridge}, which is asked only when you name it: add "
+            f"--umbridge {settings.umbridge}"
         )
     beside = config.parent if config else Path()
     target = out or Path("runs") / Path(settings.file).stem
     check_target(target, force=force)
-    kept = runs_in or target.with_name(f"{target.name}-forward-runs")
+    runs_folder = runs_in or target.with_name(f"{target.name}-forward-runs")
     with campaign_progress(settings.runs + settings.refine) as step:
-        study = run_calibration(settings, beside, runs_in=kept, workers=workers, step=step)
+        study = run_calibration(settings, beside, runs_in=runs_folder, workers=workers, step=step)
     with run_folder(target, force=force) as folder:
         write_calibration_run(study, folder, beside, figures=figures)
     print_rows(f"{settings.forward_model.name}: {len(study.calibration.runs)} runs", HEADERS,
                readable_calibration(study.calibration))  # fmt: skip
     print(f"Emulator, {study.calibration.check}")
     print_warnings(study.warnings)
-    print(f"Forward runs: {kept}\nReport: {target / 'report.html'}")
+    print(f"Forward runs: {runs_folder}\nReport: {target / 'report.html'}")
     not_converged([] if study.calibration.converged else ["the calibration"])
 
 

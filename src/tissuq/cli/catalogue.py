@@ -1,4 +1,4 @@
-"""``tissuq materials``, ``modes``, ``discrepancies`` and ``datasets``: what there is."""
+"""``tissuq materials``, ``modes``, ``discrepancies``, ``datasets``: what is available; ``check``: your own law."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import typer
 from tissuq.errors import InputError
 
 if TYPE_CHECKING:
-    from tissuq.discrepancy import Discrepancy
     from tissuq.mechanics import Material
+    from tissuq.model.discrepancy import Discrepancy
 
-__all__ = ["datasets", "discrepancies", "materials", "modes"]
+__all__ = ["check", "datasets", "discrepancies", "materials", "modes"]
 
 LONG = 70
 """Characters of a formula from which its source stands on a line of its own."""
@@ -27,13 +27,13 @@ def materials(
     """List the materials: formula, parameters, units and default priors."""
     from tissuq.mechanics.material import materials as known
     from tissuq.mechanics.named import FORMS, plugins
-    from tissuq.report.materials_page import materials_page
+    from tissuq.report.catalogue import materials_page
 
     if markdown:
         print(materials_page(), end="")
         return
-    others = [each for each in plugins() if each.name not in known()]
-    _print_kinds("Materials: strain-energy densities W", [*known().values(), *others])
+    external = [plugin for plugin in plugins() if plugin.name not in known()]
+    _print_kinds("Materials: strain-energy densities W", [*known().values(), *external])
     print("Other names:")
     for form in FORMS:
         print(f"    {form}")
@@ -43,12 +43,14 @@ def modes(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the page docs/modes.md instead.")] = False,
 ) -> None:
     """List the loading modes: what is set, and the stresses that are measured."""
-    from tissuq.experiments.modes import loading_modes
-    from tissuq.report.modes_page import modes_page
+    from tissuq.experiments.modes import LoadingMode, loading_modes
+    from tissuq.registry import plugins
+    from tissuq.report.catalogue import modes_page
 
     if markdown:
         print(modes_page(), end="")
         return
+    plugins(LoadingMode)
     print("Loading modes: every stress is the derivative of W by what it does work on\n")
     for kind in loading_modes().values():
         controls = ", ".join(control.name for control in kind.controls)
@@ -57,8 +59,11 @@ def modes(
 
 def discrepancies() -> None:
     """List the discrepancies: formula, parameters, units and default priors."""
-    from tissuq.discrepancy import discrepancies as known
+    from tissuq.model.discrepancy import Discrepancy
+    from tissuq.model.discrepancy import discrepancies as known
+    from tissuq.registry import plugins
 
+    plugins(Discrepancy)
     _print_kinds("Discrepancies: measured stress = material + discrepancy + noise", known().values())
 
 
@@ -80,7 +85,7 @@ def datasets(
 
 
 def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy] | Material]) -> None:
-    from tissuq.report.materials_page import default_in_words
+    from tissuq.report.catalogue import default_in_words
 
     print(f"{title}\n")
     for kind in kinds:
@@ -91,3 +96,15 @@ def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy] 
         if kind.caution:
             print(fill(kind.caution, 96, initial_indent="    Note: ", subsequent_indent="    "))
         print()
+
+
+def check(material: Annotated[str, typer.Argument(help="Your own law.py:Name, or the name of any material.")]) -> None:
+    """Check a material: zero at the reference, derivatives, what is linear; status 2 where it fails."""
+    from tissuq.mechanics import material_named
+    from tissuq.mechanics.contract import checked
+
+    law = material_named(material, laws=True)
+    print(f"{law.name}\n    {law.formula}")
+    print(f"    parameters: {', '.join(f'{p.symbol} ({p.unit})' if p.unit else p.symbol for p in law.parameters)}")
+    for result in checked(law):
+        print(f"    FAILS: {result.claim}: {result.problem}" if result.problem else f"    holds: {result.claim}")

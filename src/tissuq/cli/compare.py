@@ -1,4 +1,4 @@
-"""``tissuq compare``: the fits of runs side by side."""
+"""``tissuq compare`` and ``show``: the fits of runs side by side, and the summary of one run."""
 
 from __future__ import annotations
 
@@ -8,28 +8,30 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tissuq.cli.options import Force
 from tissuq.errors import InputError
-from tissuq.report.run_folder import ASSESSMENT
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compare"]
+from tissuq.studies.settings import DAMAGE
+
+__all__ = ["compare", "show"]
 
 
 def compare(
     runs: Annotated[list[Path], typer.Argument(help="Run folders, or files of posteriors in them.")],
     out: Annotated[Path | None, typer.Option(help="Folder for table, figure and report.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the folder of an earlier comparison.")] = False,
+    force: Force = False,
 ) -> None:
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.experiments.units import stress_unit
+    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
+    from tissuq.experiments.reading.units import stress_unit
     from tissuq.report.comparison import (
+        EXPLANATIONS,
         HEADERS,
-        NOTES,
-        ROUGH,
+        comparison_warnings,
         parameter_header,
         readable_comparison,
         write_comparison,
@@ -38,7 +40,7 @@ def compare(
 
     if out is not None:
         if any(path.resolve().is_relative_to(out.resolve()) for path in runs):
-            raise InputError(f"'{out}' holds what is compared; choose another folder for the comparison with --out.")
+            raise InputError(f"'{out}' holds one of the compared runs; choose another folder with --out.")
         check_target(out, force=force)
     trees = _trees(runs)
     table = compare_fits(trees)
@@ -46,7 +48,8 @@ def compare(
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
     headers = [*HEADERS, parameter_header(table, unit)]
     print_rows("Fits of the same measurements", headers, readable_comparison(table, unit))
-    print_warnings([*NOTES, *[ROUGH] * bool(table["is_rough"].any())])
+    print_explanations(EXPLANATIONS)
+    print_warnings(comparison_warnings(table))
     if out is not None:
         with run_folder(out, force=force) as folder:
             write_comparison(table, [str(run) for run in runs], unit, folder)
@@ -59,10 +62,10 @@ def _trees(runs: list[Path]) -> dict[str, xr.DataTree]:
 
     files: dict[str, Path] = {}
     for run in runs:
-        found = sorted((run / "posterior").glob("*.nc")) if run.is_dir() else [run]
-        if not found or not all(path.is_file() for path in found):
+        paths = sorted((run / "posterior").glob("*.nc")) if run.is_dir() else [run]
+        if not paths or not all(path.is_file() for path in paths):
             raise InputError(f"there is no posterior in '{run}': give the folder of a run, or an .nc file in one.")
-        for path in found:
+        for path in paths:
             name = f"{run.name}/{path.stem}" if run.is_dir() and len(runs) > 1 else path.stem
             files[name if name not in files else str(path)] = path
     try:
@@ -76,9 +79,18 @@ def _trees(runs: list[Path]) -> dict[str, xr.DataTree]:
 
 def _assessed(path: Path) -> dict[str, float]:
     """Return what the assessment of the posterior's run says of its evidence with other priors."""
+    from tissuq.report.run_folder import ASSESSMENT
+
     try:
         rows = json.loads((path.parent.parent / ASSESSMENT).read_text(encoding="utf-8"))
-        own = next(row for row in rows if row["formulation"] == path.stem)
-        return {f"evidence_change_{name}": float(change) for name, change in own["evidence_changes"].items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, StopIteration):
-        return {}  # a file by itself, or a run without an assessment: not known
+        assessment = next(row for row in rows if row["formulation"] == path.stem)
+        return {f"evidence_change_{name}": float(change) for name, change in assessment["evidence_changes"].items()}
+    except (OSError, *DAMAGE, StopIteration):
+        return {}  # a single file, or a run without an assessment
+
+
+def show(run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> None:
+    """Print the summary of a run and where its report lies."""
+    from tissuq.cli.tables import print_summary
+
+    print_summary(run_folder)

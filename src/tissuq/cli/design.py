@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import own_law, progress
+from tissuq.cli.options import Config, Figures, Force, RunDiscrepancy, RunFolder, RunMaterial, Seed, own_law, progress
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -16,11 +16,11 @@ __all__ = ["design"]
 
 
 def design(
-    run: Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")] = None,
+    run: RunFolder = None,
     target: Annotated[
         list[str] | None,
         typer.Option(
-            help="What is to become less uncertain: modulus (initial shear modulus), a parameter, or a stress as "
+            help="Quantity to become less uncertain: modulus (initial shear modulus), a parameter, or a stress as "
             "MODE:STRETCH, such as planar:1.5; repeat for more [modulus]."
         ),
     ] = None,
@@ -33,24 +33,22 @@ def design(
     ] = None,
     points: Annotated[
         list[int] | None,
-        typer.Option(help="Measurements of every usual test; repeat for more [as many as the data, 10 to 40]."),
+        typer.Option(help="Measurements of every default test; repeat for more [as many as the data, 10 to 40]."),
     ] = None,
     specimen: Annotated[
         str | None,
         typer.Option(help="The next test is of the same specimen or of another one [same, unless there are several]."),
     ] = None,
-    discrepancy: Annotated[
-        str | None, typer.Option(help="Which discrepancy of the run [auto, or the only one].")
-    ] = None,
-    material: Annotated[str | None, typer.Option(help="Your own law.py:Name, where the run's material is one.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the simulated outcomes [0].")] = None,
+    discrepancy: RunDiscrepancy = None,
+    material: RunMaterial = None,
+    seed: Seed = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the ranking [runs/RUN-design].")] = None,
-    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier ranking, or your own.")] = None,
-    figures: Annotated[bool, typer.Option(help="Draw the figure, too.")] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace the folder of an earlier ranking.")] = False,
+    config: Config = None,
+    figures: Figures = True,
+    force: Force = False,
 ) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
-    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
     from tissuq.report.design import HEADERS, heading, readable_design, write_design
     from tissuq.report.run_folder import check_apart, check_target, run_folder
     from tissuq.studies.design import DesignSettings, run_design
@@ -64,17 +62,22 @@ def design(
     law = own_law(material)
     settings = load_settings(DesignSettings, config, options)
     beside = config.parent if config else Path()
-    place = (beside / settings.run).resolve()
-    folder = out or Path("runs") / f"{place.name}-design"
-    check_apart(folder, place)
+    run_path = (beside / settings.run).resolve()
+    folder = out or Path("runs") / f"{run_path.name}-design"
+    check_apart(folder, run_path)
     check_target(folder, force=force)
     with progress() as step:
         study = run_design(settings, beside, step, law)
         step("writing")
-        recipe = settings.model_copy(update={"run": os.path.relpath(place, folder.resolve())})
+        recipe = settings.model_copy(update={"run": os.path.relpath(run_path, folder.resolve())})
         with run_folder(folder, force=force) as scratch:
             write_design(study, recipe, scratch, figures=figures)
-    for each in study.targets:
-        print_rows(heading(study, each)[0].upper() + heading(study, each)[1:], HEADERS, readable_design(study, each))
-    print_warnings(study.notes)
+    for aim in study.targets:
+        print_rows(
+            heading(study, aim)[0].upper() + heading(study, aim)[1:],
+            HEADERS,
+            readable_design(study, aim),
+        )
+    print_explanations(study.explanations)
+    print_warnings(study.warnings)
     print(f"Report: {folder / 'report.html'}")

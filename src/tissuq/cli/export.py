@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from tissuq.cli.options import own_law
+from tissuq.cli.options import Force, RunDiscrepancy, RunMaterial, own_law
 
 if TYPE_CHECKING:
-    from tissuq.ensemble import Sampling
+    from tissuq.posterior.ensemble import Sampling
 
 __all__ = ["export"]
 
@@ -22,9 +21,7 @@ def export(
         str, typer.Option(help="abaqus, calculix, ansys, febio, ls-dyna, or table (W1 and W2 as CSV).")
     ] = "abaqus",
     draws: Annotated[int, typer.Option(help="Number of draws, a card each.")] = 20,
-    discrepancy: Annotated[
-        str | None, typer.Option(help="Which of the run's discrepancies [auto, or the only one].")
-    ] = None,
+    discrepancy: RunDiscrepancy = None,
     sampling: Annotated[str, typer.Option(help="How draws spread: sobol, latin or random.")] = "sobol",
     all_draws: Annotated[
         bool, typer.Option("--all-draws", help="Keep draws that are not stable over the measured range.")
@@ -43,19 +40,17 @@ def export(
     ] = None,
     poisson: Annotated[float | None, typer.Option(help="Instead: Poisson's ratio of all draws.")] = None,
     name: Annotated[str, typer.Option(help="Name of the material in the cards.")] = "TISSUE",
-    material: Annotated[
-        str | None, typer.Option(help="The law.py:Name of the run, where it is your own: it is not run unasked.")
-    ] = None,
+    material: RunMaterial = None,
     seed: Annotated[int, typer.Option(help="Seed of the draws.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the cards [cards/RUN-FORMAT].")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the folder of earlier cards.")] = False,
+    force: Force = False,
 ) -> None:
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
-    from tissuq.cli.tables import print_warnings
+    from tissuq.cli.tables import print_explanations
     from tissuq.export import CardSettings, card_format
     from tissuq.report.cards import INDEX, write_cards
     from tissuq.report.run_folder import check_apart, check_target
-    from tissuq.studies.earlier_run import load_run
+    from tissuq.studies.earlier_run import load
 
     target = out or Path("cards") / f"{run.resolve().name}-{format}"
     check_apart(target, run)
@@ -65,14 +60,11 @@ def export(
         "law": law, "order": order, "unit": unit, "bulk_modulus": bulk_modulus, "poisson": poisson, "name": name,
     }  # fmt: skip
     CardSettings(**settings)
-    own = own_law(material)
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always", UserWarning)
-        posterior = load_run(run, discrepancy, own)
+    posterior = load(run, discrepancy, own_law(material))
     ensemble = posterior.ensemble(draws, seed, cast("Sampling", sampling), admissible=not all_draws)
     source = f"run {run.resolve().name} of tissuq fit, {sampling} draws from seed {seed}"
     cards = write_cards(ensemble, target, format, force=force, source=source, **settings)
-    print_warnings([*(str(each.message) for each in told), *cards.notes])
+    print_explanations(cards.warnings)
     files, typical = list(cards.files), min(cards.index, key=lambda row: row["from_median"])
     print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
     print(f"The most typical draw, nearest to the median stresses: {typical['file']}")

@@ -1,4 +1,4 @@
-"""``tissuq fit``: the user's own measurements, of one test or of several."""
+"""``tissuq fit``: the user's own measurements, of one test or of reading."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli import reading, several
-from tissuq.cli.options import not_converged, once_each, parse_prior, progress
+from tissuq.cli import reading
+from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, once_each, parse_prior, progress
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -56,9 +56,9 @@ def fit(
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
-            help="By how much a whole test may be off: stress=10%, length=2%, slack=0.01 (of stretch), zero=0.1 (in "
-            "the stress unit), or every single stretch=0.001; or none; repeat [stress=18% for files of different "
-            "specimens]."
+            help="Error of a whole test (standard deviation): stress=10%, length=2%, slack=0.01 (of stretch), zero=0.1 "
+            "(in the stress unit), or of every single stretch=0.001; or none; repeat [stress=18% for files of "
+            "different specimens]."
         ),
     ] = None,
     specimen: Annotated[
@@ -74,16 +74,16 @@ def fit(
     method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
     stable_in: Annotated[
         list[str] | None,
-        typer.Option(help="Leave out what is not stable in this loading mode, or in all; repeat for more."),
+        typer.Option(help="Require stability in this loading mode, or in all; repeat for more."),
     ] = None,
     held_out: Annotated[
-        bool | None, typer.Option("--held-out", help="Predict every one of several tests from the others, too.")
+        bool | None, typer.Option("--held-out", help="Also predict each of several tests from the others.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
+    seed: Seed = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
-    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
-    figures: Annotated[bool, typer.Option(help="Draw the figures, too.")] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
+    config: Config = None,
+    figures: Figures = True,
+    force: Force = False,
 ) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
     from tissuq.cli.tables import print_summary, print_warnings
@@ -92,13 +92,13 @@ def fit(
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
-    files = several.files_of(file or [])
+    files = reading.files_of(file or [])
     options: dict[str, Any] = {
         "material": material, "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
-        "tolerances": several.tolerances(tolerance), "stable_in": stable_in or None,
+        "tolerances": reading.tolerances(tolerance), "stable_in": stable_in or None,
         "held_out": held_out,
     }  # fmt: skip
-    options |= several.measured([] if config else files, read_as, mode, specimen, noise_sd)
+    options |= reading.measured([] if config else files, read_as, mode, specimen, noise_sd)
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))
     if not file and not config:
@@ -108,17 +108,17 @@ def fit(
     law = material_named(material, laws=True) if material else None
     settings = load_settings(SpecimenSettings, config, options, rivals=("noise", "noise_sd"))
     beside = config.parent if config else Path()
-    sources = [beside / each.file for each in settings.tests or (settings,)]
+    sources = [beside / test.file for test in settings.tests or (settings,)]
     if files and config:
         _check_same(files[0], sources[0], config)
-    target = out or Path("runs") / several.run_name(file or [], config, sources)
+    target = out or Path("runs") / reading.run_name(file or [], config, sources)
     check_target(target, force=force)
     with progress() as step:
         study = run_specimen(settings, beside, step, law)
         step("writing")
         with run_folder(target, force=force) as folder:
             write_specimen_run(study, sources, folder, figures=figures)
-    print_summary(target)
+    print_summary(target, study.experiment)
     print_warnings(study.warnings)
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")

@@ -1,4 +1,4 @@
-"""What several commands share: priors, progress and the closing lines."""
+"""What several commands share: repeated options, priors, progress, folders of campaigns and closing lines."""
 
 from __future__ import annotations
 
@@ -6,43 +6,80 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
+from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from tissuq.errors import InputError
-from tissuq.priors import Prior
-from tissuq.registry import find
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from tissuq.mechanics import Material
 
-__all__ = ["campaign_progress", "not_converged", "once_each", "own_law", "parse_prior", "progress"]
+__all__ = [
+    "Config",
+    "Figures",
+    "Force",
+    "RunDiscrepancy",
+    "RunFolder",
+    "RunMaterial",
+    "Scheduler",
+    "Seed",
+    "campaign_progress",
+    "check_folder",
+    "not_converged",
+    "once_each",
+    "own_law",
+    "parse_prior",
+    "progress",
+    "write_campaign_recipe",
+]
+
+RunFolder = Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")]
+RunDiscrepancy = Annotated[
+    str | None, typer.Option(help="Which of the discrepancies of the run [auto, or the only one].")
+]
+RunMaterial = Annotated[
+    str | None,
+    typer.Option(help="law.py:Name of the run, if its material is your own law; its code runs only if named here."),
+]
+Config = Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of the random numbers [0].")]
+Scheduler = Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead.")]
+Figures = Annotated[bool, typer.Option(help="Draw the figures.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an existing folder of the same kind.")]
 
 NOT_CONVERGED = 3
 
 
 def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return the pairs of a repeatable option as a dictionary, each name given once."""
-    found: dict[str, Any] = {}
+    values_by_name: dict[str, Any] = {}
     for name, value in pairs:
-        if name in found:
+        if name in values_by_name:
             raise InputError(f"{option} is given twice for '{name}'; give it once.")
-        found[name] = value
-    return found
+        values_by_name[name] = value
+    return values_by_name
 
 
 def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
     """Return the symbol and the prior of a text like ``C10=uniform(0, 5)``."""
+    from tissuq.parameters.priors import Prior
+    from tissuq.registry import find
+
     match = re.fullmatch(r"\s*(\w+)\s*=\s*([\w-]+)\s*\(([^()]*)\)\s*", text)
     if match is None:
         raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
     symbol, distribution, numbers = match.groups()
-    known = fields(find(Prior, "prior distribution", distribution, InputError))
+    arguments = fields(find(Prior, "prior distribution", distribution, InputError))
     try:
         values = [float(number) for number in numbers.split(",")] if numbers.strip() else []
     except ValueError as error:
-        raise InputError(f"prior '{text}': its arguments must be numbers with a decimal point.") from error
-    names, needed = [field.name for field in known], sum(field.default is MISSING for field in known)
+        raise InputError(f"prior '{text}': the arguments must be numbers, with a decimal point.") from error
+    names, needed = [field.name for field in arguments], sum(field.default is MISSING for field in arguments)
     if not needed <= len(values) <= len(names):
         optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
         raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
@@ -55,19 +92,19 @@ def own_law(material: str | None) -> Material | None:
 
     if material is not None and ".py:" not in material:
         raise InputError(
-            f"--material names the law in a file of a run whose material is one, as law.py:Name, and '{material}' is "
-            "none; the run knows every other material."
+            f"'{material}' is not of the form law.py:Name. --material is only needed for a run whose material is a "
+            "law in your own file."
         )
     return material_named(material, laws=True) if material else None
 
 
 @contextmanager
 def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
-    """Show the steps of a long run on a terminal; give the function that announces the next one."""
+    """Show the steps of a long run on a terminal; give the function that announces the next step."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=total)
@@ -83,24 +120,24 @@ def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def campaign_progress(total: int) -> Iterator[Callable[[str, bool], None]]:
-    """Show how much of a campaign is done and how long the rest will take; give the function that is told of each task.
+    """Show how much of a campaign is done and how long it will still take; give the function to call after each task.
 
-    Tasks that an earlier run had done count as done, but not for the time.
+    Tasks that an earlier run had done count as done, but not in the estimate of the time.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         shown = bar.add_task("", total=total)
-        start, found, own = monotonic(), 0, 0
+        start, finished, computed = monotonic(), 0, 0
 
         def step(text: str, is_new: bool) -> None:
-            nonlocal found, own
-            found, own = found + 1, own + is_new
-            left = (monotonic() - start) / own * (total - found) if own else None
-            bar.update(shown, description=f"{_duration(left)}{text}", completed=found)
+            nonlocal finished, computed
+            finished, computed = finished + 1, computed + is_new
+            seconds_left = (monotonic() - start) / computed * (total - finished) if computed else None
+            bar.update(shown, description=f"{_duration(seconds_left)}{text}", completed=finished)
 
         yield step
 
@@ -108,14 +145,12 @@ def campaign_progress(total: int) -> Iterator[Callable[[str, bool], None]]:
 def _duration(seconds: float | None) -> str:
     if seconds is None:
         return ""
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes // 60} h {minutes % 60:02d} min left, " if minutes >= 60 else f"{minutes}:{rest:02d} left, "
+    minutes, remaining = divmod(round(seconds), 60)
+    return f"{minutes // 60} h {minutes % 60:02d} min left, " if minutes >= 60 else f"{minutes}:{remaining:02d} left, "
 
 
 def not_converged(names: list[str]) -> None:
     """End with status 3 when sampling has not converged anywhere."""
-    import typer
-
     if names:
         typer.echo(
             f"tissuq: sampling has NOT converged for {', '.join(names)}; do not use these results. "
@@ -123,3 +158,42 @@ def not_converged(names: list[str]) -> None:
             err=True,
         )
         raise typer.Exit(NOT_CONVERGED)
+
+
+def check_folder(folder: Path, settings: BaseModel) -> None:
+    """Refuse a folder that is not empty, unless it is that of the same campaign.
+
+    Raises
+    ------
+    InputError
+        When it is neither.
+    """
+    from tissuq.report.run_folder import RECIPE
+
+    recipe = folder / RECIPE
+    if not folder.exists() or (folder.is_dir() and {path.name for path in folder.iterdir()} <= {_unfinished(recipe)}):
+        return
+    if not recipe.exists():
+        raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
+    if recipe.read_text(encoding="utf-8") != _recipe(settings):
+        raise InputError(f"'{folder}' holds a campaign with other settings; choose another folder with --out.")
+
+
+def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
+    """Write the recipe atomically, so that a killed campaign can be resumed."""
+    from tissuq.report.run_folder import RECIPE
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scratch = folder / _unfinished(folder / RECIPE)
+    scratch.write_text(_recipe(settings), encoding="utf-8")
+    scratch.replace(folder / RECIPE)
+
+
+def _unfinished(recipe: Path) -> str:
+    return f"{recipe.name}.new"
+
+
+def _recipe(settings: BaseModel) -> str:
+    import tomli_w
+
+    return tomli_w.dumps(settings.model_dump(mode="json", exclude_none=True))

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli import reading
-from tissuq.cli.options import not_converged, progress
-from tissuq.cli.several import one_noise
+from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, progress
+from tissuq.cli.reading import one_noise
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -49,13 +49,13 @@ def population(
     method: Annotated[
         str | None, typer.Option(help="Of every specimen's fit: auto, exact, nuts, smc or joint [auto].")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the draws [0].")] = None,
+    seed: Seed = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/population].")] = None,
-    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")] = None,
-    figures: Annotated[bool, typer.Option(help="Draw the figures, too.")] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing run folder.")] = False,
+    config: Config = None,
+    figures: Figures = True,
+    force: Force = False,
 ) -> None:
-    """Identify a population from its specimens, every specimen within it, and what to expect of a new patient."""
+    """Identify a population from its specimens, every specimen within it, and what to expect for a new patient."""
     from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.mechanics import material_named
     from tissuq.report.population import HEADERS, readable_population, write_population_run
@@ -63,7 +63,7 @@ def population(
     from tissuq.studies.population import PopulationSettings, run_population
 
     if bool(files) == bool(config):
-        raise InputError("give the FILES of several specimens or folders of them, or --config run.toml.")
+        raise InputError("give the FILES of several specimens, folders of them, or --config run.toml.")
     options: dict[str, Any] = read_as | {
         "files": tuple(map(str, files)) if files else None, "specimen": specimen, "material": material,
         "parameters": tuple(parameter) if parameter else None, "spread": spread, "discrepancy": discrepancy,
@@ -80,7 +80,7 @@ def population(
         with run_folder(target, force=force) as folder:
             write_population_run(study, folder, beside, figures=figures)
     print_rows(f"A population of {len(study.tests)} specimens", HEADERS, readable_population(study))
-    print("Complete pooling takes all specimens for one: its interval is no range of patients.")
+    print("Complete pooling treats all specimens as one: its interval does not describe the range of patients.")
     print_warnings(study.warnings)
     print(f"Report: {target / 'report.html'}")
     not_converged([] if study.population.converged else ["the population"])

@@ -9,7 +9,17 @@ from typing import Annotated, Any
 import typer
 
 from tissuq.cli import reading
-from tissuq.cli.options import not_converged, own_law, progress
+from tissuq.cli.options import (
+    Config,
+    Figures,
+    Force,
+    RunDiscrepancy,
+    RunFolder,
+    RunMaterial,
+    not_converged,
+    own_law,
+    progress,
+)
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
@@ -18,7 +28,7 @@ __all__ = ["predict"]
 
 @partial(reading.reads_files, names={"stress_type": "data_stress_type"})
 def predict(
-    run: Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")] = None,
+    run: RunFolder = None,
     mode: Annotated[
         str | None, typer.Option(help="Loading mode to predict [that of the data, or of the run]; see tissuq modes.")
     ] = None,
@@ -31,14 +41,10 @@ def predict(
         typer.Option(help="Of the second control of a mode with two, such as biaxial; one number where it is held."),
     ] = None,
     points: Annotated[int | None, typer.Option(help="Stretches in a range [101].")] = None,
-    discrepancy: Annotated[
-        str | None, typer.Option(help="Which of the run's discrepancies [auto, or the only one].")
-    ] = None,
+    discrepancy: RunDiscrepancy = None,
     prob: Annotated[float | None, typer.Option(help="Probability of the bands [0.95].")] = None,
     stress_type: Annotated[str | None, typer.Option(help="Predict engineering or cauchy stress [engineering].")] = None,
-    material: Annotated[
-        str | None, typer.Option(help="Your law.py:Name, where the run's material is one; it is not run unasked.")
-    ] = None,
+    material: RunMaterial = None,
     data: Annotated[
         Path | None,
         typer.Option(
@@ -49,9 +55,9 @@ def predict(
     *,
     read_as: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="Folder for the prediction [RUN-MODE, beside the run].")] = None,
-    config: Annotated[Path | None, typer.Option(help="run.toml of an earlier prediction to repeat.")] = None,
-    figures: Annotated[bool, typer.Option(help="Draw the figure, too.")] = True,
-    force: Annotated[bool, typer.Option("--force", help="Replace an existing prediction.")] = False,
+    config: Config = None,
+    figures: Figures = True,
+    force: Force = False,
 ) -> None:
     """Predict the stress in any loading mode from a fit, and compare it with measurements."""
     from tissuq.cli.tables import print_rows, print_warnings
@@ -67,13 +73,13 @@ def predict(
 
     if bool(run) == bool(config):
         raise InputError("give the RUN folder of a fit, or --config run.toml of an earlier prediction.")
-    told = {name: value for name, value in read_as.items() if value is not None}
-    if told and not (data or config):
-        raise InputError(f"there are options that say how to read a file ({', '.join(told)}), and no --data to read.")
+    stated = {name: value for name, value in read_as.items() if value is not None}
+    if stated and not (data or config):
+        raise InputError(f"{', '.join(stated)} can only be used with --data FILE.")
     file = {"file": str(reading.resolve(data))} if data else {}
     options: dict[str, Any] = {
         "run": str(run) if run else None, "mode": mode, "stretch": stretch, "stretch2": stretch2, "points": points,
-        "discrepancy": discrepancy, "prob": prob, "stress_type": stress_type, "data": file | told or None,
+        "discrepancy": discrepancy, "prob": prob, "stress_type": stress_type, "data": file | stated or None,
     }  # fmt: skip
     settings = load_settings(PredictionSettings, config, options)
     beside = config.parent if config else Path()
@@ -84,13 +90,17 @@ def predict(
     check_apart(target, source)
     check_target(target, force=force)
     with progress() as step:
-        found = run_prediction(settings, beside, step, law)
+        prediction = run_prediction(settings, beside, step, law)
         step("writing")
         with run_folder(target, force=force) as folder:
-            write_prediction_run(found, settings, folder, target, beside, law=material, figures=figures)
-    print_rows(f"Stress in mode {found.mode.name}, {found.unit.name}", band_headers(found), readable_bands(found))
-    if found.scores is not None and found.data is not None:
-        print_rows(f"Measurements of {found.data.name}", score_headers(found), readable_scores(found))
-    print_warnings(list(found.notes))
+            write_prediction_run(prediction, settings, folder, target, beside, law=material, figures=figures)
+    print_rows(
+        f"Stress in mode {prediction.mode.name}, {prediction.unit.name}",
+        band_headers(prediction),
+        readable_bands(prediction),
+    )
+    if prediction.scores is not None and prediction.data is not None:
+        print_rows(f"Measurements of {prediction.data.name}", score_headers(prediction), readable_scores(prediction))
+    print_warnings(prediction.warnings)
     print(f"Report: {target / 'report.html'}")
-    not_converged(["the fit"] if found.posterior.solution.is_approximate else [])
+    not_converged(["the fit"] if prediction.posterior.solution.is_approximate else [])

@@ -1,19 +1,22 @@
-"""The options that say how a file of measurements is read, shared by the commands that read one."""
+"""Files of measurements on the command line: options of reading, modes, specimens and noise; ``tissuq inspect``."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
+from inspect import Parameter
+from inspect import signature as signature_of
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import once_each
+from tissuq.cli.options import Force, once_each
 from tissuq.errors import InputError
+from tissuq.registry import variants
+from tissuq.studies.settings import load_settings
 
-__all__ = ["Mode", "reads_files", "resolve"]
+__all__ = ["Mode", "files_of", "inspect", "measured", "one_noise", "reads_files", "resolve", "run_name", "tolerances"]
 
 Mode = Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")]
 OPTIONS: dict[str, Any] = {
@@ -65,40 +68,39 @@ def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = 
     another use for.
     """
     names = {name: name for name in OPTIONS} | dict(names or {})
-    signature = inspect.signature(command, eval_str=True)
-    place = list(signature.parameters).index("read_as")
-    own = list(signature.parameters.values())
+    signature = signature_of(command, eval_str=True)
+    position = list(signature.parameters).index("read_as")
+    parameters = list(signature.parameters.values())
     options = [
-        inspect.Parameter(names[name], inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
+        Parameter(names[name], Parameter.KEYWORD_ONLY, default=None, annotation=option)
         for name, option in OPTIONS.items()
     ]
 
     @wraps(command)
     def reading(**arguments: Any) -> None:
-        given = {name: arguments.pop(names[name]) for name in OPTIONS}
-        command(**arguments, read_as=_settings(given))
+        values = {name: arguments.pop(names[name]) for name in OPTIONS}
+        command(**arguments, read_as=_settings(values))
 
     reading.__signature__ = signature.replace(  # type: ignore[attr-defined]  # what Typer reads
-        parameters=[*own[:place], *options, *own[place + 1 :]]
+        parameters=[*parameters[:position], *options, *parameters[position + 1 :]]
     )
     return reading
 
 
-def _settings(given: dict[str, Any]) -> dict[str, Any]:
+def _settings(values: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of a file's reading for the options' values by name."""
-    dimensions = {name: given.pop(name) for name in DIMENSIONS}
-    columns = once_each("--column", map(_role, given.pop("column") or []))
-    known = {name: value for name, value in dimensions.items() if value}
-    return given | {"dimensions": known or None, "columns": columns or None}
+    dimensions = {name: values.pop(name) for name in DIMENSIONS}
+    columns = once_each("--column", map(_role, values.pop("column") or []))
+    stated = {name: value for name, value in dimensions.items() if value}
+    return values | {"dimensions": stated or None, "columns": columns or None}
 
 
 def resolve(file: Path) -> Path:
-    """Return the user's file, or the built-in data set of that name, which must be one that can be fitted."""
+    """Return the user's file, or the built-in data set of that name."""
     from tissuq.experiments import datasets
 
     if file.exists() or str(file) not in datasets.names():
         return file
-    datasets.load(str(file))
     return datasets.path(str(file))
 
 
@@ -107,3 +109,148 @@ def _role(text: str) -> tuple[str, str | int]:
     if not name:
         raise InputError(f"--column needs ROLE=COLUMN, such as stress='Stress (kPa)', not '{text}'.")
     return role.strip(), int(name) if name.strip().isdecimal() else name.strip()
+
+
+def files_of(paths: Sequence[Path]) -> list[Path]:
+    """Return the files that were given; of a folder those in it that may hold measurements."""
+    from tissuq.experiments.reading.specimens import SUFFIXES
+
+    files: list[Path] = []
+    for path in paths:
+        if not path.is_dir():
+            files.append(resolve(path))
+            continue
+        inside = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+        if not inside:
+            raise InputError(f"folder '{path}' has no files of measurements ({', '.join(SUFFIXES)}).")
+        files += inside
+    return files
+
+
+def measured(
+    files: Sequence[Path],
+    reading: dict[str, Any],
+    modes: Sequence[str] | None,
+    specimens: Sequence[str] | None,
+    noise_sd: str | None,
+) -> dict[str, Any]:
+    """Return the settings of a fit that say what was measured, of one file or of several.
+
+    Raises
+    ------
+    InputError
+        When there is not one mode, specimen or noise for each file, or a file does not say its mode.
+    """
+    from tissuq.experiments.reading.stated_mode import said_mode, told_mode
+
+    noise = _numbers(noise_sd)
+    if len(files) < 2:
+        for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
+            if stated and len(stated) > 1:
+                raise InputError(f"{option} is given {len(stated)} times for one file; give it once.")
+        file_setting: dict[str, Any] = {"file": str(files[0])} if files else {}
+        mode = modes[0] if modes else said_mode(files[0]) if files else None
+        return reading | file_setting | {"mode": mode, "noise_sd": noise[0] if noise else None}
+    modes = _for_each(files, "--mode", modes) or [told_mode(file) for file in files]
+    names = _for_each(files, "--specimen", specimens)
+    each_noise = _for_each(files, "--noise-sd", noise) if noise and len(noise) > 1 else None
+    options = {name: value for name, value in reading.items() if value is not None}
+    tests = [options | {"file": str(file), "mode": mode} for file, mode in zip(files, modes, strict=True)]
+    for name, values in (("specimen", names), ("noise_sd", each_noise)):
+        for test, value in zip(tests, values or [], strict=False):
+            test[name] = value
+    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}
+
+
+def tolerances(texts: Sequence[str] | None) -> dict[str, float] | None:
+    """Return tolerances from texts such as ``stress=10%``; an empty one from ``none``."""
+    if not texts:
+        return None
+    if list(texts) == ["none"]:
+        return {}
+    return once_each("--tolerance", map(_tolerance, texts))
+
+
+def one_noise(text: str | None) -> float | str | None:
+    """Return the standard deviation of the noise of all files: a number, or 'unknown'."""
+    values = _numbers(text)
+    if values and len(values) > 1:
+        raise InputError(f"--noise-sd is given {len(values)} times for a population; give it once for all specimens.")
+    return values[0] if values else None
+
+
+def run_name(paths: Sequence[Path], config: Path | None, sources: Sequence[Path]) -> str:
+    """Return the name of a run's folder unless one is given."""
+    if config is not None and len(sources) > 1:
+        return config.stem
+    if len(paths) == 1:
+        return paths[0].stem
+    return sources[0].stem + (f"-and-{len(sources) - 1}-more" if len(sources) > 1 else "")
+
+
+def _tolerance(text: str) -> tuple[str, float]:
+    from tissuq.model.measurement_errors import MeasurementError
+
+    name, _, number = text.partition("=")
+    scale = 0.01 if number.strip().endswith("%") else 1.0
+    try:
+        value = float(number.strip().removesuffix("%")) * scale
+    except ValueError:
+        value = -1.0
+    name, errors = name.strip(), variants(MeasurementError)
+    is_share = name not in errors or not errors[name].is_stress
+    if name not in errors or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
+        names = ", ".join(errors)
+        raise InputError(
+            f"'{text}' is not a tolerance; write stress=10%, length=2%, slack=0.01, zero=0.1 or stretch=0.001 (the "
+            f"errors are {names}; zero is in the unit of stress of the file)."
+        )
+    return name, value
+
+
+def _numbers(text: str | None) -> list[float | str] | None:
+    if text is None or text == "unknown":
+        return None if text is None else [text]
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'. For several files, one "
+            "for each with commas."
+        ) from error
+
+
+def _for_each(files: Sequence[Path], option: str, values: Sequence[Any] | None) -> list[Any] | None:
+    if not values:
+        return None
+    if len(values) not in (1, len(files)):
+        raise InputError(f"{option} is given {len(values)} times for {len(files)} files; give it once for each.")
+    return list(values) * (len(files) if len(values) == 1 else 1)
+
+
+@reads_files
+def inspect(
+    file: Annotated[Path, typer.Argument(help="CSV or Excel file, or the name of a built-in data set.")],
+    mode: Mode = None,
+    *,
+    read_as: dict[str, Any],
+    out: Annotated[Path | None, typer.Option(help="Folder for figure, converted data and what is printed.")] = None,
+    force: Force = False,
+) -> None:
+    """Show what is understood of a file of measurements: columns, dimensions, cycles, rows, noise, warnings."""
+    from tissuq.experiments.reading.inspection import inspect as inspect_file
+    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.studies.measured_file import MeasuredFile
+
+    if out is not None:
+        check_target(out, force=force)
+    source = resolve(file)
+    settings = load_settings(MeasuredFile, None, read_as | {"mode": mode, "file": str(source)})
+    inspection = inspect_file(source, **settings.reading_options)
+    print(inspection)
+    if out is not None:
+        from tissuq.report.inspection import write_inspection
+
+        with run_folder(out, force=force) as folder:
+            write_inspection(inspection, folder)
+        print(f"\nFigure: {out / 'figures' / 'curve.png'}")

@@ -1,4 +1,4 @@
-"""``tissuq study``: campaigns."""
+"""``tissuq paper`` and ``study``: the study of the paper, and campaigns over many data sets."""
 
 from __future__ import annotations
 
@@ -7,21 +7,88 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.campaign import check_folder, write_campaign_recipe
-from tissuq.cli.options import campaign_progress
+from tissuq.cli.options import (
+    Config,
+    Figures,
+    Force,
+    Scheduler,
+    Seed,
+    campaign_progress,
+    check_folder,
+    not_converged,
+    once_each,
+    parse_prior,
+    progress,
+    write_campaign_recipe,
+)
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
-__all__ = ["study"]
+__all__ = ["paper", "study"]
+
+
+def paper(
+    out: Annotated[Path, typer.Option(help="Folder for the run.")] = Path("runs/paper"),
+    config: Config = None,
+    points: Annotated[int | None, typer.Option(help="Number of measurements [30].")] = None,
+    stretch_range: Annotated[str | None, typer.Option(help="Stretches LOW:HIGH [0.5:4.25].")] = None,
+    noise_sd: Annotated[
+        float | None,
+        typer.Option(help="Standard deviation of the noise, MPa [0.5]; 0.7071 if 0.5 is a variance."),
+    ] = None,
+    prior: Annotated[
+        list[str] | None, typer.Option(help="A prior in MPa, such as c=uniform(0,10); repeat for more.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of noise and draws [2021].")] = None,
+    sampler: Annotated[str | None, typer.Option(help="exact, nuts or both [exact].")] = None,
+    replicates: Annotated[int | None, typer.Option(help="Data sets over which every claim is checked [1].")] = None,
+    figures: Figures = True,
+    force: Force = False,
+) -> None:
+    """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
+    from tissuq.cli.tables import print_summary, print_warnings
+    from tissuq.report.paper import write_paper_run
+    from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.validation.paper import PaperSettings, run_paper
+    from tissuq.validation.paper.study import steps_of
+
+    low, high = _range(stretch_range)
+    options: dict[str, Any] = {
+        "points": points, "stretch_low": low, "stretch_high": high, "noise_sd": noise_sd, "seed": seed,
+        "sampler": sampler, "replicates": replicates,
+    }  # fmt: skip
+    if prior:
+        options["priors"] = once_each("--prior", map(parse_prior, prior))
+    settings = load_settings(PaperSettings, config, options)
+    check_target(out, force=force)
+    with progress(steps_of(settings)) as step:
+        study = run_paper(settings, step)
+        step("writing")
+        with run_folder(out, force=force) as folder:
+            write_paper_run(study, folder, figures=figures)
+    print_summary(out)
+    print_warnings(study.warnings)
+    not_converged(study.not_converged)
+
+
+def _range(text: str | None) -> tuple[float | None, float | None]:
+    from tissuq.errors import InputError
+
+    if text is None:
+        return None, None
+    try:
+        low, high = (float(end) for end in text.split(":"))
+    except ValueError as error:
+        raise InputError(f"--stretch-range needs LOW:HIGH, such as 0.5:4.25, not '{text}'.") from error
+    return low, high
+
 
 study = typer.Typer(name="study", no_args_is_help=True, rich_markup_mode=None, help="Campaigns over many data sets.")
 
-Config = Annotated[Path | None, typer.Option(help="TOML file of the campaign.")]
+CampaignConfig = Annotated[Path | None, typer.Option(help="TOML file of the campaign.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign [runs/NAME].")]
 Noise = Annotated[str | None, typer.Option(help="known or unknown.")]
-Seed = Annotated[int | None, typer.Option(help="Seed of materials and noise.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
-Scheduler = Annotated[str | None, typer.Option(help="Address of a Dask scheduler to use instead.")]
 
 
 @study.callback()
@@ -31,7 +98,7 @@ def _study() -> None:
 
 @study.command("coverage")
 def coverage(
-    config: Config = None,
+    config: CampaignConfig = None,
     preset: Annotated[
         str | None,
         typer.Option(
@@ -46,11 +113,11 @@ def coverage(
     workers: Workers = 1,
     scheduler: Scheduler = None,
 ) -> None:
-    """Count how often intervals hold the truth; the same command goes on with a campaign that was stopped."""
+    """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
     from tissuq.cli.tables import print_rows
-    from tissuq.report.coverage import readable_coverage, write_campaign
-    from tissuq.studies.coverage import PRESETS, CoverageSettings, run_campaign
-    from tissuq.studies.coverage.campaign import tasks_of
+    from tissuq.report.campaigns import readable_coverage, write_campaign
+    from tissuq.validation.coverage import PRESETS, CoverageSettings, run_campaign
+    from tissuq.validation.coverage.campaign import tasks_of
 
     if preset == "sbc" and config is None:
         sbc(None, out, replicates, noise, seed, workers, scheduler)
@@ -68,7 +135,7 @@ def coverage(
 
 @study.command("sbc")
 def sbc(
-    config: Config = None,
+    config: CampaignConfig = None,
     out: Out = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets of every formulation.")] = None,
     noise: Noise = None,
@@ -82,9 +149,9 @@ def sbc(
 ) -> None:
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
     from tissuq.cli.tables import print_rows
-    from tissuq.report.sbc import readable_ranks, write_sbc
-    from tissuq.studies.sbc import SbcSettings, run_sbc
-    from tissuq.studies.sbc.campaign import tasks_of
+    from tissuq.report.campaigns import readable_ranks, write_sbc
+    from tissuq.validation.sbc import SbcSettings, run_sbc
+    from tissuq.validation.sbc.campaign import tasks_of
 
     options = {"replicates": replicates, "noise": noise, "seed": seed, "material": material}
     settings = load_settings(SbcSettings, config, options | {"formulations": formulation or None})
@@ -96,17 +163,17 @@ def sbc(
 
 
 def _with_preset(name: str | None, options: dict[str, Any]) -> dict[str, Any]:
-    from tissuq.studies.coverage import preset
+    from tissuq.validation.coverage import preset
 
-    given = {key: value for key, value in options.items() if value is not None}
-    return dict(preset(name)) | given if name else given
+    stated = {key: value for key, value in options.items() if value is not None}
+    return dict(preset(name)) | stated if name else stated
 
 
 def _carry_out(
     settings: Any, folder: Path, workers: int, scheduler: str | None, total: int, run: Any
 ) -> list[dict[str, Any]]:
     """Carry out a campaign in its folder; nothing is written before its workers are there."""
-    from tissuq.studies.stream import open_pool
+    from tissuq.studies.workers import open_pool
 
     check_folder(folder, settings)
     with open_pool(workers, scheduler) as pool, campaign_progress(total) as step:

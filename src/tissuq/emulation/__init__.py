@@ -2,8 +2,7 @@
 
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator, emulate
-from tissuq.emulation.forward import FileForward, Forward
+from tissuq.emulation.forward import FileForward, Forward, UmbridgeForward
 from tissuq.emulation.runs import ForwardRuns, gathered
-from tissuq.emulation.umbridge import UmbridgeForward
 
 __all__ = ["Calibration", "Emulator", "FileForward", "Forward", "ForwardRuns", "UmbridgeForward", "emulate", "gathered"]

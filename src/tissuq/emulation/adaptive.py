@@ -1,4 +1,4 @@
-"""From runs to a posterior, with further runs where it is."""
+"""From runs to a posterior, with further runs where the posterior is."""
 
 from __future__ import annotations
 
@@ -10,44 +10,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.calibration import Calibration
-from tissuq.emulation.design import Design, space_filling
 from tissuq.emulation.emulator import Emulator, emulate, runs_needed
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
+from tissuq.emulation.run_plan import PointSet, space_filling
 from tissuq.emulation.runs import ForwardRuns
 from tissuq.errors import InputError
+from tissuq.parameters.seeds import check_seed
 
-__all__ = ["Choices", "Runner", "calibrated"]
+__all__ = ["EmulationSettings", "Runner", "calibrated"]
 
 FloatArray = NDArray[np.float64]
 
 Runner = Callable[[FloatArray], ForwardRuns]
-"""Runs a forward model at parameters (N, d)."""
+"""A function that runs a forward model at parameters (N, d)."""
 
-ENOUGH = 0.02
+MAX_ERROR_RATIO = 0.02
 """Ratio of the emulator's error to noise and discrepancy (variances) below which no further runs are made."""
-CANDIDATES = 256
-"""Draws of the posterior among which further runs are chosen."""
+CANDIDATE_DRAWS = 256
+"""Number of draws of the posterior among which further runs are chosen."""
 
 
 @dataclass(frozen=True)
-class Choices:
-    """How a model is emulated and its posterior found.
+class EmulationSettings:
+    """Settings of an emulator and of its posterior.
 
     Parameters
     ----------
     runs : int
-        Of the space-filling design.
+        Number of runs of the space-filling plan.
     refine : int
-        Further ones at most, in batches where the posterior is and the emulator is least sure, until its error hardly
-        counts beside the noise.
+        Largest number of further runs, in batches where the posterior is and the emulator is least certain, until its
+        error is negligible beside the noise.
     design, kernel, trend, method : str
     seed : int
     """
 
     runs: int = 40
     refine: int = 0
-    design: Design = "sobol"
+    design: PointSet = "sobol"
     kernel: Kernel = "squared-exponential"
     trend: Trend = "linear"
     method: Method = "auto"
@@ -56,85 +57,90 @@ class Choices:
     def __post_init__(self) -> None:
         if self.refine < 0:
             raise InputError(f"the number of further runs must be 0 or more, not {self.refine}.")
+        check_seed(self.seed)
 
 
-def calibrated(problem: Problem, run: Runner, choices: Choices, emulator: Emulator | None = None) -> Calibration:
+def calibrated(
+    problem: Problem, run: Runner, settings: EmulationSettings, emulator: Emulator | None = None
+) -> Calibration:
     """Return the posterior of a problem.
 
     Parameters
     ----------
     problem : Problem
     run : callable
-        Runs the forward model.
-    choices : Choices
+        Function that runs the forward model.
+    settings : Choices
     emulator : Emulator, optional
-        An earlier one of the same model at the same controls, instead of the design.
+        An earlier emulator of the same model at the same controls, in place of the run plan.
     """
     if emulator is None:
-        _check_enough(problem, choices)
-        runs = run(space_filling(problem.forward_priors, choices.runs, choices.seed, choices.design))
-        emulator = emulate(runs, problem.control, choices.kernel, choices.trend, problem.forward_priors)
+        _check_run_count(problem, settings)
+        runs = run(space_filling(problem.forward_priors, settings.runs, settings.seed, settings.design))
+        emulator = emulate(runs, problem.control, settings.kernel, settings.trend, problem.forward_priors)
     else:
         _check_fit(problem, emulator)
-    found = _posterior(problem, emulator, choices)
-    left, held_out = choices.refine, found.held_out
-    while left > 0 and found.error_ratio > ENOUGH:
-        more = run(_where_unsure(found, min(left, len(problem.forward_symbols) + 2)))
-        left -= len(more)
-        if not more.failed.all():
-            held_out = (*held_out, found.emulator.check(*more.good))
+    calibration = _posterior(problem, emulator, settings)
+    remaining, held_out = settings.refine, calibration.held_out
+    while remaining > 0 and calibration.error_ratio > MAX_ERROR_RATIO:
+        new_runs = run(_most_uncertain(calibration, min(remaining, len(problem.forward_symbols) + 2)))
+        remaining -= len(new_runs)
+        if not new_runs.failed.all():
+            held_out = (*held_out, calibration.emulator.check(*new_runs.good))
         emulator = emulate(
-            found.runs.joined(more), problem.control, choices.kernel, choices.trend, problem.forward_priors
+            calibration.runs.joined(new_runs), problem.control, settings.kernel, settings.trend, problem.forward_priors
         )
-        found = _posterior(problem, emulator, choices)
-    return Calibration(found.problem, found.emulator, found.posterior, held_out, choices.seed, choices.method)
+        calibration = _posterior(problem, emulator, settings)
+    return Calibration(
+        calibration.problem, calibration.emulator, calibration.posterior, held_out, settings.seed, settings.method
+    )
 
 
-def _posterior(problem: Problem, emulator: Emulator, choices: Choices) -> Calibration:
+def _posterior(problem: Problem, emulator: Emulator, settings: EmulationSettings) -> Calibration:
     from tissuq.emulation.likelihood import Likelihood
-    from tissuq.emulation.sampling import sampled
+    from tissuq.emulation.sampling import sample_posterior
 
-    found = sampled(Likelihood(problem, emulator), choices.seed, choices.method)
-    return Calibration(problem, emulator, found, (), choices.seed, choices.method)
+    posterior = sample_posterior(Likelihood(problem, emulator), settings.seed, settings.method)
+    return Calibration(problem, emulator, posterior, (), settings.seed, settings.method)
 
 
-def _where_unsure(found: Calibration, count: int) -> FloatArray:
-    """Return parameters (count, d) from the posterior at which the emulator is least sure.
+def _most_uncertain(calibration: Calibration, count: int) -> FloatArray:
+    """Return parameters (count, d) from the posterior at which the emulator is least certain.
 
-    They are apart from each other and from runs that failed, which an emulator never becomes surer of.
+    They are apart from each other and from failed runs, near which no further run reduces the uncertainty.
     """
-    draws = found.draws(CANDIDATES)[:, : len(found.problem.forward_symbols)]
-    _, covariance = found.emulator.moments(draws)
-    unsure = np.trace(covariance, axis1=1, axis2=2)
+    draws = calibration.draws(CANDIDATE_DRAWS)[:, : len(calibration.problem.forward_symbols)]
+    _, covariance = calibration.emulator.moments(draws)
+    uncertainty = np.trace(covariance, axis1=1, axis2=2)
     spread = np.maximum(draws.std(axis=0), 1e-12 * np.abs(draws).max(axis=0) + np.finfo(float).tiny)
 
     def away_from(point: FloatArray) -> FloatArray:
         return np.asarray(-np.expm1(-0.5 * (((draws - point) / spread) ** 2).sum(axis=1)))
 
-    for point in found.runs.points[found.runs.failed]:
-        unsure = unsure * away_from(point)
-    chosen: list[int] = []
+    for point in calibration.runs.points[calibration.runs.failed]:
+        uncertainty = uncertainty * away_from(point)
+    selected: list[int] = []
     for _ in range(count):
-        chosen.append(int(np.argmax(unsure)))
-        unsure = unsure * away_from(draws[chosen[-1]])
-    return np.asarray(draws[chosen])
+        selected.append(int(np.argmax(uncertainty)))
+        uncertainty = uncertainty * away_from(draws[selected[-1]])
+    return np.asarray(draws[selected])
 
 
-def _check_enough(problem: Problem, choices: Choices) -> None:
-    """Refuse too few runs before any is made: each may take hours."""
-    if choices.trend not in get_args(Trend):
-        return  # which `emulate` refuses
+def _check_run_count(problem: Problem, settings: EmulationSettings) -> None:
+    """Refuse too few runs before any is made, because one may take hours."""
+    if settings.trend not in get_args(Trend):
+        return  # `emulate` refuses it
     dimension = len(problem.forward_symbols)
-    needed = runs_needed(dimension, choices.trend)
-    if choices.runs < needed:
+    needed = runs_needed(dimension, settings.trend)
+    if settings.runs < needed:
         raise InputError(
-            f"an emulator of {dimension} parameters with a {choices.trend} mean needs {needed} runs or more, and "
-            f"{choices.runs} are asked for (--runs)."
+            f"an emulator of {dimension} parameters with a {settings.trend} mean needs {needed} runs or more, and "
+            f"{settings.runs} are requested (--runs)."
         )
 
 
 def _check_fit(problem: Problem, emulator: Emulator) -> None:
-    """Refuse an emulator of other parameters or controls; of a narrower region than the priors, a warning tells."""
+    """Refuse an emulator of other parameters or controls; one of a narrower region than the priors gives a warning."""
     if emulator.symbols != problem.forward_symbols:
         raise InputError(
             f"the emulator is one of {', '.join(emulator.symbols)}; the priors are of "

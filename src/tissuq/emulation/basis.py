@@ -1,4 +1,4 @@
-"""Few numbers that stand for the many outputs of a run: the singular value decomposition of what was computed."""
+"""A few scores in place of the many outputs of a run, by singular value decomposition of the runs."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ __all__ = ["OutputBasis", "basis_of", "has_signs"]
 
 FloatArray = NDArray[np.float64]
 
-LEFT_OUT = 1e-10
-"""Share of the outputs' variance in the directions that are left out, at most."""
-MOST_LOG = 10.0
-"""Variance of a logarithm beyond which nothing is known anyway."""
+MAX_TRUNCATED_SHARE = 1e-10
+"""Largest share of the outputs' variance in the directions that are truncated."""
+MAX_LOG_VARIANCE = 10.0
+"""Largest variance of a logarithm, beyond which its moments would overflow."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutputBasis:
-    """Outputs, or the logarithms of their sizes, = mean + directions @ scores + what is left out.
+    """Outputs, or the logarithms of their sizes, = mean + directions @ scores + truncated remainder.
 
     Parameters
     ----------
     mean : (n,) array
     directions : (n, q) array
         Scaled, so that the scores of the runs have unit variance.
-    left_out : (n, n) array
-        Covariance of what is left out, over the runs.
+    truncated : (n, n) array
+        Covariance of the truncated remainder over the runs.
     signs : (n,) array, optional
-        Of the outputs, where their logarithms are taken; zero where an output is always zero.
+        Signs of the outputs, where their logarithms are taken; zero where an output is always zero.
     """
 
     mean: FloatArray
     directions: FloatArray
-    left_out: FloatArray
+    truncated: FloatArray
     signs: FloatArray | None = None
 
     @property
@@ -46,33 +46,33 @@ class OutputBasis:
     def scores(self, outputs: FloatArray) -> FloatArray:
         """Return the scores (N, q) of outputs (N, n)."""
         size = (self.directions**2).sum(axis=0)
-        return np.asarray((self._plain(outputs) - self.mean) @ (self.directions / size))
+        return np.asarray((self._working_scale(outputs) - self.mean) @ (self.directions / size))
 
     def residuals(self, outputs: FloatArray) -> FloatArray:
-        """Return what of outputs (N, n), or of their logarithms, the directions do not reach."""
-        return np.asarray(self._plain(outputs) - self.mean - self.scores(outputs) @ self.directions.T)
+        """Return the remainder of outputs (N, n), or of their logarithms, that the directions do not reach."""
+        return np.asarray(self._working_scale(outputs) - self.mean - self.scores(outputs) @ self.directions.T)
 
-    def _plain(self, outputs: FloatArray) -> FloatArray:
+    def _working_scale(self, outputs: FloatArray) -> FloatArray:
         return outputs if self.signs is None else _logs(outputs, self.signs)
 
     @property
     def arrays(self) -> dict[str, Any]:
-        """What `output_moments` needs."""
-        own = {name: getattr(self, name) for name in ("mean", "directions", "left_out")}
-        return own if self.signs is None else own | {"signs": self.signs}
+        """The arrays of which `output_moments` is computed."""
+        arrays = {name: getattr(self, name) for name in ("mean", "directions", "truncated")}
+        return arrays if self.signs is None else arrays | {"signs": self.signs}
 
 
 def basis_of(outputs: FloatArray, *, is_log: bool = False) -> OutputBasis:
     """Return the directions in which outputs (m, n) of runs vary, up to a negligible share of their variance."""
     signs = np.sign(outputs[0]) if is_log else None
-    plain = outputs if signs is None else _logs(outputs, signs)
-    mean = plain.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(plain - mean, full_matrices=False)
-    rest = 1 - np.cumsum(sizes**2) / max((sizes**2).sum(), np.finfo(float).tiny)
-    kept = int(np.argmax(rest <= LEFT_OUT)) + 1
-    dropped = sizes[kept:, None] * directions[kept:]
+    working = outputs if signs is None else _logs(outputs, signs)
+    mean = working.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(working - mean, full_matrices=False)
+    remaining_share = 1 - np.cumsum(sizes**2) / max((sizes**2).sum(), np.finfo(float).tiny)
+    count = int(np.argmax(remaining_share <= MAX_TRUNCATED_SHARE)) + 1
+    dropped = sizes[count:, None] * directions[count:]
     scale = max(len(outputs) - 1, 1)
-    scaled = (sizes[:kept, None] * directions[:kept]).T / np.sqrt(scale)
+    scaled = (sizes[:count, None] * directions[:count]).T / np.sqrt(scale)
     return OutputBasis(mean, scaled, dropped.T @ dropped / scale, signs)
 
 
@@ -88,13 +88,13 @@ def output_moments(arrays: dict[str, Any], mean: Any, variance: Any, error: Any 
     """
     directions = arrays["directions"]
     centre = arrays["mean"] + directions @ mean + error
-    cov = (directions * variance) @ directions.T + arrays["left_out"]
+    cov = (directions * variance) @ directions.T + arrays["truncated"]
     if "signs" not in arrays:
         return centre, cov
     library = centre.__array_namespace__()
-    known = library.minimum(cov, MOST_LOG)
-    sizes = arrays["signs"] * library.exp(centre + 0.5 * library.diagonal(known))
-    return sizes, sizes[:, None] * sizes[None, :] * library.expm1(known)
+    bounded = library.minimum(cov, MAX_LOG_VARIANCE)
+    sizes = arrays["signs"] * library.exp(centre + 0.5 * library.diagonal(bounded))
+    return sizes, sizes[:, None] * sizes[None, :] * library.expm1(bounded)
 
 
 def _logs(outputs: FloatArray, signs: FloatArray) -> FloatArray:

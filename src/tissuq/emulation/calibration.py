@@ -1,4 +1,4 @@
-"""The posterior of an expensive model's parameters, as a user meets it."""
+"""The posterior of an expensive model's parameters: marginals, predictions, warnings, and labelled arrays."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.emulation.cautions import warnings_about
 from tissuq.emulation.checks import EmulatorCheck
 from tissuq.emulation.emulator import Emulator
-from tissuq.emulation.labelled import labelled_arrays
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import ForwardRuns
+from tissuq.emulation.warnings import calibration_warnings
 from tissuq.errors import InputError
 from tissuq.inference.marginal import Marginal
 from tissuq.prediction.mixture import Mixtures
@@ -27,40 +26,40 @@ if TYPE_CHECKING:
 
     from tissuq.emulation.likelihood import Likelihood
     from tissuq.emulation.problem import Method
-    from tissuq.emulation.sampling import Sampled
+    from tissuq.emulation.sampling import SampledPosterior
 
-__all__ = ["Calibration"]
+__all__ = ["Calibration", "labelled_arrays"]
 
 FloatArray = NDArray[np.float64]
 
-MANY = 1000
-"""Draws that stand for the posterior in predictions."""
-SOME = 128
-"""Draws over which the emulator's error is averaged."""
+PREDICTION_DRAWS = 1000
+"""Number of draws of the posterior in predictions."""
+ERROR_DRAWS = 128
+"""Number of draws over which the emulator's error is averaged."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What `tissuq.calibrate` returns.
+    """The posterior of an expensive model's parameters, as `tissuq.calibrate` returns it.
 
     Attributes
     ----------
     problem : Problem
         Measurements, priors, discrepancy and noise.
     emulator : Emulator
-        That stands for the model; ``emulator.check()`` says how well.
-    posterior : Sampled
-        Weighted points and equally weighted draws of all parameters, and whether they can be used.
+        Emulator in place of the model; ``emulator.check()`` gives its errors.
+    posterior : SampledPosterior
+        Weighted points and equally weighted draws of all parameters, and whether they have converged.
     held_out : tuple of EmulatorCheck
-        Runs at which the emulator was tried before it learnt them, batch by batch.
+        Further runs, predicted before the emulator was made from them, batch by batch.
     seed : int
     method : str
-        By which the posterior was asked for.
+        Requested method that finds the posterior.
     """
 
     problem: Problem
     emulator: Emulator
-    posterior: Sampled
+    posterior: SampledPosterior
     held_out: tuple[EmulatorCheck, ...] = ()
     seed: int = 0
     method: Method = "auto"
@@ -82,7 +81,7 @@ class Calibration:
 
     @property
     def converged(self) -> bool:
-        """Whether the sampler's result can be used."""
+        """Whether the sampler has converged."""
         return self.posterior.converged
 
     @cached_property
@@ -92,49 +91,52 @@ class Calibration:
 
     @cached_property
     def likelihood(self) -> Likelihood:
-        """Of the measurements."""
+        """The likelihood of the measurements."""
         from tissuq.emulation.likelihood import Likelihood
 
         return Likelihood(self.problem, self.emulator)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader must know, in sentences."""
-        return tuple(warnings_about(self))
+        """Warnings that the user must read, in sentences."""
+        exact = self.without_emulator_error.posterior
+        sentences = calibration_warnings(
+            self.problem, self.emulator, self.check, self.posterior, exact, self.emulator_share
+        )
+        return tuple(sentences)
 
     @cached_property
     def without_emulator_error(self) -> Calibration:
         """The same as if the emulator were exact: for comparison, not for use."""
         from tissuq.emulation.likelihood import Likelihood
-        from tissuq.emulation.sampling import sampled
+        from tissuq.emulation.sampling import sample_posterior
 
         exact = Likelihood(self.problem, self.emulator, has_error=False)
-        found = replace(self, posterior=sampled(exact, self.seed, self.method))
-        found.__dict__["likelihood"] = exact
-        return found
+        calibration = replace(self, posterior=sample_posterior(exact, self.seed, self.method))
+        calibration.__dict__["likelihood"] = exact
+        return calibration
 
     @cached_property
     def emulator_share(self) -> dict[str, float]:
-        """The share of every parameter's posterior variance that is owed to the emulator's error.
+        """The share of every parameter's posterior variance that is due to the emulator's error.
 
-        One minus the variance without that error over the variance with it, zero at least: where the emulator is far
-        off, the posterior without its error also lies elsewhere, and the share says little.
+        One minus the variance without that error over the variance with it, but not below zero. Where the emulator's
+        error is large, it also shifts the posterior, and the share is of little meaning.
         """
         pairs = zip(self.marginals.items(), self.without_emulator_error.marginals.values(), strict=True)
-        return {symbol: max(0.0, 1 - (exact.sd / own.sd) ** 2) for (symbol, own), exact in pairs}
+        return {symbol: max(0.0, 1 - (exact.sd / marginal.sd) ** 2) for (symbol, marginal), exact in pairs}
 
     @cached_property
     def error_ratio(self) -> float:
         """The largest variance of the emulator's error over that of noise and discrepancy, in any direction.
 
-        The mean over the posterior. It bounds what the error can do, and is often far above it.
+        The mean over the posterior: an upper bound of the error's effect, often far above it.
         """
-        return self.likelihood.error_ratio(self.draws(SOME))
+        return self.likelihood.error_ratio(self.draws(ERROR_DRAWS))
 
     def draws(self, count: int) -> FloatArray:
         """Return equally probable draws (count, D) of all parameters."""
-        every = self.posterior.draws.reshape(-1, len(self.problem.symbols))
-        return np.asarray(every[np.linspace(0, len(every) - 1, count).round().astype(int)])
+        return self.posterior.thinned(count)
 
     def summary(self, prob: float = 0.95) -> pd.DataFrame:
         """Return mean, sd, median and highest-density interval of every parameter, in the forward model's units.
@@ -143,15 +145,15 @@ class Calibration:
         -------
         pandas.DataFrame
             Indexed by parameter: mean, sd, median, hdi_low, hdi_high, ess, rhat (nan where no chains were run) and
-            emulator_share, the share of the variance that is owed to the emulator's error.
+            emulator_share, the share of the variance that is due to the emulator's error.
         """
         import pandas as pd
 
         _check_probability(prob)
         rows = [
-            (own.mean, own.sd, float(own.quantile(0.5)), *own.hdi(prob), self.posterior.ess[symbol],
+            (marginal.mean, marginal.sd, float(marginal.quantile(0.5)), *marginal.hdi(prob), self.posterior.ess[symbol],
              self.posterior.rhat.get(symbol, np.nan), self.emulator_share[symbol])
-            for symbol, own in self.marginals.items()
+            for symbol, marginal in self.marginals.items()
         ]  # fmt: skip
         names = ["mean", "sd", "median", "hdi_low", "hdi_high", "ess", "rhat", "emulator_share"]
         return pd.DataFrame(rows, pd.Index(self.problem.symbols, name="parameter"), names)
@@ -162,9 +164,9 @@ class Calibration:
         Parameters
         ----------
         discrepancy : bool
-            With the discrepancy's share, or the forward model alone.
+            Add the discrepancy to the forward model.
         noise : bool
-            For a new measurement, or for the quantity itself.
+            Predict a new measurement, with its noise, in place of the quantity itself.
         prob : float
             Probability between low and high, equal tails.
 
@@ -176,10 +178,10 @@ class Calibration:
         import pandas as pd
 
         _check_probability(prob)
-        mean, variance = self.likelihood.predictions(self.draws(MANY), discrepancy=discrepancy, noise=noise)
-        found = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
-        low, high = (found.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
-        return pd.DataFrame({"control": self.problem.control, "mean": found.mean, "low": low, "high": high})
+        mean, variance = self.likelihood.predictions(self.draws(PREDICTION_DRAWS), discrepancy=discrepancy, noise=noise)
+        mixture = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
+        low, high = (mixture.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
+        return pd.DataFrame({"control": self.problem.control, "mean": mixture.mean, "low": low, "high": high})
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of parameters)."""
@@ -191,8 +193,8 @@ class Calibration:
     def data(self) -> xr.DataTree:
         """Everything as labelled arrays that ArviZ reads.
 
-        Groups posterior and posterior_predictive (chain, draw), observed_data, constant_data, and forward_runs: the
-        design, its outputs and what failed.
+        Groups posterior and posterior_predictive (chain, draw), observed_data, constant_data, and forward_runs
+        (parameters, outputs, errors).
         """
         return labelled_arrays(self)
 
@@ -212,3 +214,60 @@ class Calibration:
 def _check_probability(prob: float) -> None:
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
+
+
+PREDICTIVE_STRIDE = 4
+"""Stride of the draws for which measurements are simulated."""
+
+
+def labelled_arrays(calibration: Calibration) -> xr.DataTree:
+    """Return draws, measurements as simulated and as made, and forward runs: the groups of `Calibration.data`."""
+    import xarray as xr
+
+    problem, runs, drawn = calibration.problem, calibration.runs, calibration.posterior.draws
+    chains, draws = np.arange(drawn.shape[0]), np.arange(drawn.shape[1])
+    sample, thinned_sample = {"chain": chains, "draw": draws}, {"chain": chains, "draw": draws[::PREDICTIVE_STRIDE]}
+    thinned = drawn[:, ::PREDICTIVE_STRIDE]
+    flat = thinned.reshape(-1, drawn.shape[2])
+    scores = np.random.default_rng([calibration.seed, 59]).standard_normal((len(flat), len(problem.measured)))
+    simulated = calibration.likelihood.replicates(flat, scores).reshape(*thinned.shape[:2], -1)
+    point, run = {"measurement": np.arange(len(problem.measured))}, {"run": np.arange(len(runs))}
+    columns = enumerate(problem.symbols)
+    groups = {
+        "posterior": xr.Dataset(
+            {symbol: (("chain", "draw"), drawn[:, :, column]) for column, symbol in columns}, sample
+        ),
+        "posterior_predictive": xr.Dataset(
+            {"measured": (("chain", "draw", "measurement"), simulated)}, thinned_sample | point
+        ),
+        "observed_data": xr.Dataset({"measured": ("measurement", problem.measured)}, point),
+        "constant_data": xr.Dataset({"control": ("measurement", problem.control)}, point),
+        "forward_runs": xr.Dataset(
+            {
+                "parameters": (("run", "parameter"), runs.points),
+                "outputs": (("run", "measurement"), runs.outputs),
+                "error": ("run", np.array(runs.errors, dtype=str)),
+                "seconds": ("run", runs.seconds),
+            },
+            point | run | {"parameter": list(runs.symbols)},
+        ),
+    }
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs.update(_labels(calibration))
+    return tree
+
+
+def _labels(calibration: Calibration) -> dict[str, str | float]:
+    problem, posterior = calibration.problem, calibration.posterior
+    labels: dict[str, str | float] = {
+        "inference_library": "tissuq",
+        "discrepancy": problem.discrepancy.name,
+        "noise_sd": "unknown" if problem.noise_sd is None else problem.noise_sd,
+        "method": posterior.method,
+        "converged": str(posterior.converged),
+        "verdict": posterior.verdict,
+        "seed": calibration.seed,
+        "emulator_check": str(calibration.check),
+    }
+    labels |= {f"prior_{symbol}": str(prior) for symbol, prior in problem.priors.items()}
+    return labels if posterior.log_evidence is None else labels | {"log_evidence": posterior.log_evidence}

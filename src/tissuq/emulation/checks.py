@@ -1,4 +1,4 @@
-"""How far an emulator is off, where the model itself is known."""
+"""Errors of an emulator at runs of the model itself."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ __all__ = ["EmulatorCheck"]
 
 FloatArray = NDArray[np.float64]
 
-INSIDE = 1.959963984540054
+NORMAL_QUANTILE_975 = 1.959963984540054
 """Standard deviations within which 95 % of normal errors lie."""
-ROUNDING = 1e-9
-"""Of the largest output: below it an error is rounding."""
+ROUNDING_SHARE = 1e-9
+"""Share of the largest output below which an error is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class EmulatorCheck:
-    """Runs of a model beside what the emulator says of them.
+    """Runs of a model beside the emulator's predictions of them.
 
     Parameters
     ----------
     kind : str
-        How the runs were kept from the emulator.
+        How the runs were withheld from the emulator.
     points : (N, d) array
     computed, predicted : (N, n) array
-        By the model, and by the emulator.
+        Outputs of the model, and of the emulator.
     covariance : (N, n, n) array
-        Of the emulator's error.
+        Covariance of the emulator's error.
     """
 
     kind: str
@@ -42,7 +42,7 @@ class EmulatorCheck:
     @cached_property
     def sd(self) -> FloatArray:
         """Standard deviations (N, n) of the emulator's error."""
-        rounding = ROUNDING * np.abs(self.computed).max()
+        rounding = ROUNDING_SHARE * np.abs(self.computed).max()
         return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2) + rounding**2))
 
     @property
@@ -53,16 +53,16 @@ class EmulatorCheck:
     @property
     def share_inside(self) -> float:
         """Share of the outputs within 1.96 standard deviations: about 0.95."""
-        return float((np.abs(self.standardised) < INSIDE).mean())
+        return float((np.abs(self.standardised) < NORMAL_QUANTILE_975).mean())
 
     @property
     def rms_standardised(self) -> float:
-        """Root mean square of the standardised errors: about one; more where the emulator is too sure."""
+        """Root mean square of the standardised errors: about one; more where the emulator is over-confident."""
         return float(np.sqrt((self.standardised**2).mean()))
 
     @property
     def log_density(self) -> float:
-        """Mean over the outputs of the log of their density, each by itself."""
+        """Mean over the outputs of the log of their marginal densities."""
         return float((-0.5 * self.standardised**2 - np.log(self.sd)).mean() - 0.5 * np.log(2 * np.pi))
 
     @property

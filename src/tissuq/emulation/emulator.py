@@ -1,4 +1,4 @@
-"""The emulator: what an expensive model would give at any parameters, and how far that may be off."""
+"""The emulator: outputs of an expensive model at any parameters, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.emulation.basis import OutputBasis, basis_of, has_signs, output_moments
 from tissuq.emulation.checks import EmulatorCheck
-from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, left_out, moments, trend_basis
+from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, leave_one_out, moments, trend_basis
 from tissuq.emulation.runs import ForwardRuns
 from tissuq.errors import InputError, ModelError
-from tissuq.priors import Prior
+from tissuq.parameters.priors import Prior
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,18 +25,18 @@ __all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
 
 FloatArray = NDArray[np.float64]
 
-MOST_CHOICES = 3
-"""Parameters of which each may be taken by its logarithm or not; with more, all or none are."""
-RARE, BEYOND = 1e-4, 0.25
-"""Probability below a value of a parameter that is still looked at, and how far it may lie beyond the runs, in their
-range."""
-MARGIN = 4
-"""Runs by which a design must exceed the coefficients of the mean."""
+MAX_PARAMETERS_COMBINED = 3
+"""Largest number of positive parameters for which all combinations of logarithms are tried; with more, all or none."""
+LOW_PROBABILITY, MAX_DISTANCE_BELOW = 1e-4, 0.25
+"""Prior probability below the smallest value that matters, and the largest distance of this value from the runs, as a
+share of their range of logarithms."""
+EXTRA_RUNS = 4
+"""Smallest number of runs in excess of the coefficients of the mean."""
 
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """The unit box of the design: parameters, or the logarithms of some, from the least to the largest."""
+    """The unit box of the runs: parameters, or the logarithms of some, from the smallest to the largest."""
 
     low: FloatArray
     high: FloatArray
@@ -57,9 +57,9 @@ class Emulator:
     Parameters
     ----------
     runs : ForwardRuns
-        From which it was made.
+        Runs from which it was made.
     control : (n,) array
-        Where the outputs are.
+        Controls of the outputs.
     coordinates : Coordinates
     basis : OutputBasis
     kriging : Kriging
@@ -78,12 +78,12 @@ class Emulator:
 
     @property
     def logarithms(self) -> tuple[str, ...]:
-        """The parameters that are taken by their logarithms."""
+        """The parameters whose logarithms are used."""
         return tuple(np.array(self.symbols)[self.coordinates.is_log].tolist())
 
     @cached_property
     def arrays(self) -> dict[str, Any]:
-        """What `emulated` needs."""
+        """The arrays of which `emulated` is computed."""
         return {
             "low": self.coordinates.low,
             "span": self.coordinates.high - self.coordinates.low,
@@ -94,7 +94,7 @@ class Emulator:
 
     @property
     def form(self) -> tuple[Kernel, Trend]:
-        """What compiled functions depend on."""
+        """The static arguments of compiled functions."""
         return self.kriging.kernel, self.kriging.trend
 
     def moments(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -103,7 +103,7 @@ class Emulator:
         return np.asarray(mean), np.asarray(cov)
 
     def predict(self, parameters: Mapping[str, float]) -> pd.DataFrame:
-        """Return what the model would give at parameters, and the standard deviation of the emulator's error.
+        """Return the predicted outputs at parameters, and the standard deviation of the emulator's error.
 
         Returns
         -------
@@ -115,21 +115,21 @@ class Emulator:
         unknown = set(self.symbols) ^ set(parameters)
         if unknown:
             raise InputError(
-                f"the emulator needs {', '.join(self.symbols)}; '{sorted(unknown)[0]}' is too much or lacks."
+                f"the emulator needs {', '.join(self.symbols)}; '{sorted(unknown)[0]}' is missing or unknown."
             )
         mean, cov = self.moments(np.array([[parameters[symbol] for symbol in self.symbols]], dtype=np.float64))
         sd = np.sqrt(np.diagonal(cov[0]))
         return pd.DataFrame({"control": self.control, "mean": mean[0], "sd": sd})
 
     def check(self, points: ArrayLike | None = None, outputs: ArrayLike | None = None) -> EmulatorCheck:
-        """Return how far the emulator is off: every run predicted from the others, or runs that it has not seen.
+        """Return the errors of the emulator: every run predicted from the others, or held-out runs.
 
         Parameters
         ----------
         points : (N, d) array, optional
-            Parameters of runs that were held out; without them, each run of its own is left out in turn.
+            Parameters of held-out runs; without them, each run of the emulator is left out in turn.
         outputs : (N, n) array, optional
-            What the model gave there.
+            Outputs of the model there.
 
         Examples
         --------
@@ -142,20 +142,23 @@ class Emulator:
         True
         """
         if points is None or outputs is None:
-            own, computed = self.runs.good
-            error, sd = left_out(self.kriging)
-            scores, beyond = self.basis.scores(computed) - error, self.basis.residuals(computed)
-            found = [output_moments(self.basis.arrays, *each) for each in zip(scores, sd**2, beyond, strict=True)]
-            mean, cov = (np.array(each) for each in zip(*found, strict=True))
-            return EmulatorCheck("each left out", own, computed, mean, cov)
-        own, computed = np.atleast_2d(np.asarray(points, float)), np.atleast_2d(np.asarray(outputs, float))
-        return EmulatorCheck("held out", own, computed, *self.moments(own))
+            points, computed = self.runs.good
+            error, sd = leave_one_out(self.kriging)
+            scores, residuals = self.basis.scores(computed) - error, self.basis.residuals(computed)
+            output_moments_of_runs = [
+                output_moments(self.basis.arrays, *arguments)
+                for arguments in zip(scores, sd**2, residuals, strict=True)
+            ]
+            mean, cov = (np.array(arguments) for arguments in zip(*output_moments_of_runs, strict=True))
+            return EmulatorCheck("each left out", points, computed, mean, cov)
+        points, computed = np.atleast_2d(np.asarray(points, float)), np.atleast_2d(np.asarray(outputs, float))
+        return EmulatorCheck("held out", points, computed, *self.moments(points))
 
 
 def emulated(form: tuple[Kernel, Trend], values: Any, arrays: Mapping[str, Any]) -> tuple[Any, Any]:
     """Return mean (n,) and covariance (n, n) of the outputs at parameters (d,); JAX traces it."""
-    place = Coordinates(arrays["low"], arrays["low"] + arrays["span"], arrays["is_log"]).of(values)
-    return output_moments(arrays["outputs"], *moments(*form, arrays["processes"], place))
+    point = Coordinates(arrays["low"], arrays["low"] + arrays["span"], arrays["is_log"]).of(values)
+    return output_moments(arrays["outputs"], *moments(*form, arrays["processes"], point))
 
 
 @lru_cache
@@ -175,20 +178,20 @@ def emulate(
 ) -> Emulator:
     """Return the emulator of a model from its runs.
 
-    Positive parameters are taken by their logarithms where that makes the runs more probable; outputs whose signs never
-    change, where every run is then better predicted from the others.
+    Logarithms of positive parameters are used where that makes the runs more probable; those of outputs whose signs
+    never change, where every run is then better predicted from the others.
 
     Parameters
     ----------
     runs : ForwardRuns
     control : (n,) array
-        Where the outputs are.
+        Controls of the outputs.
     kernel : str
         ``"squared-exponential"``, for models that are smooth in their parameters, or ``"matern-5/2"``.
     trend : str
         Polynomial mean of the processes: ``"constant"``, ``"linear"`` or ``"quadratic"``.
     priors : mapping of str to Prior, optional
-        Of the parameters. One that may come far nearer to zero than the runs is not taken by its logarithm.
+        Priors of the parameters. The logarithm is not used where a parameter may come far nearer to zero than the runs.
 
     Raises
     ------
@@ -200,62 +203,66 @@ def emulate(
             raise InputError(f"the {name} must be one of {', '.join(get_args(kind))}, not '{value}'.")
     points, outputs = runs.good
     form: tuple[Kernel, Trend] = (kernel, trend)
-    known = [None if priors is None else priors[symbol] for symbol in runs.symbols]
+    prior_of_column = [None if priors is None else priors[symbol] for symbol in runs.symbols]
     needed = runs_needed(points.shape[1], trend)
     if len(points) < needed:
-        failed = f" {runs.told_failures}" if runs.failed.any() else ""
+        failed = f" {runs.failure_summary}" if runs.failed.any() else ""
         raise ModelError(
             f"an emulator of {points.shape[1]} parameters with a {trend} mean needs {needed} runs that succeed, and "
             f"there are {len(points)}.{failed}"
         )
     if np.ptp(outputs, axis=0).max() == 0:
         raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")
-    choices = _choices(points, [_may_be_log(column, prior) for column, prior in zip(points.T, known, strict=True)])
-    every = [
-        _best_coordinates(runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), choices, form)
+    candidates = _coordinate_candidates(
+        points, [_may_be_log(column, prior) for column, prior in zip(points.T, prior_of_column, strict=True)]
+    )
+    emulators = [
+        _best_coordinates(
+            runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), candidates, form
+        )
         for is_log in (False, True)[: 1 + has_signs(outputs)]
     ]
-    return max(every, key=lambda each: each.check().log_density)
+    return max(emulators, key=lambda emulator: emulator.check().log_density)
 
 
 def runs_needed(dimension: int, trend: Trend) -> int:
     """Return how many runs an emulator of so many parameters needs."""
-    return MARGIN + int(trend_basis(np.zeros((1, dimension)), trend).shape[1])
+    return EXTRA_RUNS + int(trend_basis(np.zeros((1, dimension)), trend).shape[1])
 
 
 def _best_coordinates(
     runs: ForwardRuns,
     control: FloatArray,
     basis: OutputBasis,
-    choices: Sequence[Coordinates],
+    candidates: Sequence[Coordinates],
     form: tuple[Kernel, Trend],
 ) -> Emulator:
     """Return the emulator with the coordinates that make the scores of the runs most probable."""
     points, outputs = runs.good
     scores = basis.scores(outputs)
-    found = ((where, fitted(where.of(points), scores, *form)) for where in choices)
-    where, kriging = max(found, key=lambda pair: pair[1].log_evidence)
-    return Emulator(runs, control, where, basis, kriging)
+    fits = ((coordinates, fitted(coordinates.of(points), scores, *form)) for coordinates in candidates)
+    coordinates, kriging = max(fits, key=lambda pair: pair[1].log_evidence)
+    return Emulator(runs, control, coordinates, basis, kriging)
 
 
 def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
-    """Return whether all of a prior that matters is near the runs (m,) on the line of logarithms."""
+    """Return whether the logarithms of a prior's probable values are near those of the runs (m,)."""
     if column.min() <= 0:
         return False
     low, high = np.log([column.min(), column.max()])
-    least = column.min() if prior is None else float(prior.quantile(RARE))
-    return least > 0 and low - np.log(least) <= BEYOND * (high - low)
+    smallest = column.min() if prior is None else float(prior.quantile(LOW_PROBABILITY))
+    return smallest > 0 and low - np.log(smallest) <= MAX_DISTANCE_BELOW * (high - low)
 
 
-def _choices(points: FloatArray, positive: Sequence[bool]) -> list[Coordinates]:
-    """Return the coordinates that there are: every parameter by itself or, where it may be, by its logarithm."""
+def _coordinate_candidates(points: FloatArray, positive: Sequence[bool]) -> list[Coordinates]:
+    """Return the coordinates to try: every parameter by itself or, where it is positive, by its logarithm."""
     choices: list[tuple[bool, ...]] = [(False,) * len(positive), tuple(positive)]
-    if sum(positive) <= MOST_CHOICES:
-        choices = list(product(*((False, True) if each else (False,) for each in positive)))
-    found = []
+    if sum(positive) <= MAX_PARAMETERS_COMBINED:
+        choices = list(product(*((False, True) if is_positive else (False,) for is_positive in positive)))
+    candidates = []
     for choice in choices:
         is_log = np.array(choice)
-        places = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
-        low, high = places.min(axis=0), places.max(axis=0)
-        found.append(Coordinates(low, np.where(high > low, high, low + 1), is_log))
-    return found
+        values = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
+        low, high = values.min(axis=0), values.max(axis=0)
+        candidates.append(Coordinates(low, np.where(high > low, high, low + 1), is_log))
+    return candidates

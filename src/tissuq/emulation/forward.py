@@ -1,4 +1,4 @@
-"""A forward model: what computes the measured quantity from parameters, at the price of minutes or hours a run."""
+"""Forward models, which compute the measured quantity from parameters in minutes or hours a run."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,11 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import LAW, failures_of, run_file
 
-__all__ = ["CallableForward", "FileForward", "Forward", "as_forward"]
+__all__ = ["DEFAULT_URL", "CallableForward", "FileForward", "Forward", "UmbridgeForward", "as_forward"]
 
 FloatArray = NDArray[np.float64]
 
-WRITE = (
+ADVICE = (
     "Write a function forward(parameters) of a dictionary of parameters by name, or forward(parameters, control), that "
     "returns an output for every measurement"
 )
@@ -31,7 +32,7 @@ WRITE = (
 class Forward(ABC):
     """An expensive model.
 
-    A new kind is one subclass: how it is run, and what tells it from others. It travels to other processes.
+    A new kind is one subclass: how it is run, and its identity. It is sent to other processes.
     """
 
     @abstractmethod
@@ -41,15 +42,15 @@ class Forward(ABC):
     @property
     @abstractmethod
     def identity(self) -> str:
-        """What tells this model from others, so that runs of another one are not taken for its own."""
+        """A text that identifies the model, so that runs of another one are not taken for its own."""
 
     @property
     def name(self) -> str:
-        """What it is called in reports."""
+        """The name in reports."""
         return self.identity.partition(" ")[0]
 
     def check(self, symbols: Sequence[str]) -> None:  # noqa: B027  (most kinds have nothing to check)
-        """Raise an InputError where it can be seen that no run with these parameters is possible."""
+        """Raise an InputError where no run with these parameters is possible."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,12 @@ class CallableForward(Forward):
 
     @property
     def identity(self) -> str:
-        own = getattr(self.function, "__qualname__", type(self.function).__qualname__)
+        name = getattr(self.function, "__qualname__", type(self.function).__qualname__)
         try:
             text = inspect.getsource(self.function)
         except (OSError, TypeError):
             text = ""
-        return f"{getattr(self.function, '__module__', '')}.{own} {_digest(text.encode())}"
+        return f"{getattr(self.function, '__module__', '')}.{name} {_digest(text.encode())}"
 
 
 @dataclass(frozen=True)
@@ -78,27 +79,27 @@ class FileForward(Forward):
     The file is run where the model is, in every process anew.
     """
 
-    place: str
+    location: str
 
     def run(self, parameters: Mapping[str, float], control: FloatArray) -> Any:
-        return _called(_function_at(self.place), parameters, control)
+        return _called(_function_at(self.location), parameters, control)
 
     @property
     def identity(self) -> str:
-        match = LAW.fullmatch(self.place)
+        match = LAW.fullmatch(self.location)
         if match is None:
-            return self.place
+            return self.location
         path = Path(match["path"])
         return f"{path.name}:{match['name']} {_digest(path.read_bytes())}"
 
     @property
     def file(self) -> Path | None:
         """The user's file, where it is one."""
-        match = LAW.fullmatch(self.place)
+        match = LAW.fullmatch(self.location)
         return Path(match["path"]) if match else None
 
     def check(self, symbols: Sequence[str]) -> None:
-        _function_at(self.place)
+        _function_at(self.location)
 
 
 def as_forward(forward: Forward | Callable[..., Any]) -> Forward:
@@ -112,7 +113,7 @@ def as_forward(forward: Forward | Callable[..., Any]) -> Forward:
     if isinstance(forward, Forward):
         return forward
     if not callable(forward):
-        raise InputError(f"the forward model must be a function, not {forward!r}. {WRITE}.")
+        raise InputError(f"the forward model must be a function, not {forward!r}. {ADVICE}.")
     return CallableForward(forward)
 
 
@@ -127,38 +128,104 @@ def _takes_control(function: Callable[..., Any]) -> bool:
     except (TypeError, ValueError):
         return False
     plain = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    second = [each for each in arguments if each.kind in plain][1:2]
-    return any(each.default is each.empty or each.name == "control" for each in second)
+    second_argument = [argument for argument in arguments if argument.kind in plain][1:2]
+    return any(argument.default is argument.empty or argument.name == "control" for argument in second_argument)
 
 
 @lru_cache
-def _function_at(place: str) -> Callable[..., Any]:
+def _function_at(location: str) -> Callable[..., Any]:
     """Return the function that the user named; runs its file."""
-    match = LAW.fullmatch(place)
+    match = LAW.fullmatch(location)
     if match is None:
-        return _function_of_module(place)
+        return _function_of_module(location)
     path, name = Path(match["path"]), match["name"]
     if not path.is_file():
-        raise InputError(f"there is no file '{path}' for the forward model '{place}'.")
+        raise InputError(f"there is no file '{path}' for the forward model '{location}'.")
     with failures_of(path):
-        found = getattr(run_file(path), name, None)
-    if not callable(found):
-        raise InputError(f"'{path}' has no function named '{name}'. {WRITE}.")
-    return found  # type: ignore[no-any-return]
+        function = getattr(run_file(path), name, None)
+    if not callable(function):
+        raise InputError(f"'{path}' has no function named '{name}'. {ADVICE}.")
+    return function  # type: ignore[no-any-return]
 
 
-def _function_of_module(place: str) -> Callable[..., Any]:
-    module, _, name = place.partition(":")
+def _function_of_module(location: str) -> Callable[..., Any]:
+    module, _, name = location.partition(":")
     if not name or not module.replace(".", "_").isidentifier():
-        raise InputError(f"'{place}' does not name a function: write path.py:function or package.module:function.")
+        raise InputError(f"'{location}' does not name a function: write path.py:function or package.module:function.")
     try:
-        found = getattr(import_module(module), name, None)
+        function = getattr(import_module(module), name, None)
     except ImportError as error:
-        raise InputError(f"the forward model '{place}' cannot be imported: {error}.") from error
-    if not callable(found):
-        raise InputError(f"module '{module}' has no function named '{name}'. {WRITE}.")
-    return found  # type: ignore[no-any-return]
+        raise InputError(f"the forward model '{location}' cannot be imported: {error}.") from error
+    if not callable(function):
+        raise InputError(f"module '{module}' has no function named '{name}'. {ADVICE}.")
+    return function  # type: ignore[no-any-return]
 
 
 def _digest(content: bytes) -> str:
     return sha256(content).hexdigest()[:16]
+
+
+DEFAULT_URL = "http://localhost:4242"
+
+
+@dataclass(frozen=True)
+class UmbridgeForward(Forward):
+    """A model that an UM-Bridge server offers.
+
+    The parameters are sent in the order of their priors, as one input vector or as several that together are as long;
+    all output vectors together are the outputs at the measured controls. The controls are sent, too, as the entry
+    ``control`` of the configuration: a server may compute there, and ignores it otherwise.
+
+    Parameters
+    ----------
+    url : str
+        Address of the server.
+    model : str
+        Name of the model on the server.
+
+    References
+    ----------
+    Seelinger et al. (2023), Journal of Open Source Software 8(83), 4748.
+    """
+
+    url: str = DEFAULT_URL
+    model: str = "forward"
+
+    def run(self, parameters: Mapping[str, float], control: FloatArray) -> Any:
+        settings, values = {"control": control.tolist()}, iter(parameters.values())
+        client, sizes = _client(self.url, self.model)
+        inputs = [list(islice(values, size)) for size in sizes]
+        return np.concatenate([np.asarray(vector, dtype=np.float64) for vector in client(inputs, settings)])
+
+    @property
+    def identity(self) -> str:
+        return f"{self.model} at {self.url}"
+
+    @property
+    def name(self) -> str:
+        return f"{self.model} at {self.url}"
+
+    def check(self, symbols: Sequence[str]) -> None:
+        _, sizes = _client(self.url, self.model)
+        if sum(sizes) != len(symbols):
+            raise InputError(
+                f"the model '{self.model}' at {self.url} takes {sum(sizes)} parameters; {len(symbols)} have priors "
+                f"({', '.join(symbols)})."
+            )
+
+
+@lru_cache
+def _client(url: str, model: str) -> tuple[Any, tuple[int, ...]]:
+    """Return the client of a model, and the lengths of its input vectors."""
+    try:
+        import umbridge
+    except ImportError as error:
+        raise InputError("an UM-Bridge model needs its client: install tissuq with its extra 'umbridge'.") from error
+    try:
+        models = umbridge.supported_models(url)
+    except Exception as error:  # whatever the network, the server and its answer do
+        raise InputError(f"no UM-Bridge server answers at {url} ({type(error).__name__}). Start it first.") from error
+    if model not in models:
+        raise InputError(f"the server at {url} has no model '{model}'; it has {', '.join(models)}.")
+    client = umbridge.HTTPModel(url, model)
+    return client, tuple(client.get_input_sizes())

@@ -1,4 +1,4 @@
-"""A Gaussian process through few runs of a smooth function, with what is not known of its own parameters.
+"""A Gaussian process through few runs of a smooth function, with the uncertainty of its own parameters.
 
 Given length scales and nugget, the coefficients of the polynomial mean and the variance are integrated in closed form
 (flat and 1 / variance), which leaves a Student t distribution; length scales are at their most probable values, or
@@ -23,22 +23,22 @@ FloatArray = NDArray[np.float64]
 Kernel = Literal["squared-exponential", "matern-5/2"]
 Trend = Literal["constant", "linear", "quadratic"]
 
-NUGGET = (1e-12, 1e-2)
+NUGGET_BOUNDS = (1e-12, 1e-2)
 """Bounds of the nugget over the variance: rounding, and the noise of a solver."""
-TYPICAL, SPREAD = 0.7, 1.0
-"""Median of the length scales over the width of the design, and the sd of their logarithm, a priori."""
-STARTS = 5
-SETTINGS = 12
-"""Settings of the length scales that are averaged, at most."""
-FEW_RUNS = 60
-"""Up to which the length scales are averaged: beyond, the data tell them."""
-STEP = 1e-3
-"""Of the logarithms, for the curvature at the mode."""
-WIDER, STEEPNESS = 1.2, (0.1, 400.0)
-"""How much wider than the mode's Gaussian the settings spread, and the curvatures that are believed."""
-HUGE = 1e10
-FLOOR = 1e-20
-"""Of the residual sum of squares over that of the function: functions that the mean reproduces to rounding."""
+MEDIAN_LENGTH, LOG_LENGTH_SD = 0.7, 1.0
+"""Prior of the length scales: median over the width of the run plan, and sd of the logarithm."""
+OPTIMISER_STARTS = 5
+MAX_SETTINGS = 12
+"""Largest number of settings of the length scales that are averaged."""
+MAX_RUNS_AVERAGED = 60
+"""Largest number of runs for which length scales are averaged; with more, the runs determine them."""
+LOG_STEP = 1e-3
+"""Step of the logarithms of the length scales for the curvature at the mode."""
+PROPOSAL_WIDENING, CURVATURE_BOUNDS = 1.2, (0.1, 400.0)
+"""Width of the settings over that of the mode's Gaussian, and the bounds of the curvature."""
+IMPROBABLE = 1e10
+MIN_RELATIVE_RESIDUAL = 1e-20
+"""Smallest residual sum of squares over that of the function, for functions that the mean reproduces to rounding."""
 
 
 def trend_basis(points: Any, trend: Trend) -> Any:
@@ -53,9 +53,9 @@ def trend_basis(points: Any, trend: Trend) -> Any:
     return arrays.stack(columns, axis=-1)
 
 
-def squared_differences(one: Any, other: Any) -> Any:
+def squared_differences(first_points: Any, second_points: Any) -> Any:
     """Return the squared differences (n, m, d) of points (n, d) and (m, d)."""
-    return (one[:, None, :] - other[None, :, :]) ** 2
+    return (first_points[:, None, :] - second_points[None, :, :]) ** 2
 
 
 def correlation(kernel: Kernel, squared: Any) -> tuple[Any, Any]:
@@ -76,11 +76,11 @@ class Kriging:
     Attributes
     ----------
     weights : (q, S) array
-        Of the settings of the length scales; their sum is one.
+        Weights of the settings of the length scales; their sum is one.
     lengths : (q, S, d) array
     nugget : (q,) array
     log_evidence : float
-        Of all functions at their most probable length scales, up to a constant that the points alone set.
+        Log evidence of all functions at their most probable length scales, up to a constant that the points alone set.
     """
 
     points: FloatArray
@@ -93,24 +93,27 @@ class Kriging:
     trend: Trend
 
     @cached_property
-    def parts(self) -> list[list[Parts]]:
-        """What every setting of every function gives."""
+    def terms(self) -> list[list[SettingTerms]]:
+        """The terms of every setting of every function."""
         return [
-            [_parts(self.kernel, self.trend, self.points, values, lengths, nugget) for lengths in own]
-            for values, own, nugget in zip(self.values.T, self.lengths, self.nugget, strict=True)
+            [
+                _setting_terms(self.kernel, self.trend, self.points, values, lengths, nugget)
+                for lengths in lengths_of_function
+            ]
+            for values, lengths_of_function, nugget in zip(self.values.T, self.lengths, self.nugget, strict=True)
         ]
 
     @cached_property
     def arrays(self) -> dict[str, Any]:
-        """What `moments` needs, each (q, S, ...)."""
+        """The arrays of which `moments` is computed, (q, S, ...)."""
         names = ("whitener", "whitened", "root", "beta", "weight", "variance")
-        found = {name: np.array([[getattr(part, name) for part in own] for own in self.parts]) for name in names}
-        return found | {name: getattr(self, name) for name in ("points", "lengths", "weights", "nugget")}
+        stacked = {name: np.array([[getattr(terms, name) for terms in row] for row in self.terms]) for name in names}
+        return stacked | {name: getattr(self, name) for name in ("points", "lengths", "weights", "nugget")}
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
-    """What a setting of the length scales says of a function: R = covariance over the variance, H the mean's basis.
+class SettingTerms:
+    """Terms of a function in one setting of the length scales: R = covariance over the variance, H the mean's basis.
 
     Attributes
     ----------
@@ -125,9 +128,9 @@ class Parts:
     weight : (m,) array
         R^-1 (z - H beta).
     squares : float
-        Of the whitened residuals.
+        Sum of squares of the whitened residuals.
     variance : float
-        Of the process, its own uncertainty included.
+        Variance of the process, its own uncertainty included.
     """
 
     whitener: FloatArray
@@ -140,7 +143,7 @@ class Parts:
 
     @property
     def projection(self) -> FloatArray:
-        """R^-1 without what the mean's coefficients explain (m, m)."""
+        """R^-1 less the part that the mean's coefficients explain (m, m)."""
         explained = self.root @ (self.whitener.T @ self.whitened).T
         return np.asarray(self.whitener.T @ self.whitener - explained.T @ explained)
 
@@ -152,15 +155,17 @@ def fitted(points: FloatArray, values: FloatArray, kernel: Kernel, trend: Trend)
     ----------
     points : (m, d) array
     values : (m, q) array
-        Of the q functions, each of about unit size.
+        Values of the q functions, each of about unit size.
     """
-    own = [_most_probable(points, column, kernel, trend) for column in values.T]
-    settings = [_settings(points, column, best, kernel, trend) for column, (best, _) in zip(values.T, own, strict=True)]
+    modes = [_most_probable(points, column, kernel, trend) for column in values.T]
+    settings = [
+        _settings(points, column, best, kernel, trend) for column, (best, _) in zip(values.T, modes, strict=True)
+    ]
     count = max(len(weights) for weights, _ in settings)
-    weights = np.stack([np.pad(each, (0, count - len(each))) for each, _ in settings])
-    lengths = np.stack([np.pad(each, ((0, count - len(each)), (0, 0)), mode="edge") for _, each in settings])
-    nugget = np.exp(np.array([best[-1] for best, _ in own]))
-    evidence = float(sum(value for _, value in own))
+    weights = np.stack([np.pad(row, (0, count - len(row))) for row, _ in settings])
+    lengths = np.stack([np.pad(rows, ((0, count - len(rows)), (0, 0)), mode="edge") for _, rows in settings])
+    nugget = np.exp(np.array([best[-1] for best, _ in modes]))
+    evidence = float(sum(value for _, value in modes))
     return Kriging(points, values, weights, lengths, nugget, evidence, kernel, trend)
 
 
@@ -169,39 +174,39 @@ def moments(kernel: Kernel, trend: Trend, arrays: dict[str, Any], point: Any) ->
     import jax.numpy as jnp
 
     squared = (squared_differences(point[None], arrays["points"])[0] / arrays["lengths"][:, :, None] ** 2).sum(axis=-1)
-    among, _ = correlation(kernel, squared)
+    correlations, _ = correlation(kernel, squared)
     basis = trend_basis(point, trend)
-    own = jnp.einsum("qsij,qsj->qsi", arrays["whitener"], among)
-    rest = basis - jnp.einsum("qsip,qsi->qsp", arrays["whitened"], own)
-    rest = jnp.einsum("qsij,qsj->qsi", arrays["root"], rest)
+    whitened = jnp.einsum("qsij,qsj->qsi", arrays["whitener"], correlations)
+    unexplained = basis - jnp.einsum("qsip,qsi->qsp", arrays["whitened"], whitened)
+    unexplained = jnp.einsum("qsij,qsj->qsi", arrays["root"], unexplained)
     nugget = arrays["nugget"][:, None]
-    left = jnp.maximum(1 + nugget - (own**2).sum(axis=-1) + (rest**2).sum(axis=-1), nugget)
-    mean = arrays["beta"] @ basis + (among * arrays["weight"]).sum(axis=-1)
+    relative_variance = jnp.maximum(1 + nugget - (whitened**2).sum(axis=-1) + (unexplained**2).sum(axis=-1), nugget)
+    mean = arrays["beta"] @ basis + (correlations * arrays["weight"]).sum(axis=-1)
     centre = (arrays["weights"] * mean).sum(axis=1)
-    spread = (arrays["weights"] * (arrays["variance"] * left + (mean - centre[:, None]) ** 2)).sum(axis=1)
+    spread = (arrays["weights"] * (arrays["variance"] * relative_variance + (mean - centre[:, None]) ** 2)).sum(axis=1)
     return centre, spread
 
 
-def left_out(model: Kriging) -> tuple[FloatArray, FloatArray]:
+def leave_one_out(model: Kriging) -> tuple[FloatArray, FloatArray]:
     """Return errors and standard deviations (m, q) of every value predicted from the others.
 
     Mean and variance of the process are estimated without it (Dubrule 1983), the length scales with it.
     """
     errors, sds = [], []
-    for weights, own in zip(model.weights, model.parts, strict=True):
-        error, variance = np.array([_left_out(part) for part in own]).transpose(1, 0, 2)
+    for weights, terms_of_function in zip(model.weights, model.terms, strict=True):
+        error, variance = np.array([_leave_one_out_in_setting(terms) for terms in terms_of_function]).transpose(1, 0, 2)
         centre = weights @ error
         errors.append(centre)
         sds.append(np.sqrt(weights @ (variance + (error - centre) ** 2)))
     return np.array(errors).T, np.array(sds).T
 
 
-def _left_out(part: Parts) -> tuple[FloatArray, FloatArray]:
+def _leave_one_out_in_setting(terms: SettingTerms) -> tuple[FloatArray, FloatArray]:
     """Return errors and variances (m,) in one setting."""
-    m, p = part.whitened.shape
-    diagonal = np.diag(part.projection)
-    error = part.weight / diagonal
-    squares = np.maximum(part.squares - error**2 * diagonal, FLOOR)
+    m, p = terms.whitened.shape
+    diagonal = np.diag(terms.projection)
+    error = terms.weight / diagonal
+    squares = np.maximum(terms.squares - error**2 * diagonal, MIN_RELATIVE_RESIDUAL)
     return error, squares / (m - p - 3) / diagonal
 
 
@@ -215,37 +220,39 @@ def _most_probable(points: FloatArray, values: FloatArray, kernel: Kernel, trend
         value, gradient = _log_posterior(kernel, trend, logs, points, values)
         return -value, -gradient
 
-    bounds = [(np.log(0.02), np.log(50.0))] * size + [(np.log(NUGGET[0]), np.log(NUGGET[1]))]
-    starts = np.column_stack([np.log(0.15) + np.log(30.0) * quasi_random(size, STARTS), np.full(STARTS, np.log(1e-8))])
-    found = min(
-        (minimize(loss, start, jac=True, bounds=bounds, method="L-BFGS-B") for start in starts),
-        key=lambda each: float(each.fun),
+    bounds = [(np.log(0.02), np.log(50.0))] * size + [(np.log(NUGGET_BOUNDS[0]), np.log(NUGGET_BOUNDS[1]))]
+    starts = np.column_stack(
+        [np.log(0.15) + np.log(30.0) * quasi_random(size, OPTIMISER_STARTS), np.full(OPTIMISER_STARTS, np.log(1e-8))]
     )
-    return np.asarray(found.x), -float(found.fun)
+    best = min(
+        (minimize(loss, start, jac=True, bounds=bounds, method="L-BFGS-B") for start in starts),
+        key=lambda result: float(result.fun),
+    )
+    return np.asarray(best.x), -float(best.fun)
 
 
 def _settings(
     points: FloatArray, values: FloatArray, best: FloatArray, kernel: Kernel, trend: Trend
 ) -> tuple[FloatArray, FloatArray]:
-    """Return weights (S,) and settings (S, d) of the length scales that stand for their posterior.
+    """Return weights (S,) and settings (S, d) of the length scales that represent their posterior.
 
     Quasi-random points of the Gaussian with the curvature at the mode, weighted to be the posterior.
     """
     from scipy.special import ndtri
 
     size = points.shape[1]
-    if len(points) > FEW_RUNS:
+    if len(points) > MAX_RUNS_AVERAGED:
         return np.ones(1), np.exp(best[None, :size])
-    steps = np.eye(size + 1)[:size] * STEP
+    steps = np.eye(size + 1)[:size] * LOG_STEP
     slopes = [
-        [_log_posterior(kernel, trend, best + way * each, points, values)[1] for way in (1, -1)] for each in steps
+        [_log_posterior(kernel, trend, best + sign * step, points, values)[1] for sign in (1, -1)] for step in steps
     ]
-    curvature = np.array([(low - high)[:size] / (2 * STEP) for high, low in slopes])
+    curvature = np.array([(low - high)[:size] / (2 * LOG_STEP) for high, low in slopes])
     steep, axes = np.linalg.eigh(0.5 * (curvature + curvature.T))
-    root = WIDER * axes * np.clip(steep, *STEEPNESS) ** -0.5
-    scores = np.concatenate([np.zeros((1, size)), ndtri(np.clip(quasi_random(size, SETTINGS - 1), 1e-3, 1 - 1e-3))])
+    root = PROPOSAL_WIDENING * axes * np.clip(steep, *CURVATURE_BOUNDS) ** -0.5
+    scores = np.concatenate([np.zeros((1, size)), ndtri(np.clip(quasi_random(size, MAX_SETTINGS - 1), 1e-3, 1 - 1e-3))])
     logs = best[:size] + scores @ root.T
-    heights = np.array([_log_posterior(kernel, trend, np.append(each, best[size]), points, values)[0] for each in logs])
+    heights = np.array([_log_posterior(kernel, trend, np.append(row, best[size]), points, values)[0] for row in logs])
     weights = np.exp(heights - heights.max() + 0.5 * (scores**2).sum(axis=1) - 0.5 * (scores**2).sum(axis=1).max())
     return weights / weights.sum(), np.exp(logs)
 
@@ -256,22 +263,22 @@ def _log_posterior(
     """Return the log of marginal likelihood times prior of the length scales, up to a constant, and its gradient."""
     lengths, nugget = np.exp(logs[:-1]), float(np.exp(logs[-1]))
     try:
-        part = _parts(kernel, trend, points, values, lengths, nugget)
+        terms = _setting_terms(kernel, trend, points, values, lengths, nugget)
     except np.linalg.LinAlgError:
-        return -HUGE, np.zeros_like(logs)
-    free = len(points) - len(part.beta)
-    score = (logs[:-1] - np.log(TYPICAL)) / SPREAD
-    value = np.log(np.diag(part.whitener)).sum() + np.log(np.abs(np.diag(part.root))).sum()
-    value += -0.5 * free * np.log(part.squares) - 0.5 * (score**2).sum()
-    apart = squared_differences(points, points) / lengths**2
-    change = part.projection - free / part.squares * np.outer(part.weight, part.weight)
-    slope = -0.5 * np.einsum("ij,ij,ijd->d", change, correlation(kernel, apart.sum(axis=-1))[1], apart)
-    return float(value), np.append(slope - score / SPREAD, -0.5 * nugget * np.trace(change))
+        return -IMPROBABLE, np.zeros_like(logs)
+    free = len(points) - len(terms.beta)
+    score = (logs[:-1] - np.log(MEDIAN_LENGTH)) / LOG_LENGTH_SD
+    value = np.log(np.diag(terms.whitener)).sum() + np.log(np.abs(np.diag(terms.root))).sum()
+    value += -0.5 * free * np.log(terms.squares) - 0.5 * (score**2).sum()
+    scaled = squared_differences(points, points) / lengths**2
+    change = terms.projection - free / terms.squares * np.outer(terms.weight, terms.weight)
+    slope = -0.5 * np.einsum("ij,ij,ijd->d", change, correlation(kernel, scaled.sum(axis=-1))[1], scaled)
+    return float(value), np.append(slope - score / LOG_LENGTH_SD, -0.5 * nugget * np.trace(change))
 
 
-def _parts(
+def _setting_terms(
     kernel: Kernel, trend: Trend, points: FloatArray, values: FloatArray, lengths: FloatArray, nugget: float
-) -> Parts:
+) -> SettingTerms:
     from scipy.linalg import solve_triangular
 
     basis = trend_basis(points, trend)
@@ -282,6 +289,6 @@ def _parts(
     orthonormal, triangle = np.linalg.qr(whitened)
     root = solve_triangular(triangle, np.eye(p))
     beta = root @ (orthonormal.T @ target)
-    rest = target - whitened @ beta
-    squares = float(rest @ rest + FLOOR * values @ values)
-    return Parts(whitener, whitened, root.T, beta, whitener.T @ rest, squares, squares / (m - p - 2))
+    residual = target - whitened @ beta
+    squares = float(residual @ residual + MIN_RELATIVE_RESIDUAL * values @ values)
+    return SettingTerms(whitener, whitened, root.T, beta, whitener.T @ residual, squares, squares / (m - p - 2))

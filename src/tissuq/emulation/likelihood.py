@@ -13,11 +13,11 @@ import numpy as np
 from jax.scipy.linalg import cho_solve, solve_triangular
 from numpy.typing import NDArray
 
-from tissuq.discrepancy.discrepancy import Discrepancy
 from tissuq.emulation.emulator import Emulator, emulated
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Problem
-from tissuq.priors import Prior
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.parameters.priors import Prior
 
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
@@ -25,15 +25,15 @@ __all__ = ["Likelihood"]
 
 FloatArray = NDArray[np.float64]
 
-BLOCK = 256
-"""Parameters at once: what bounds the memory."""
-ROUNDING = 1e-9
-"""Of the largest measurement: the least standard deviation, so that no covariance is singular."""
+BLOCK_SIZE = 256
+"""Number of parameter settings computed at once, which bounds the memory."""
+ROUNDING_SHARE = 1e-9
+"""Smallest standard deviation as a share of the largest measurement, so that no covariance is singular."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """What compiled functions depend on; all else is data, so that one compilation serves many data sets."""
+    """The static arguments of compiled functions; all else is data, so that one compilation serves many data sets."""
 
     emulator: tuple[Kernel, Trend]
     symbols: tuple[str, ...]
@@ -42,7 +42,7 @@ class Form:
 
 
 class Likelihood:
-    """Of a problem with an emulator.
+    """The likelihood of a problem with an emulator.
 
     Parameters
     ----------
@@ -70,12 +70,12 @@ class Likelihood:
     def predictions(self, values: FloatArray, *, discrepancy: bool, noise: bool) -> tuple[FloatArray, FloatArray]:
         """Return means and variances (N, n) at the controls, given the measurements and parameters (N, D)."""
         mean, variance = self._in_blocks(_conditional(self.form, discrepancy), values)
-        own = (
+        noise_sd = (
             values[:, self.problem.symbols.index("noise_sd")]
             if self.problem.noise_sd is None
             else self.problem.noise_sd
         )
-        return mean, variance + (np.broadcast_to(own, len(values))[:, None] ** 2 if noise else 0.0)
+        return mean, variance + (np.broadcast_to(noise_sd, len(values))[:, None] ** 2 if noise else 0.0)
 
     def replicates(self, values: FloatArray, scores: FloatArray) -> FloatArray:
         """Return new measurements (N, n), all of a row together, from parameters (N, D) and normal scores (N, n)."""
@@ -84,38 +84,47 @@ class Likelihood:
     def error_ratio(self, values: FloatArray) -> float:
         """Return the largest variance of the emulator's error over that of noise and discrepancy, in any direction.
 
-        The mean over parameters (N, D). Where it is small, the error hardly widens any posterior: by less than this
-        share of its variance.
+        The mean over parameters (N, D). Where it is small, the error widens any posterior by less
+        than this share of its variance.
         """
         return float(self._in_blocks(_ratio(self.form), values)[0].mean())
 
     def _in_blocks(self, function: Any, values: FloatArray) -> tuple[FloatArray, ...]:
         count = len(values)
-        whole = np.concatenate([values, np.repeat(values[-1:], -count % BLOCK, axis=0)])
-        found = [function(block, self.data) for block in np.split(whole, len(whole) // BLOCK)]
-        return tuple(np.concatenate([np.asarray(each) for each in part])[:count] for part in zip(*found, strict=True))
+        padded = np.concatenate([values, np.repeat(values[-1:], -count % BLOCK_SIZE, axis=0)])
+        results = [function(block, self.data) for block in np.split(padded, len(padded) // BLOCK_SIZE)]
+        return tuple(
+            np.concatenate([np.asarray(block) for block in blocks])[:count] for blocks in zip(*results, strict=True)
+        )
 
 
-def _parts(form: Form, values: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
+def _moments(form: Form, values: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
     """Return the mean, the covariances of the emulator's error and of the discrepancy, and the noise variance."""
     mean, error = emulated(form.emulator, values[: form.forward], data["emulator"])
-    named = dict(zip(form.symbols, values, strict=True))
+    values_by_symbol = dict(zip(form.symbols, values, strict=True))
     control = data["control"]
-    own = jnp.zeros_like(error)
+    discrepancy = jnp.zeros_like(error)
     if form.discrepancy.is_correlated:
-        own = form.discrepancy.correlated_variance(named) * form.discrepancy.correlation(control, control, named)
-    rounding = ROUNDING * jnp.abs(data["measured"]).max()
-    return mean, data["has_error"] * error, own, named.get("noise_sd", data["noise_sd"]) ** 2 + rounding**2
+        discrepancy = form.discrepancy.correlated_variance(values_by_symbol) * form.discrepancy.kernel(
+            0, control, control, values_by_symbol
+        )
+    rounding = ROUNDING_SHARE * jnp.abs(data["measured"]).max()
+    return (
+        mean,
+        data["has_error"] * error,
+        discrepancy,
+        values_by_symbol.get("noise_sd", data["noise_sd"]) ** 2 + rounding**2,
+    )
 
 
-def _whole(error: Any, own: Any, noise: Any) -> Any:
-    return jnp.linalg.cholesky(error + own + noise * jnp.eye(len(error)))
+def _root(error: Any, discrepancy: Any, noise: Any) -> Any:
+    return jnp.linalg.cholesky(error + discrepancy + noise * jnp.eye(len(error)))
 
 
 def log_density(form: Form, values: Any, data: Mapping[str, Any]) -> Any:
     """Return the log density of the measurements at parameters (D,); JAX traces it."""
-    mean, error, own, noise = _parts(form, values, data)
-    root = _whole(error, own, noise)
+    mean, error, discrepancy, noise = _moments(form, values, data)
+    root = _root(error, discrepancy, noise)
     score = solve_triangular(root, data["measured"] - mean, lower=True)
     return -0.5 * score @ score - jnp.log(jnp.diag(root)).sum() - 0.5 * len(score) * jnp.log(2 * jnp.pi)
 
@@ -128,12 +137,12 @@ def _density(form: Form) -> Any:
 @lru_cache
 def _conditional(form: Form, discrepancy: bool) -> Any:
     def moments(values: Any, data: Any) -> tuple[Any, Any]:
-        mean, error, own, noise = _parts(form, values, data)
-        root = _whole(error, own, noise)
-        asked = error + own if discrepancy else error
-        shift = asked @ cho_solve((root, True), data["measured"] - mean)
-        explained = solve_triangular(root, asked, lower=True)
-        return mean + shift, jnp.maximum(jnp.diag(asked) - (explained**2).sum(axis=0), 0.0)
+        mean, error, process, noise = _moments(form, values, data)
+        root = _root(error, process, noise)
+        predicted = error + process if discrepancy else error
+        shift = predicted @ cho_solve((root, True), data["measured"] - mean)
+        explained = solve_triangular(root, predicted, lower=True)
+        return mean + shift, jnp.maximum(jnp.diag(predicted) - (explained**2).sum(axis=0), 0.0)
 
     return jax.jit(jax.vmap(moments, (0, None)))
 
@@ -142,9 +151,9 @@ def _conditional(form: Form, discrepancy: bool) -> Any:
 def _replicate(form: Form) -> Any:
     def replicate(row: Any, data: Any) -> tuple[Any]:
         values, scores = jnp.split(row, [len(form.symbols)])
-        mean, error, own, noise = _parts(form, values, data)
-        root = _whole(error, own, noise)
-        shift = (error + own) @ cho_solve((root, True), data["measured"] - mean)
+        mean, error, discrepancy, noise = _moments(form, values, data)
+        root = _root(error, discrepancy, noise)
+        shift = (error + discrepancy) @ cho_solve((root, True), data["measured"] - mean)
         half = solve_triangular(root, jnp.eye(len(scores)), lower=True)
         # A - A K^-1 A + s^2 I with K = A + s^2 I, but never singular
         spread = jnp.linalg.cholesky(noise * (2 * jnp.eye(len(scores)) - noise * half.T @ half))
@@ -156,8 +165,8 @@ def _replicate(form: Form) -> Any:
 @lru_cache
 def _ratio(form: Form) -> Any:
     def largest(values: Any, data: Any) -> tuple[Any]:
-        _, error, own, noise = _parts(form, values, data)
-        root = _whole(0.0 * error, own, noise)
+        _, error, discrepancy, noise = _moments(form, values, data)
+        root = _root(0.0 * error, discrepancy, noise)
         half = solve_triangular(root, error, lower=True)
         return (jnp.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[-1],)
 
@@ -169,7 +178,7 @@ def log_posterior(form: Form, priors: tuple[Prior, ...]) -> Any:
     """Return the log posterior of parameters (D,) and data, up to a constant; the same function for the same form."""
 
     def density(values: Any, data: Any) -> Any:
-        prior = sum(each.log_density(value) for each, value in zip(priors, values, strict=True))
-        return log_density(form, values, data) + prior
+        log_prior = sum(prior.log_density(value) for prior, value in zip(priors, values, strict=True))
+        return log_density(form, values, data) + log_prior
 
     return density

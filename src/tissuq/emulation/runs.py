@@ -1,4 +1,4 @@
-"""Runs of a forward model: what came out, what failed, and where."""
+"""Runs of a forward model: their outputs, and which of them failed where."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ __all__ = ["ForwardRun", "ForwardRuns", "carry_out", "gathered"]
 
 FloatArray = NDArray[np.float64]
 
-FEW = 3
-"""Failed runs from which a value of one parameter that they all exceed tells something."""
+MIN_FAILED_RUNS = 3
+"""Smallest number of failed runs from which a threshold of one parameter that separates them is reported."""
 
 
 @dataclass(frozen=True)
 class ForwardRun:
-    """One run that is to be made: a task of its own, which may travel to another process.
+    """One run that is to be made: a task that may be sent to another process.
 
     Parameters
     ----------
     forward : Forward
     parameters : tuple of (str, float)
     control : tuple of float
-        Where the outputs were measured.
+        Controls at which the outputs were measured.
     number : int
-        For what is shown while it runs.
+        Number shown while it runs.
     """
 
     forward: Forward
@@ -44,32 +44,32 @@ class ForwardRun:
 
     @property
     def key(self) -> str:
-        """The parameters, which tell it from every other run."""
+        """The parameters, which identify the run."""
         return json.dumps(self.parameters)
 
     @property
     def label(self) -> str:
-        """What is shown when it is done."""
+        """The text shown when the run is done."""
         return f"run {self.number}"
 
 
 def carry_out(run: ForwardRun) -> dict[str, Any]:
-    """Run the model once, and return its outputs or why there are none; plain data.
+    """Run the model once, and return its outputs or the reason of its failure, as plain data.
 
     Raises
     ------
     InputError
-        When what it returns is no outputs at the measured controls, whatever the parameters.
+        When the model does not return one number for each measurement.
     """
     start = perf_counter()
-    found: dict[str, Any] = {"outputs": [], "error": ""}
+    result: dict[str, Any] = {"outputs": [], "error": ""}
     try:
         outputs = run.forward.run(dict(run.parameters), np.array(run.control))
-    except Exception as error:  # a run that fails is a result: it is listed, and told
-        found["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
+    except Exception as error:  # a failed run is a result, which is listed
+        result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
     else:
-        found |= _checked(outputs, run)
-    return found | {"parameters": dict(run.parameters), "seconds": perf_counter() - start}
+        result |= _checked(outputs, run)
+    return result | {"parameters": dict(run.parameters), "seconds": perf_counter() - start}
 
 
 def _checked(outputs: Any, run: ForwardRun) -> dict[str, Any]:
@@ -89,7 +89,7 @@ def _checked(outputs: Any, run: ForwardRun) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class ForwardRuns:
-    """What a forward model computed.
+    """The runs of a forward model.
 
     Parameters
     ----------
@@ -100,9 +100,9 @@ class ForwardRuns:
     outputs : (N, n) array
         nan where a run failed.
     errors : tuple of str
-        Why a run failed; empty where it did not.
+        Reasons of failure; empty where a run succeeded.
     seconds : (N,) array
-        How long each took.
+        Durations of the runs, s.
     """
 
     symbols: tuple[str, ...]
@@ -124,40 +124,39 @@ class ForwardRuns:
         """Parameters and outputs of the runs that did not fail."""
         return self.points[~self.failed], self.outputs[~self.failed]
 
-    def joined(self, other: ForwardRuns) -> ForwardRuns:
+    def joined(self, new_runs: ForwardRuns) -> ForwardRuns:
         """Return these runs followed by others of the same model."""
         return ForwardRuns(
             self.symbols,
-            np.concatenate([self.points, other.points]),
-            np.concatenate([self.outputs, other.outputs]),
-            self.errors + other.errors,
-            np.concatenate([self.seconds, other.seconds]),
+            np.concatenate([self.points, new_runs.points]),
+            np.concatenate([self.outputs, new_runs.outputs]),
+            self.errors + new_runs.errors,
+            np.concatenate([self.seconds, new_runs.seconds]),
         )
 
     @property
-    def told_failures(self) -> str:
-        """How many runs failed, where, and why most of them; empty where none did."""
+    def failure_summary(self) -> str:
+        """The number, the region and the most frequent reason of failed runs, in words; empty where none failed."""
         if not self.failed.any():
             return ""
         reasons = [error for error in self.errors if error]
-        usual = max(set(reasons), key=reasons.count)
+        most_frequent = max(set(reasons), key=reasons.count)
         return (
-            f"{len(reasons)} of {len(self)} runs of the forward model failed, {self._where()}. The most frequent "
-            f"reason: {usual}."
+            f"{len(reasons)} of {len(self)} runs of the forward model failed, {self._failure_region()}. The most "
+            f"frequent reason: {most_frequent}."
         )
 
-    def _where(self) -> str:
+    def _failure_region(self) -> str:
         """Return the region of the failures: beyond a value of one parameter, or their ranges."""
         good, bad = self.points[~self.failed], self.points[self.failed]
-        if len(good) and len(bad) >= FEW:
-            for symbol, own, others in zip(self.symbols, bad.T, good.T, strict=True):
-                if own.min() > others.max():
-                    return f"all those with {symbol} from {own.min():.4g} and none below {others.max():.4g}"
-                if own.max() < others.min():
-                    return f"all those with {symbol} up to {own.max():.4g} and none above {others.min():.4g}"
-        ranges = [
-            f"{symbol} {own.min():.4g} to {own.max():.4g}" for symbol, own in zip(self.symbols, bad.T, strict=True)
-        ]
+        if len(good) and len(bad) >= MIN_FAILED_RUNS:
+            for symbol, failed, succeeded in zip(self.symbols, bad.T, good.T, strict=True):
+                if failed.min() > succeeded.max():
+                    return f"all those with {symbol} from {failed.min():.4g} and none below {succeeded.max():.4g}"
+                if failed.max() < succeeded.min():
+                    return f"all those with {symbol} up to {failed.max():.4g} and none above {succeeded.min():.4g}"
+        columns = zip(self.symbols, bad.T, strict=True)
+        ranges = [f"{symbol} {column.min():.4g} to {column.max():.4g}" for symbol, column in columns]
         inside = ((good >= bad.min(axis=0)) & (good <= bad.max(axis=0))).all(axis=1).sum()
         return f"at {', '.join(ranges)} (where {inside} others did not)"
 
@@ -167,8 +166,10 @@ def gathered(symbols: Sequence[str], results: Sequence[Mapping[str, Any]], outpu
     missing = np.full(outputs, np.nan)
     return ForwardRuns(
         tuple(symbols),
-        np.array([[each["parameters"][symbol] for symbol in symbols] for each in results]).reshape(-1, len(symbols)),
-        np.array([missing if each["error"] else each["outputs"] for each in results]).reshape(-1, outputs),
-        tuple(each["error"] for each in results),
-        np.array([each["seconds"] for each in results]),
+        np.array([[result["parameters"][symbol] for symbol in symbols] for result in results]).reshape(
+            -1, len(symbols)
+        ),
+        np.array([missing if result["error"] else result["outputs"] for result in results]).reshape(-1, outputs),
+        tuple(result["error"] for result in results),
+        np.array([result["seconds"] for result in results]),
     )

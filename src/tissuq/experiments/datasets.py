@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 from contextlib import suppress
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading import read_experiment
+from tissuq.experiments.reading.experiment_file import read_experiment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +75,7 @@ def load(name: str) -> Experiment:
     file = path(name)
     about = _comments(file)
     experiment = read_experiment(file, mode=about["mode"], name=name)
-    return replace(experiment, source=f"{about['citation']} ({experiment.source})")
+    return experiment.labelled(source=f"{about['citation']} ({experiment.source})")
 
 
 def table(name: str) -> pd.DataFrame:

@@ -1,23 +1,74 @@
-"""What was measured: stretches and engineering stresses of one specimen in one loading mode."""
+"""What was measured: curves of engineering stress, of one test or of several, each along a path of its loading mode."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode, Path, loading_mode
+from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
+from tissuq.experiments.modes.path import UNMEASURED
 
-__all__ = ["Experiment", "checked_points"]
+__all__ = ["Curve", "Experiment", "checked_points"]
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Curve:
+    """One stress that a test measured, and where.
+
+    Parameters
+    ----------
+    mode : LoadingMode
+        How the specimen was loaded.
+    channel : int
+        The number of the stress among those of the mode.
+    points : (n,) or (n, c) array, dimensionless
+        What the mode controls.
+    stress : (n,) array, MPa
+        Engineering stress.
+    name, source, stress_unit, specimen : str
+        Those of the test.
+    """
+
+    mode: LoadingMode
+    channel: int
+    points: FloatArray
+    stress: FloatArray
+    name: str
+    source: str
+    stress_unit: str
+    specimen: str
+
+    def __len__(self) -> int:
+        return len(self.stress)
+
+    @property
+    def path(self) -> Path:
+        """What the stress does work along."""
+        return self.mode.paths[self.channel]
+
+    @property
+    def abscissa(self) -> FloatArray:
+        """What the stress is drawn against, (n,)."""
+        return np.asarray(self.path.abscissa(self.points))
+
+    @property
+    def quantity(self) -> str:
+        """What the mode calls the stress."""
+        return self.mode.stresses[self.channel]
+
+
+@dataclass(frozen=True, eq=False, init=False)
 class Experiment:
-    """Measurements of one test: what it set, such as stretches, and the stresses.
+    """Measurements of one test: what it set, such as stretches, and the stresses. `Experiment.of` joins several tests.
 
     Parameters
     ----------
@@ -39,6 +90,11 @@ class Experiment:
         Which specimen it was, where several tests are fitted together: those of one specimen share its errors of area
         and length. Without a name every test counts as one of a specimen of its own.
 
+    Attributes
+    ----------
+    curves : tuple of Curve
+        Every measured stress, test by test.
+
     Raises
     ------
     InputError
@@ -54,15 +110,12 @@ class Experiment:
     >>> both = tq.Experiment("biaxial", stretch=[[1.1, 1.0], [1.2, 1.1]], stress=[[0.3, 0.2], [0.5, 0.4]])
     >>> len(both), both.mode.stresses
     (2, ('engineering stress of axis 1', 'engineering stress of axis 2'))
+    >>> tests = tq.Experiment.of([data, both])
+    >>> len(tests.tests), len(tests.curves), tests.name
+    (2, 3, 'experiment + experiment')
     """
 
-    mode: LoadingMode
-    stretch: NDArray[np.float64]
-    stress: NDArray[np.float64]
-    name: str = "experiment"
-    source: str = ""
-    stress_unit: str = "MPa"
-    specimen: str = ""
+    curves: tuple[Curve, ...]
 
     def __init__(
         self,
@@ -75,53 +128,152 @@ class Experiment:
         specimen: str = "",
     ) -> None:
         mode = loading_mode(mode)
-        values = {
-            "mode": mode,
-            "stretch": checked_points(mode, stretch),
-            "stress": _checked("stress", stress, mode.stresses),
-            "name": name,
-            "source": source,
-            "stress_unit": stress_unit,
-            "specimen": specimen,
-        }
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
-        if len(self.stretch) != len(self.stress):
+        points, stresses = checked_points(mode, stretch), _checked("stress", stress, mode.stresses)
+        if len(points) != len(stresses):
             raise InputError(
-                f"experiment '{name}': {len(self.stretch)} stretches but {len(self.stress)} stresses; "
+                f"experiment '{name}': {len(points)} stretches but {len(stresses)} stresses; "
                 "give one stress for every stretch."
             )
+        columns = enumerate(stresses.reshape(len(stresses), -1).T)
+        labels = name, source, stress_unit, specimen
+        curves = tuple(Curve(mode, channel, points, column, *labels) for channel, column in columns)
+        object.__setattr__(self, "curves", curves)
+
+    @classmethod
+    def of(cls, tests: Experiment | Sequence[Experiment]) -> Experiment:
+        """Return several tests as one experiment; a single one as it is.
+
+        Raises
+        ------
+        InputError
+            When there is none, or the same measurements are there twice.
+        """
+        if isinstance(tests, Experiment):
+            return tests
+        for number, test in enumerate(tests, 1):
+            if not isinstance(test, Experiment):
+                raise InputError(f"experiment number {number} is no tissuq.Experiment, but {test!r:.80}.")
+        single = [test for experiment in tests for test in experiment.tests]
+        if not single:
+            raise InputError("there is no experiment to fit.")
+        for (number, test), (second, other) in combinations(enumerate(single, 1), 2):
+            if test.has_measurements_of(other):
+                raise InputError(
+                    f"experiments number {number} ('{test.name}') and {second} ('{other.name}') hold the same "
+                    "measurements, which would count twice: leave one of them out."
+                )
+        return single[0] if len(single) == 1 else cls._of_curves(curve for test in single for curve in test.curves)
+
+    @classmethod
+    def _of_curves(cls, curves: Iterable[Curve]) -> Experiment:
+        experiment = cls.__new__(cls)
+        object.__setattr__(experiment, "curves", tuple(curves))
+        return experiment
 
     def __len__(self) -> int:
-        return len(self.stretch)
+        return sum(len(test.curves[0]) for test in self.tests)
 
     @property
-    def parts(self) -> tuple[Experiment, ...]:
-        """The tests that it is made of: itself."""
-        return (self,)
+    def size(self) -> int:
+        """The number of measured stresses."""
+        return sum(map(len, self.curves))
+
+    @cached_property
+    def tests(self) -> tuple[Experiment, ...]:
+        """The tests that it is made of."""
+        if len(self.curves) == len(self.curves[0].mode.stresses):
+            return (self,)
+        tests, start = [], 0
+        while start < len(self.curves):
+            stop = start + len(self.curves[start].mode.stresses)
+            tests.append(self._of_curves(self.curves[start:stop]))
+            start = stop
+        return tuple(tests)
+
+    @property
+    def name(self) -> str:
+        """The name of the test, or those of all."""
+        return " + ".join(test.curves[0].name for test in self.tests)
+
+    @property
+    def source(self) -> str:
+        """Where the values come from."""
+        return "; ".join(test.curves[0].source for test in self.tests if test.curves[0].source)
+
+    @property
+    def stress_unit(self) -> str:
+        """The unit in which people want to read the stresses: that of the first test."""
+        return self.curves[0].stress_unit
+
+    @property
+    def specimen(self) -> str:
+        """Which specimen it was; of several tests see that of each."""
+        return self.curves[0].specimen if len(self.tests) == 1 else ""
+
+    @property
+    def mode(self) -> LoadingMode:
+        """How the specimen was loaded in the test."""
+        return self._only_test[0].mode
+
+    @property
+    def stretch(self) -> FloatArray:
+        """What the test set: (n,), or (n, c) for c controls."""
+        return self._only_test[0].points
+
+    @cached_property
+    def stress(self) -> FloatArray:
+        """What the test measured, MPa: (n,), or (n, k) for k stresses."""
+        columns = [curve.stress for curve in self._only_test]
+        return columns[0] if len(columns) == 1 else np.column_stack(columns)
+
+    @property
+    def _only_test(self) -> tuple[Curve, ...]:
+        """The curves of the only test."""
+        if len(self.tests) > 1:
+            raise InputError(
+                f"'{self.name}' are {len(self.tests)} tests, each with a mode, stretches and stresses of its own: take "
+                "one of its tests."
+            )
+        return self.curves
 
     @property
     def modes(self) -> tuple[LoadingMode, ...]:
         """The different modes of its tests."""
-        return tuple(dict.fromkeys(part.mode for part in self.parts))
+        return tuple(dict.fromkeys(curve.mode for curve in self.curves))
 
-    @property
-    def curves(self) -> list[tuple[Experiment, int, NDArray[np.float64]]]:
-        """Every measured stress (n,) of its tests: the test, the number of the stress in its mode, and the values."""
-        return [
-            (part, number, stress)
-            for part in self.parts
-            for number, stress in enumerate(part.stress.reshape(len(part.stress), -1).T)
-        ]
+    @cached_property
+    def measured(self) -> FloatArray:
+        """Every measured stress (size,), curve by curve, MPa."""
+        return (
+            np.concatenate([curve.stress for curve in self.curves]) if len(self.curves) > 1 else self.curves[0].stress
+        )
 
-    def along(
-        self, mode: LoadingMode, points: NDArray[np.float64], channel: int = 0
-    ) -> tuple[Path, NDArray[np.float64]]:
-        """Return a path and its points that stand for points of a mode: what models of this experiment speak of.
+    @cached_property
+    def states(self) -> States:
+        """The states of deformation at which the stresses `measured` were."""
+        return States.joined([curve.path.at(curve.points, number) for number, curve in enumerate(self.curves)])
 
-        ``channel`` is the number of the stress, where the mode has several.
+    def states_at(self, points: FloatArray, mode: LoadingMode | None = None, channel: int = 0) -> States:
+        """Return the states at points of a mode, as measured by the first test of that mode where there is one.
+
+        ``mode`` is that of the only test unless said; ``channel`` is the number of the stress, where it has several.
         """
-        return mode.channels[channel], points
+        mode = mode or self.mode
+        curves = (number for number, curve in enumerate(self.curves) if (curve.mode, curve.channel) == (mode, channel))
+        return mode.paths[channel].at(points, next(curves, UNMEASURED))
+
+    def labelled(self, **labels: str) -> Experiment:
+        """Return the same measurements with another name, source, stress_unit or specimen."""
+        return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
+
+    def has_measurements_of(self, other: Experiment) -> bool:
+        """Return whether another experiment has the same curves."""
+        return len(self.curves) == len(other.curves) and all(
+            curve.mode == same.mode
+            and np.array_equal(curve.points, same.points)
+            and np.array_equal(curve.stress, same.stress)
+            for curve, same in zip(self.curves, other.curves, strict=True)
+        )
 
     def joined(self, other: Experiment) -> Experiment:
         """Return this experiment with the measurements of another one in the same loading mode added.
@@ -129,8 +281,12 @@ class Experiment:
         Raises
         ------
         InputError
-            When the loading modes differ.
+            When the loading modes differ, or there are several tests.
         """
+        if len(self.tests) > 1:
+            raise InputError(
+                f"experiment '{other.name}' cannot be added to a fit of several tests: fit all together again."
+            )
         if other.mode != self.mode:
             raise InputError(
                 f"experiment '{other.name}' is {other.mode.name} and experiment '{self.name}' {self.mode.name}: only "
@@ -142,7 +298,7 @@ class Experiment:
         return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit, self.specimen)
 
 
-def checked_points(mode: LoadingMode, points: ArrayLike) -> NDArray[np.float64]:
+def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
     """Return points of a mode as an array (n,), or (n, c) where the mode has c controls.
 
     Raises
@@ -150,30 +306,32 @@ def checked_points(mode: LoadingMode, points: ArrayLike) -> NDArray[np.float64]:
     InputError
         When it is not of this shape, or holds what is no value of a control.
     """
-    found = _checked("stretch", points, [control.name for control in mode.controls])
-    for control, column in zip(mode.controls, found.reshape(len(found), -1).T, strict=True):
+    checked = _checked("stretch", points, [control.name for control in mode.controls])
+    for control, column in zip(mode.controls, checked.reshape(len(checked), -1).T, strict=True):
         low = np.flatnonzero(column <= control.above)
         if len(low):
             raise InputError(
                 f"{control.name} {column[low[0]]:g} at position {low[0]} is not positive. "
                 "A stretch is deformed over undeformed length; if this is a strain, add 1."
             )
-    return found
+    return checked
 
 
-def _checked(name: str, values: Any, columns: Sequence[str]) -> NDArray[np.float64]:
+def _checked(name: str, values: Any, columns: Sequence[str]) -> FloatArray:
     """Return an array of finite numbers, (n,) or with several columns (n, k), that cannot be changed."""
     try:
-        found = np.array(values, dtype=np.float64)
+        array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be an array of numbers: {error}.") from error
     count = len(columns)
-    if found.ndim != min(count, 2) or not found.size or found.shape[1:] != (count,)[: found.ndim - 1]:
+    if array.ndim != min(count, 2) or not array.size or array.shape[1:] != (count,)[: array.ndim - 1]:
         form = f"an array with {count} columns ({', '.join(columns)})" if count > 1 else "a one-dimensional array"
-        raise InputError(f"{name} must be {form} with values, not of shape {found.shape}.")
-    for column, own in zip(columns, found.reshape(len(found), -1).T, strict=True):
-        bad = np.flatnonzero(~np.isfinite(own))
+        raise InputError(f"{name} must be {form} with values, not of shape {array.shape}.")
+    for column, numbers in zip(columns, array.reshape(len(array), -1).T, strict=True):
+        bad = np.flatnonzero(~np.isfinite(numbers))
         if len(bad):
-            raise InputError(f"{column} is {own[bad[0]]} at position {bad[0]}; every value must be a finite number.")
-    found.flags.writeable = False
-    return found
+            raise InputError(
+                f"{column} is {numbers[bad[0]]} at position {bad[0]}; every value must be a finite number."
+            )
+    array.flags.writeable = False
+    return array

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tissuq.export.code import Card, FECode
-from tissuq.export.forms import OgdenForm, OwnForm, PolynomialForm
+from tissuq.export.laws import LibraryForm, OgdenForm, PolynomialForm
 from tissuq.export.projection import OgdenFit, PolynomialFit, ReducedFit, full_terms, reduced_terms
-from tissuq.mechanics.materials import Gent
+from tissuq.mechanics.laws import Gent
 
 __all__ = ["Ansys"]
 
-PER_LINE = 6
+NUMBERS_PER_LINE = 6
 
 
 class Ansys(FECode):
@@ -39,7 +39,7 @@ class Ansys(FECode):
             )
             for n in range(1, 9)
         ),
-        OwnForm("GENT", "-mu Jm/2 ln(1 - (I1 - 3)/Jm)", Gent, lambda mu, Jm: {"mu": mu, "Jm": Jm}),
+        LibraryForm("GENT", "-mu Jm/2 ln(1 - (I1 - 3)/Jm)", Gent, lambda mu, Jm: {"mu": mu, "Jm": Jm}),
     )
     projections = PolynomialFit(full_terms(3)), OgdenFit(6), ReducedFit(reduced_terms(5))
 
@@ -50,7 +50,7 @@ class Ansys(FECode):
         if count.endswith("terms"):
             numbers += [0.0] * (int(points) - 1)
         lines = [f"! material {card.name}; MATID 1: change it to that of the model", f"TB,HYPER,1,1,{points},{option}"]
-        for start in range(0, len(numbers), PER_LINE):
-            words = ",".join(f"{number:.10e}" for number in numbers[start : start + PER_LINE])
+        for start in range(0, len(numbers), NUMBERS_PER_LINE):
+            words = ",".join(f"{number:.10e}" for number in numbers[start : start + NUMBERS_PER_LINE])
             lines.append(f"TBDATA,{start + 1},{words}")
         return "".join(f"{line}\n" for line in lines)

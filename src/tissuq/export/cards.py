@@ -1,25 +1,41 @@
-"""What is asked of cards, what they are, and the base of everything that draws can be written as."""
+"""Settings of material cards, the cards, and the base class of card formats."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from tissuq.ensemble import Ensemble
+import numpy as np
+from numpy.typing import NDArray
+
 from tissuq.errors import InputError
-from tissuq.experiments.units import stress_unit
+from tissuq.experiments.reading.units import stress_unit
+from tissuq.export.states import SeenStates
+from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.registry import find, variants
 
-__all__ = ["CardFormat", "CardSettings", "Cards", "UnitSystem", "card_format", "card_formats"]
+__all__ = [
+    "CardFormat",
+    "CardSettings",
+    "Cards",
+    "UnitSystem",
+    "card_format",
+    "card_formats",
+    "distances_from_median",
+    "draw_row",
+    "ensemble_lines",
+    "file_name",
+    "words_of",
+]
 
 
 class UnitSystem(NamedTuple):
-    """Consistent units of a finite-element model: the others, and the density of water in them."""
+    """The units of a finite-element model that are consistent with one of stress, and the density of water in them."""
 
-    others: str
-    water: float
+    units: str
+    water_density: float
 
 
 UNITS = {
@@ -27,13 +43,13 @@ UNITS = {
     "kPa": UnitSystem("mm, mN, kg, s", 1e-6),
     "Pa": UnitSystem("m, N, kg, s", 1e3),
 }
-STIFF = 1000.0
+DEFAULT_BULK_TO_SHEAR = 1000.0
 """Default bulk modulus over the mean initial shear modulus: near 0.4995 for Poisson's ratio."""
 
 
 @dataclass(frozen=True)
 class CardSettings:
-    """What is asked of cards.
+    """Settings of material cards.
 
     Parameters
     ----------
@@ -42,17 +58,17 @@ class CardSettings:
         ``"ogden"`` or ``"mixture"``. Unless given, the draws' own law where the code has it, else the best of the
         code's projections: nearly all draws stable, then the smallest error.
     order : int, optional
-        Of that family; unless given, the highest that the code has or is worthwhile.
+        Order or number of terms of that family; unless given, the highest that the code supports and is worthwhile.
     unit : str
-        Of stress in the finite-element model: ``"MPa"`` (mm, N, t), ``"kPa"`` (mm, mN, kg) or ``"Pa"`` (m, N, kg).
+        Unit of stress in the finite-element model: ``"MPa"`` (mm, N, t), ``"kPa"`` (mm, mN, kg) or ``"Pa"`` (m, N, kg).
     bulk_modulus : float, optional
-        In that unit, the same for all draws; unless given, 1000 times the mean initial shear modulus.
+        Bulk modulus of all draws in that unit; unless given, 1000 times the mean initial shear modulus.
     poisson : float, optional
-        Instead: Poisson's ratio at the reference, from which each draw has a bulk modulus of its own.
+        Poisson's ratio at the reference, in place of a common bulk modulus: each draw then has its own bulk modulus.
     name : str
-        Of the material in the cards, the same in all so that they can be exchanged.
+        Name of the material, the same in all cards so that they can be exchanged.
     source : str
-        Where the draws come from, for the comments.
+        Origin of the draws, for the comments.
 
     Raises
     ------
@@ -78,7 +94,7 @@ class CardSettings:
         if self.poisson is not None and not 0 < self.poisson < 0.5:
             raise InputError(f"Poisson's ratio must lie between 0 and 0.5, not at {self.poisson:g}.")
         if self.order is not None and self.law is None:
-            raise InputError("an order is that of a law: name the law, too, such as polynomial or ogden.")
+            raise InputError("the order belongs to a law: give the law as well, such as polynomial or ogden.")
         if not (self.name.isascii() and self.name.replace("_", "").replace("-", "").isalnum() and len(self.name) <= 40):
             raise InputError(f"'{self.name}' cannot name a material: use up to 40 letters, digits, _ and -.")
 
@@ -89,7 +105,7 @@ class CardSettings:
 
     @property
     def system(self) -> UnitSystem:
-        """The other units."""
+        """The consistent units of length, force, mass and time."""
         return UNITS[self.unit]
 
     def bulk(self, modulus: float, mean: float) -> float:
@@ -107,7 +123,7 @@ class CardSettings:
             )
         if self.poisson is not None:
             return 2 * modulus * (1 + self.poisson) / (3 * (1 - 2 * self.poisson))
-        return self.bulk_modulus if self.bulk_modulus is not None else STIFF * mean
+        return self.bulk_modulus if self.bulk_modulus is not None else DEFAULT_BULK_TO_SHEAR * mean
 
 
 @dataclass(frozen=True)
@@ -120,18 +136,19 @@ class Cards:
         Texts by the names of the files, one for each draw.
     index : tuple of mappings
         A row for each draw: its file, parameters, constants, and how far its card is from the draw.
-    notes : tuple of str
-        What a reader must know, in sentences.
+    warnings : tuple of str
+        Sentences that the user must read: the law of the cards, its errors, and cards that are not stable.
     """
 
     files: Mapping[str, str]
     index: tuple[Mapping[str, Any], ...]
-    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 class CardFormat(ABC):
     """A way to write draws for another program; a new one is one subclass in one file."""
 
+    entry_point_group: ClassVar[str] = "tissuq.card_formats"
     name: ClassVar[str]
     description: ClassVar[str]
 
@@ -154,3 +171,57 @@ def card_format(name: str) -> CardFormat:
         When there is none.
     """
     return find(CardFormat, "format of cards", name, InputError)()
+
+
+def file_name(ensemble: Ensemble, draw_index: int, suffix: str) -> str:
+    """Return the name of a draw's file, so that names sort like numbers."""
+    return f"draw-{draw_index + 1:0{len(str(len(ensemble)))}d}{suffix}"
+
+
+def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
+    """Return the sentences that are true of all draws."""
+    model = ensemble.model
+    names = f"{model.material.name}, discrepancy {model.discrepancy.name}"
+    yield f"tissuq: equally probable draws of the posterior of {names}"
+    yield f"source: {settings.source or model.experiment.name}"
+    yield (
+        "energy of the draws: material and discrepancy" if ensemble[0].discrepancy else "energy of the draws: material"
+    )
+    if ensemble.admissible_in:
+        yield (
+            f"admissible: stable over the measured range in {', '.join(ensemble.admissible_in)}; "
+            f"{len(ensemble)} of {ensemble.tried} draws that were tried are"
+        )
+    else:
+        yield "admissible: not looked at, draws may be unstable"
+    ends = (f"{mode} {low:.4g} to {high:.4g}" for mode, (low, high) in ensemble.ranges.items())
+    yield f"calibrated stretches: {', '.join(ends)}; beyond, the card is an extrapolation"
+
+
+def draw_row(draw: EnergyDraw, settings: CardSettings, modulus: float) -> dict[str, Any]:
+    """Return the row of a draw in the index: its number, parameters (stresses in the unit), and its modulus."""
+    parameters = _parameters(draw, settings)
+    return {"draw": draw.number + 1, "unit": settings.unit, **parameters, "initial_shear_modulus": modulus}
+
+
+def words_of(draw: EnergyDraw, settings: CardSettings) -> str:
+    """Return the parameters of a draw in words, stresses in the unit."""
+    return ", ".join(f"{symbol} = {value:.6g}" for symbol, value in _parameters(draw, settings).items())
+
+
+def distances_from_median(ensemble: Ensemble) -> NDArray[np.float64]:
+    """Return how far draws (N,) are from the median of all: root mean square difference of stresses in the seen states.
+
+    Relative to the sizes of the medians; the draw with the smallest is the most typical.
+    """
+    states = SeenStates(ensemble.most)
+    stress = ensemble.stress(states, states.points)
+    median = np.median(stress, axis=0)
+    return np.asarray(np.sqrt((((stress - median) / np.abs(median)) ** 2).mean(axis=1)))
+
+
+def _parameters(draw: EnergyDraw, settings: CardSettings) -> dict[str, float]:
+    material, values = draw.parts[0]
+    factors = (settings.factor if parameter.unit == "MPa" else 1.0 for parameter in material.parameters)
+    symbols = (parameter.symbol for parameter in material.parameters)
+    return {symbol: value * factor for symbol, value, factor in zip(symbols, values, factors, strict=True)}

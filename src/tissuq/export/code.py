@@ -1,4 +1,4 @@
-"""What a finite-element code knows: its forms, the projections that fit in them, and the text of a card."""
+"""Finite-element codes: their forms, the projections that fit in them, and the text of a card."""
 
 from __future__ import annotations
 
@@ -11,23 +11,30 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.ensemble import Ensemble
 from tissuq.errors import InputError
-from tissuq.export.cards import CardFormat, Cards, CardSettings
-from tissuq.export.forms import Form
-from tissuq.export.heading import distances_from_median, draw_row, ensemble_lines, file_name, words_of
-from tissuq.export.laws import Law, exact_law
+from tissuq.export.cards import (
+    CardFormat,
+    Cards,
+    CardSettings,
+    distances_from_median,
+    draw_row,
+    ensemble_lines,
+    file_name,
+    words_of,
+)
+from tissuq.export.laws import Form, Law, exact_law
 from tissuq.export.projection import Projection, projections
 from tissuq.export.states import are_stable, differences, moduli
+from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["Card", "FECode"]
 
 FloatArray = NDArray[np.float64]
 
-MOSTLY = 0.9
-"""Share of stable draws from which one projection is no better than another for having more."""
-WIDTH = 110
-"""Of comments."""
+MIN_STABLE_SHARE = 0.9
+"""Share of stable draws above which projections are compared by their error alone."""
+COMMENT_WIDTH = 110
+"""Largest number of characters in a line of comment."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +45,12 @@ class Card:
     ----------
     form : Form
     constants : mapping of str to float
-        In the order of the form.
+        Constants by name, in the order of the form.
     shear, bulk : float
-        Initial moduli.
+        Initial shear and bulk modulus.
     name : str
-        Of the material.
-    water : float
+        Name of the material.
+    water_density : float
         The density of water, for codes that need a density.
     """
 
@@ -52,7 +59,7 @@ class Card:
     shear: float
     bulk: float
     name: str
-    water: float
+    water_density: float
 
     @property
     def poisson(self) -> float:
@@ -61,19 +68,19 @@ class Card:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """The law of all cards, how far it is from the draws, and whether it is stable."""
+class JudgedLaw:
+    """The law of all cards, its relative errors of stress against the draws, and whether each draw's card is stable."""
 
     law: Law
     form: Form
     is_exact: bool
-    apart: Mapping[str, FloatArray]
+    errors: Mapping[str, FloatArray]
     stable: NDArray[np.bool_]
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """The better the smaller: nearly all draws stable, then nearer ones."""
-        return bool(self.stable.mean() < MOSTLY), float(np.sqrt((self.apart["states"] ** 2).mean()))
+        """Sort key, smaller is better: nearly all draws stable first, then the smaller error."""
+        return bool(self.stable.mean() < MIN_STABLE_SHARE), float(np.sqrt((self.errors["states"] ** 2).mean()))
 
 
 class FECode(CardFormat):
@@ -87,7 +94,7 @@ class FECode(CardFormat):
     """What begins and what ends a line of comment."""
     volumetric: ClassVar[str]
     checked: ClassVar[str]
-    """Whether the code itself has judged its cards."""
+    """How the cards of this code were checked."""
     forms: ClassVar[tuple[Form, ...]]
     """In order of preference."""
     projections: ClassVar[tuple[Projection, ...]]
@@ -105,105 +112,106 @@ class FECode(CardFormat):
         return heading + text
 
     def cards(self, ensemble: Ensemble, settings: CardSettings) -> Cards:
-        told = self._told(ensemble, settings)
+        judged = self._best_law(ensemble, settings)
         shear = moduli(ensemble) * settings.factor
         if not shear.mean() > 0:
             raise InputError(
                 "the mean initial shear modulus of the draws is not positive: no card can be made of them."
             )
-        values = told.law.scaled(settings.factor).values
-        common = [*ensemble_lines(ensemble, settings), *self._law_lines(told, settings)]
+        values = judged.law.scaled(settings.factor).values
+        common = [*ensemble_lines(ensemble, settings), *self._law_lines(judged, settings)]
         files, index = {}, []
-        for place, (own, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
-            constants = told.form.constants(told.law.material, values[place])
-            bulk = settings.bulk(float(own), float(shear.mean()))
-            card = Card(told.form, constants, float(own), bulk, settings.name, settings.system.water)
+        for draw_index, (modulus, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
+            constants = judged.form.constants(judged.law.material, values[draw_index])
+            bulk = settings.bulk(float(modulus), float(shear.mean()))
+            card = Card(judged.form, constants, float(modulus), bulk, settings.name, settings.system.water_density)
             self.check(card)
-            apart = {name: each[place] for name, each in told.apart.items()}
-            row = {"file": file_name(ensemble, place, self.suffix), **draw_row(ensemble[place], settings, card.shear)}
-            row |= {"bulk_modulus": bulk, "form": told.form.keyword, **_prefixed(constants)}
-            row |= _errors(apart) | {"card_is_stable": bool(told.stable[place]), "from_median": float(distance)}
-            lines = [f"draw {place + 1} of {len(ensemble)}: {words_of(ensemble[place], settings)}", *common]
-            lines += self._error_lines(apart, told.is_exact, bool(told.stable[place]))
+            errors = {name: error[draw_index] for name, error in judged.errors.items()}
+            draw = ensemble[draw_index]
+            row = {"file": file_name(ensemble, draw_index, self.suffix), **draw_row(draw, settings, card.shear)}
+            row |= {"bulk_modulus": bulk, "form": judged.form.keyword, **_prefixed(constants)}
+            row |= _errors(errors) | {"card_is_stable": bool(judged.stable[draw_index]), "from_median": float(distance)}
+            lines = [f"draw {draw_index + 1} of {len(ensemble)}: {words_of(draw, settings)}", *common]
+            lines += self._error_lines(errors, judged.is_exact, bool(judged.stable[draw_index]))
             files[str(row["file"])] = self.wrapped(self._commented(lines), self.text(card))
             index.append(row)
-        return Cards(files, tuple(index), tuple(self._notes(told)))
+        return Cards(files, tuple(index), tuple(self._warnings(judged)))
 
     def form_of(self, law: Law) -> Form | None:
         """Return the first form that holds a law, if any."""
         return next((form for form in self.forms if form.holds(law.material)), None)
 
-    def _told(self, ensemble: Ensemble, settings: CardSettings) -> Told:
-        own = exact_law(ensemble) if settings.law is None else None
-        form = self.form_of(own) if own is not None else None
-        if own is not None and form is not None:
-            return self._judged(ensemble, own, form, is_exact=True)
-        found = [self._projected(ensemble, each) for each in self._asked(settings)]
-        return min(found, key=lambda told: told.rank)
+    def _best_law(self, ensemble: Ensemble, settings: CardSettings) -> JudgedLaw:
+        law = exact_law(ensemble) if settings.law is None else None
+        form = self.form_of(law) if law is not None else None
+        if law is not None and form is not None:
+            return self._judged(ensemble, law, form, is_exact=True)
+        candidates = [self._projected(ensemble, projection) for projection in self._requested(settings)]
+        return min(candidates, key=lambda judged: judged.rank)
 
-    def _projected(self, ensemble: Ensemble, projection: Projection) -> Told:
+    def _projected(self, ensemble: Ensemble, projection: Projection) -> JudgedLaw:
         law = projection.law(ensemble)
         form = self.form_of(law)
         if form is None:
             raise InputError(f"{self.name} has no form for {law.material.name}; ask for another order.")
         return self._judged(ensemble, law, form, is_exact=False)
 
-    def _judged(self, ensemble: Ensemble, law: Law, form: Form, *, is_exact: bool) -> Told:
-        own = law.ensemble(ensemble)
-        return Told(law, form, is_exact, differences(own, ensemble), are_stable(own))
+    def _judged(self, ensemble: Ensemble, law: Law, form: Form, *, is_exact: bool) -> JudgedLaw:
+        card_draws = law.ensemble(ensemble)
+        return JudgedLaw(law, form, is_exact, differences(card_draws, ensemble), are_stable(card_draws))
 
-    def _asked(self, settings: CardSettings) -> Sequence[Projection]:
+    def _requested(self, settings: CardSettings) -> Sequence[Projection]:
         if settings.law is None:
             return self.projections
-        kinds = {each.family: each for each in self.projections}
+        kinds = {projection.family: projection for projection in self.projections}
         if settings.law not in kinds:
-            known = ", ".join(kinds)
-            every = "" if settings.law in projections() else f"there is no law '{settings.law}'; "
-            raise InputError(f"{every}cards for {self.name} can be of the laws {known}.")
-        own = kinds[settings.law]
-        return [own if settings.order is None else type(own).of_order(settings.order)]
+            families = ", ".join(kinds)
+            unknown = "" if settings.law in projections() else f"there is no law '{settings.law}'; "
+            raise InputError(f"{unknown}cards for {self.name} can be of the laws {families}.")
+        projection = kinds[settings.law]
+        return [projection if settings.order is None else type(projection).of_order(settings.order)]
 
-    def _law_lines(self, told: Told, settings: CardSettings) -> Iterator[str]:
-        yield f"form: {told.form.keyword}, W = {told.form.formula}; I1, I2, l of the isochoric part, l / J^(1/3)"
+    def _law_lines(self, judged: JudgedLaw, settings: CardSettings) -> Iterator[str]:
+        yield f"form: {judged.form.keyword}, W = {judged.form.formula}; I1, I2, l of the isochoric part, l / J^(1/3)"
         yield f"volume: U = {self.volumetric}; K is the bulk modulus"
-        yield f"unit of stress: {settings.unit} ({settings.system.others})"
+        yield f"unit of stress: {settings.unit} ({settings.system.units})"
         yield f"checked: {self.checked}"
 
-    def _error_lines(self, apart: Mapping[str, FloatArray], is_exact: bool, is_stable: bool) -> Iterator[str]:
+    def _error_lines(self, errors: Mapping[str, FloatArray], is_exact: bool, is_stable: bool) -> Iterator[str]:
         if is_exact:
             yield "the card's law is the draw's own, exactly"
             return
         yield "PROJECTION: the card is the nearest of its form; relative error of stress, largest and root mean square:"
-        for name, each in apart.items():
-            yield f"    {_place(name)}: {_percent(np.abs(each).max())}, {_percent(np.sqrt((each**2).mean()))}"
+        for name, error in errors.items():
+            yield f"    {_label(name)}: {_percent(np.abs(error).max())}, {_percent(np.sqrt((error**2).mean()))}"
         if not is_stable:
-            yield "    CAUTION: the card is NOT stable over the whole calibrated range"
+            yield "    WARNING: the card is NOT stable over the whole calibrated range"
 
     def _commented(self, lines: Sequence[str]) -> str:
-        before, after = self.comment
+        start, end = self.comment
         plain = (line.replace("--", "-") for line in lines)  # two hyphens end a comment of XML
-        folded = (part for line in plain for part in wrap(line, WIDTH, subsequent_indent="    "))
-        return "".join(f"{before}{part}{after}\n" for part in folded)
+        folded = (folded_line for line in plain for folded_line in wrap(line, COMMENT_WIDTH, subsequent_indent="    "))
+        return "".join(f"{start}{folded_line}{end}\n" for folded_line in folded)
 
-    def _notes(self, told: Told) -> Iterator[str]:
-        if told.is_exact:
-            yield f"The cards are the draws' own law, exactly: {told.form.keyword}."
+    def _warnings(self, judged: JudgedLaw) -> Iterator[str]:
+        if judged.is_exact:
+            yield f"The cards are the draws' own law, exactly: {judged.form.keyword}."
             return
         yield (
-            f"The draws' own law has no card in {self.name}, so every card is the nearest {told.form.keyword}: its "
+            f"The draws' own law has no card in {self.name}, so every card is the nearest {judged.form.keyword}: its "
             "stresses differ from the draw's in the calibrated range by (root mean square; largest, of all draws) "
             + "; ".join(
-                f"{_place(name)} {_percent(np.sqrt((each**2).mean()))}, {_percent(np.abs(each).max())}"
-                for name, each in told.apart.items()
+                f"{_label(name)} {_percent(np.sqrt((error**2).mean()))}, {_percent(np.abs(error).max())}"
+                for name, error in judged.errors.items()
             )
-            + ". Every file and the index say it draw by draw."
+            + ". Every file and the index give the errors of each draw."
         )
-        lost = np.flatnonzero(~told.stable)
+        lost = np.flatnonzero(~judged.stable)
         if len(lost):
-            places = ", ".join(str(place + 1) for place in lost)
+            numbers = ", ".join(str(index + 1) for index in lost)
             yield (
-                f"NOT stable over the whole calibrated range: the cards of draws {places}. Leave them out, or ask for "
-                "another law with --law."
+                f"The cards of draws {numbers} are NOT stable over the whole calibrated range. Leave them out, or "
+                "choose another law with --law."
             )
 
 
@@ -212,16 +220,16 @@ def _prefixed(constants: Mapping[str, float]) -> dict[str, float]:
     return {f"card_{name}": float(value) for name, value in constants.items()}
 
 
-def _errors(apart: Mapping[str, FloatArray]) -> dict[str, float]:
+def _errors(errors: Mapping[str, FloatArray]) -> dict[str, float]:
     """Return largest and root mean square of relative differences, by where they are."""
-    found = {}
-    for name, each in apart.items():
-        found[f"error_{name}_max"] = float(np.abs(each).max())
-        found[f"error_{name}_rms"] = float(np.sqrt((each**2).mean()))
-    return found
+    row = {}
+    for name, error in errors.items():
+        row[f"error_{name}_max"] = float(np.abs(error).max())
+        row[f"error_{name}_rms"] = float(np.sqrt((error**2).mean()))
+    return row
 
 
-def _place(name: str) -> str:
+def _label(name: str) -> str:
     return "in any measured state" if name == "states" else name
 
 

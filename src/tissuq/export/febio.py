@@ -8,42 +8,43 @@ from itertools import starmap
 from xml.sax.saxutils import quoteattr
 
 from tissuq.export.code import Card, FECode
-from tissuq.export.forms import Constants, Form, OgdenForm, OwnForm, PolynomialForm
+from tissuq.export.laws import Constants, Form, LibraryForm, OgdenForm, PolynomialForm
 from tissuq.export.projection import MixtureFit, OgdenFit, ReducedFit, reduced_terms
 from tissuq.mechanics import Material
-from tissuq.mechanics.materials import Gent, MaterialSum, VerondaWestmann
+from tissuq.mechanics.laws import Gent, MaterialSum, VerondaWestmann
 
 __all__ = ["FEBio"]
 
-ORDERS = 6
+MAX_TERMS = 6
 
 
 @dataclass(frozen=True)
 class Mixture(Form):
     """A sum of materials, each as a form writes it."""
 
-    parts: tuple[Form, ...]
+    summands: tuple[Form, ...]
 
     def holds(self, material: Material) -> bool:
-        if not isinstance(material, MaterialSum) or len(material.parts) != len(self.parts):
+        if not isinstance(material, MaterialSum) or len(material.parts) != len(self.summands):
             return False
-        return all(form.holds(part) for form, part in zip(self.parts, material.parts, strict=True))
+        return all(form.holds(summand) for form, summand in zip(self.summands, material.parts, strict=True))
 
     def constants(self, material: Material, values: Sequence[float]) -> Constants:
         assert isinstance(material, MaterialSum)  # noqa: S101 (what it holds)
-        found: Constants = {}
-        left = list(values)
-        for form, part in zip(self.parts, material.parts, strict=True):
-            own, left = left[: len(part.parameters)], left[len(part.parameters) :]
-            found |= {f"{form.keyword}_{name}": value for name, value in form.constants(part, own).items()}
-        return found
+        constants: Constants = {}
+        remaining = list(values)
+        for form, summand in zip(self.summands, material.parts, strict=True):
+            count = len(summand.parameters)
+            numbers, remaining = form.constants(summand, remaining[:count]), remaining[count:]
+            constants |= {f"{form.keyword}_{name}": value for name, value in numbers.items()}
+        return constants
 
 
 YEOH = PolynomialForm(
-    "Yeoh", "sum of c_i (I1 - 3)^i", reduced_terms(ORDERS), tuple(f"c{n}" for n in range(1, ORDERS + 1))
+    "Yeoh", "sum of c_i (I1 - 3)^i", reduced_terms(MAX_TERMS), tuple(f"c{n}" for n in range(1, MAX_TERMS + 1))
 )
 OGDEN = OgdenForm(
-    "Ogden", "sum of c_i/m_i^2 (l1^m_i + l2^m_i + l3^m_i - 3)", 1, ORDERS, lambda mu, alpha: 2 * mu, ("c", "m")
+    "Ogden", "sum of c_i/m_i^2 (l1^m_i + l2^m_i + l3^m_i - 3)", 1, MAX_TERMS, lambda mu, alpha: 2 * mu, ("c", "m")
 )
 MIXTURE = Mixture("uncoupled solid mixture", f"{YEOH.formula} (Yeoh) + {OGDEN.formula} (Ogden)", (YEOH, OGDEN))
 
@@ -64,8 +65,8 @@ class FEBio(FECode):
         PolynomialForm("Mooney-Rivlin", "c1 (I1 - 3) + c2 (I2 - 3)", ("C10", "C01"), ("c1", "c2")),
         YEOH,
         OGDEN,
-        OwnForm("Gent", "-G Jm/2 ln(1 - (I1 - 3)/Jm)", Gent, lambda mu, Jm: {"G": mu, "Jm": Jm}),
-        OwnForm(
+        LibraryForm("Gent", "-G Jm/2 ln(1 - (I1 - 3)/Jm)", Gent, lambda mu, Jm: {"G": mu, "Jm": Jm}),
+        LibraryForm(
             "Veronda-Westmann",
             "c1 (exp(c2 (I1 - 3)) - 1) - c1 c2/2 (I2 - 3)",
             VerondaWestmann,
@@ -73,18 +74,19 @@ class FEBio(FECode):
         ),
         MIXTURE,
     )
-    projections = MixtureFit(ORDERS), OgdenFit(ORDERS), ReducedFit(reduced_terms(ORDERS))
+    projections = MixtureFit(MAX_TERMS), OgdenFit(MAX_TERMS), ReducedFit(reduced_terms(MAX_TERMS))
 
     def text(self, card: Card) -> str:
         head = f'    <material id="1" name={quoteattr(card.name)} type="{card.form.keyword}">'
-        lines = [head, _element("density", card.water)]
+        lines = [head, _element("density", card.water_density)]
         if isinstance(card.form, Mixture):
-            for part in card.form.parts:
-                own = {name: card.constants[name] for name in card.constants if name.startswith(f"{part.keyword}_")}
-                inner = {name.removeprefix(f"{part.keyword}_"): value for name, value in own.items()}
-                inner["k"] = card.bulk / len(card.form.parts)  # the mixture's is their sum
-                solid = (f"  {_element(name, number)}" for name, number in inner.items())
-                lines += [f'      <solid type="{part.keyword}">', *solid, "      </solid>"]
+            for solid_form in card.form.summands:
+                prefix = f"{solid_form.keyword}_"
+                names = [name for name in card.constants if name.startswith(prefix)]
+                numbers = {name.removeprefix(prefix): card.constants[name] for name in names}
+                numbers["k"] = card.bulk / len(card.form.summands)  # the mixture's is their sum
+                solid = (f"  {_element(name, number)}" for name, number in numbers.items())
+                lines += [f'      <solid type="{solid_form.keyword}">', *solid, "      </solid>"]
         else:
             lines += starmap(_element, {**card.constants, "k": card.bulk}.items())
         return "\n".join([*lines, "    </material>", ""])

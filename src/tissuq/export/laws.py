@@ -1,17 +1,17 @@
-"""Draws as one closed law with other values for each, where they are one: what a finite-element code may know."""
+"""Closed laws of draws, and the forms in which finite-element codes write strain energies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.ensemble import EnergyDraw, Ensemble
 from tissuq.mechanics import Material
-from tissuq.mechanics.materials import (
+from tissuq.mechanics.laws import (
     Biderman,
     Isihara,
     MaterialSum,
@@ -24,10 +24,12 @@ from tissuq.mechanics.materials import (
     Rivlin,
     Yeoh,
 )
+from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 
-__all__ = ["Law", "exact_law", "parts_of"]
+__all__ = ["Constants", "Form", "Law", "LibraryForm", "OgdenForm", "PolynomialForm", "exact_law", "parts_of"]
 
 FloatArray = NDArray[np.float64]
+Constants = dict[str, float]
 
 POLYNOMIALS = Biderman, Isihara, MooneyRivlin, NeoHookean, Rivlin, Yeoh
 OGDEN = Ogden, Ogden1, Ogden2, Ogden3
@@ -52,7 +54,7 @@ class Law:
     def ensemble(self, like: Ensemble) -> Ensemble:
         """Return the draws of this law in the place of others."""
         rows = (tuple(map(float, row)) for row in self.values)
-        draws = tuple(EnergyDraw(place, ((self.material, row),), None) for place, row in enumerate(rows))
+        draws = tuple(EnergyDraw(number, ((self.material, row),), None) for number, row in enumerate(rows))
         return replace(like, draws=draws)
 
     def scaled(self, factor: float) -> Law:
@@ -69,41 +71,145 @@ def exact_law(ensemble: Ensemble) -> Law | None:
     """
     if any(draw.discrepancy is not None for draw in ensemble):
         return None
-    parts = list(parts_of(ensemble))
-    if all(isinstance(material, POLYNOMIALS) for material, _ in parts):
-        return _polynomial(parts)
-    terms = [_ogden_terms(material, values) for material, values in parts]
-    if all(each is not None for each in terms):
-        moduli, exponents = (np.hstack([each[k] for each in terms if each is not None]) for k in (0, 1))
+    summands = list(parts_of(ensemble))
+    if all(isinstance(material, POLYNOMIALS) for material, _ in summands):
+        return _polynomial(summands)
+    terms = [_ogden_terms(material, values) for material, values in summands]
+    if all(term is not None for term in terms):
+        moduli, exponents = (np.hstack([term[k] for term in terms if term is not None]) for k in (0, 1))
         return Law(Ogden(moduli.shape[1]), np.hstack([moduli, exponents]))
-    return Law(*parts[0]) if len(parts) == 1 else None
+    return Law(*summands[0]) if len(summands) == 1 else None
 
 
 def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:
     """Return the materials that draws are sums of, one by one, with their values (N, k)."""
-    for place, (material, _) in enumerate(ensemble[0].parts):
-        values = np.array([draw.parts[place][1] for draw in ensemble])
-        own = material.parts if isinstance(material, MaterialSum) else (material,)
-        ends = pairwise(accumulate((len(each.parameters) for each in own), initial=0))
-        yield from ((each, values[:, start:end]) for each, (start, end) in zip(own, ends, strict=True))
+    for index, (material, _) in enumerate(ensemble[0].parts):
+        values = np.array([draw.parts[index][1] for draw in ensemble])
+        materials = material.parts if isinstance(material, MaterialSum) else (material,)
+        ends = pairwise(accumulate((len(material.parameters) for material in materials), initial=0))
+        yield from ((material, values[:, start:end]) for material, (start, end) in zip(materials, ends, strict=True))
 
 
-def _polynomial(parts: list[tuple[Material, FloatArray]]) -> Law:
+def _polynomial(summands: list[tuple[Material, FloatArray]]) -> Law:
     """Return the sum of polynomials, its terms by their order and then by the power of I1 - 3, the highest first."""
-    found: dict[str, FloatArray] = {}
-    for material, values in parts:
+    coefficients: dict[str, FloatArray] = {}
+    for material, values in summands:
         for parameter, column in zip(material.parameters, values.T, strict=True):
-            found[parameter.symbol] = found.get(parameter.symbol, 0.0) + column
-    terms = sorted(found, key=lambda term: (int(term[1]) + int(term[2]), int(term[2])))
-    return Law(Rivlin(tuple(terms)), np.stack([found[term] for term in terms], axis=1))
+            coefficients[parameter.symbol] = coefficients.get(parameter.symbol, 0.0) + column
+    terms = sorted(coefficients, key=lambda term: (int(term[1]) + int(term[2]), int(term[2])))
+    return Law(Rivlin(tuple(terms)), np.stack([coefficients[term] for term in terms], axis=1))
 
 
 def _ogden_terms(material: Material, values: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Return moduli and exponents (N, n) of the Ogden terms that a material is, or None."""
     if isinstance(material, OGDEN):
-        first, second = np.split(values, 2, axis=1)
-        return first, second
+        moduli, exponents = np.split(values, 2, axis=1)
+        return moduli, exponents
     symbols = [parameter.symbol for parameter in material.parameters]
     if isinstance(material, POLYNOMIALS) and set(symbols) <= set(MOONEY):
         return 2 * values, np.broadcast_to([MOONEY[symbol] for symbol in symbols], values.shape)
     return None
+
+
+@dataclass(frozen=True)
+class Form(ABC):
+    """A law in the notation of a code.
+
+    Attributes
+    ----------
+    keyword : str
+        What the code calls it.
+    formula : str
+        The isochoric part of its energy, in the constants of its card.
+    """
+
+    keyword: str
+    formula: str
+
+    @abstractmethod
+    def holds(self, material: Material) -> bool:
+        """Return whether every energy of that material can be written so, exactly."""
+
+    @abstractmethod
+    def constants(self, material: Material, values: Sequence[float]) -> Constants:
+        """Return the constants of the card by the names that the code gives them, in their order."""
+
+
+@dataclass(frozen=True)
+class PolynomialForm(Form):
+    """A Rivlin polynomial with fixed places for its coefficients.
+
+    Parameters
+    ----------
+    symbols : tuple of str
+        The coefficients in the order of the card, as C10 and so on; those that the material has not are zero.
+    names : tuple of str
+        What the code calls them, where it is something else.
+    factor : float
+        The constants over the coefficients.
+    """
+
+    symbols: tuple[str, ...]
+    names: tuple[str, ...] = ()
+    factor: float = 1.0
+
+    def holds(self, material: Material) -> bool:
+        return isinstance(material, Rivlin) and set(material.terms) <= set(self.symbols)
+
+    def constants(self, material: Material, values: Sequence[float]) -> Constants:
+        coefficients = {parameter.symbol: value for parameter, value in zip(material.parameters, values, strict=True)}
+        numbers = (self.factor * coefficients.get(symbol, 0.0) for symbol in self.symbols)
+        return dict(zip(self.names or self.symbols, numbers, strict=True))
+
+
+@dataclass(frozen=True)
+class OgdenForm(Form):
+    """A sum of Ogden terms.
+
+    Parameters
+    ----------
+    min_terms, max_terms : int
+        Numbers of terms between which it is right.
+    modulus : callable
+        From mu and alpha as they are here (factors 2 mu/alpha^2), the code's own constant.
+    names : (str, str)
+        What the code calls the two constants of a term, before their number.
+    """
+
+    min_terms: int
+    max_terms: int
+    modulus: Callable[[float, float], float]
+    names: tuple[str, str] = ("mu", "alpha")
+
+    def holds(self, material: Material) -> bool:
+        return isinstance(material, Ogden) and self.min_terms <= material.terms <= self.max_terms
+
+    def constants(self, material: Material, values: Sequence[float]) -> Constants:
+        count = len(values) // 2
+        pairs = enumerate(zip(values[:count], values[count:], strict=True), start=1)
+        modulus_name, exponent_name = self.names
+        constants: Constants = {}
+        for number, (mu, alpha) in pairs:
+            constants |= {f"{modulus_name}{number}": self.modulus(mu, alpha), f"{exponent_name}{number}": alpha}
+        return constants
+
+
+@dataclass(frozen=True)
+class LibraryForm(Form):
+    """A law of the library that the code has, too, under its own constants.
+
+    Parameters
+    ----------
+    material : type of Material
+    convert : callable
+        From the material's values to the constants.
+    """
+
+    material: type[Material]
+    convert: Callable[..., Constants]
+
+    def holds(self, material: Material) -> bool:
+        return isinstance(material, self.material)
+
+    def constants(self, material: Material, values: Sequence[float]) -> Constants:
+        return self.convert(*values)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from tissuq.export.code import Card, FECode
-from tissuq.export.forms import OgdenForm, PolynomialForm
+from tissuq.export.laws import OgdenForm, PolynomialForm
 from tissuq.export.projection import OgdenFit, PolynomialFit
 
 __all__ = ["LSDyna"]
 
-MOST = 8
+MAX_OGDEN_TERMS = 8
 TERMS = ("C10", "C01", "C11", "C20", "C02", "C30")
 Row = list[tuple[str, Any]]
 KEYWORDS = {"MAT_077_H": "*MAT_HYPERELASTIC_RUBBER_TITLE", "MAT_077_O": "*MAT_OGDEN_RUBBER_TITLE"}
@@ -35,18 +35,18 @@ class LSDyna(FECode):
             "MAT_077_O",
             "sum of mu_i/alpha_i (l1^alpha_i + l2^alpha_i + l3^alpha_i - 3)",
             1,
-            MOST,
+            MAX_OGDEN_TERMS,
             lambda mu, alpha: 2 * mu / alpha,
         ),
     )
-    projections = PolynomialFit(TERMS), OgdenFit(MOST)
+    projections = PolynomialFit(TERMS), OgdenFit(MAX_OGDEN_TERMS)
 
     def text(self, card: Card) -> str:
         constants: Row = list(card.constants.items())
-        rows: list[Row] = [[("mid", "1"), ("ro", card.water), ("pr", card.poisson), ("n", "0"), ("nv", "0")]]
+        rows: list[Row] = [[("mid", "1"), ("ro", card.water_density), ("pr", card.poisson), ("n", "0"), ("nv", "0")]]
         if card.form.keyword == "MAT_077_O":
             rows += [constants[0::2], constants[1::2]]
-            rows[1:] = [row + [("", 0.0)] * (MOST - len(row)) for row in rows[1:]]
+            rows[1:] = [row + [("", 0.0)] * (MAX_OGDEN_TERMS - len(row)) for row in rows[1:]]
         else:
             rows.append(constants)
         lines = ["*KEYWORD", f"{KEYWORDS[card.form.keyword]} +", card.name]

@@ -11,13 +11,13 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.ensemble import Ensemble
 from tissuq.errors import InputError
 from tissuq.experiments.modes import SimpleShear
 from tissuq.export.laws import Law
-from tissuq.export.states import LEAST, SHEARS, SeenStates, initial_slope, moduli
+from tissuq.export.states import MIN_RELATIVE_STRESS, SHEARS, SeenStates, initial_slope, moduli
 from tissuq.mechanics import Material, stress_basis
-from tissuq.mechanics.materials import Ogden, Rivlin
+from tissuq.mechanics.laws import Ogden, Rivlin
+from tissuq.posterior.ensemble import Ensemble
 
 __all__ = [
     "MixtureFit",
@@ -33,14 +33,14 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 
 LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
-"""Steps of equal size among which Ogden's exponents are chosen."""
-FINE = tuple(step / 16 for step in range(-64, 65) if step)
-"""The same for a single term, which has no others to make up for a coarse step."""
+"""Multiples of one step among which Ogden's exponents are chosen."""
+SINGLE_TERM_LADDER = tuple(step / 16 for step in range(-64, 65) if step)
+"""The same for a single Ogden term, which needs a finer step."""
 REACHES = (2.0, 4.0, 8.0, 12.0)
 """The largest exponent of the ladder, times the largest logarithmic strain that was measured."""
-HIGHEST = 4
+MAX_ORDER = 4
 """Order of a polynomial of both invariants, beyond which terms cancel to their last digits at small strains."""
-HIGHEST_REDUCED = 6
+MAX_REDUCED_ORDER = 6
 """Order of a polynomial of I1, beyond which no code goes."""
 
 
@@ -52,13 +52,13 @@ class Candidate(NamedTuple):
     setting : tuple of float
     columns : (n, k) array
         Stresses in the states.
-    unit : (k,) array
+    unit_moduli : (k,) array
         Initial shear moduli.
     """
 
     setting: tuple[float, ...]
     columns: FloatArray
-    unit: FloatArray
+    unit_moduli: FloatArray
 
 
 @dataclass(frozen=True)
@@ -92,17 +92,17 @@ class Projection(ABC):
         """
         states = SeenStates(ensemble.most)
         stress, modulus = ensemble.stress(states, states.points), moduli(ensemble)
-        size = np.maximum(np.abs(stress), LEAST * np.abs(modulus)[:, None] * states.of_unit_modulus)
+        size = np.maximum(np.abs(stress), MIN_RELATIVE_STRESS * np.abs(modulus)[:, None] * states.of_unit_modulus)
         common = 1 / size.mean(axis=0)
 
-        def loss(each: Candidate) -> float:
-            found = _nearest(each, common, stress.T, modulus)
-            return float(((common[:, None] * (each.columns @ found - stress.T)) ** 2).sum())
+        def loss(candidate: Candidate) -> float:
+            coefficients = _nearest(candidate, common, stress.T, modulus)
+            return float(((common[:, None] * (candidate.columns @ coefficients - stress.T)) ** 2).sum())
 
         best = min(self.candidates(states), key=loss)
         rows = [
-            _nearest(best, 1 / own, one[:, None], np.array([each]))[:, 0]
-            for own, one, each in zip(size, stress, modulus, strict=True)
+            _nearest(best, 1 / draw_size, draw_stress[:, None], np.array([draw_modulus]))[:, 0]
+            for draw_size, draw_stress, draw_modulus in zip(size, stress, modulus, strict=True)
         ]
         return Law(self.material, np.hstack([np.array(rows), np.tile(best.setting, (len(rows), 1))]))
 
@@ -117,7 +117,7 @@ class PolynomialFit(Projection):
 
     @classmethod
     def of_order(cls, order: int) -> Self:
-        return cls(full_terms(_checked(order, HIGHEST, "a polynomial")))
+        return cls(full_terms(_checked(order, MAX_ORDER, "a polynomial")))
 
     @property
     def material(self) -> Material:
@@ -131,7 +131,7 @@ class ReducedFit(PolynomialFit):
 
     @classmethod
     def of_order(cls, order: int) -> Self:
-        return cls(reduced_terms(_checked(order, HIGHEST_REDUCED, "a reduced polynomial")))
+        return cls(reduced_terms(_checked(order, MAX_REDUCED_ORDER, "a reduced polynomial")))
 
 
 @dataclass(frozen=True)
@@ -164,16 +164,17 @@ class MixtureFit(Projection):
 
     @classmethod
     def of_order(cls, order: int) -> Self:
-        return cls(_checked(order, HIGHEST_REDUCED, "a mixture"))
+        return cls(_checked(order, MAX_REDUCED_ORDER, "a mixture"))
 
     @property
     def material(self) -> Material:
         return Rivlin(reduced_terms(self.terms)) + Ogden(self.terms)
 
     def candidates(self, states: SeenStates) -> Iterator[Candidate]:
-        columns, unit = _columns(Rivlin(reduced_terms(self.terms)), states, ())
-        for each in _on_ladders(self.terms, states):
-            yield Candidate(each.setting, np.hstack([columns, each.columns]), np.concatenate([unit, each.unit]))
+        polynomial, polynomial_moduli = _columns(Rivlin(reduced_terms(self.terms)), states, ())
+        for ogden in _on_ladders(self.terms, states):
+            unit_moduli = np.concatenate([polynomial_moduli, ogden.unit_moduli])
+            yield Candidate(ogden.setting, np.hstack([polynomial, ogden.columns]), unit_moduli)
 
 
 def projections() -> dict[str, type[Projection]]:
@@ -191,39 +192,39 @@ def reduced_terms(order: int) -> tuple[str, ...]:
     return tuple(f"C{power}0" for power in range(1, order + 1))
 
 
-def _checked(order: int, most: int, what: str) -> int:
-    if not 1 <= order <= most:
-        raise InputError(f"{what} has an order from 1 to {most}, not {order}.")
+def _checked(order: int, max_order: int, kind: str) -> int:
+    if not 1 <= order <= max_order:
+        raise InputError(f"{kind} has an order from 1 to {max_order}, not {order}.")
     return order
 
 
 def _on_ladders(terms: int, states: SeenStates) -> Iterator[Candidate]:
     """Return Ogden sums of so many terms, with all choices of exponents from each ladder."""
-    farthest = float(np.abs(np.log(states.base)).max())
-    ladder = np.array(FINE if terms == 1 else LADDER, dtype=np.float64)
+    max_log_strain = float(np.abs(np.log(states.base)).max())
+    ladder = np.array(SINGLE_TERM_LADDER if terms == 1 else LADDER, dtype=np.float64)
     for reach in REACHES:
-        exponents = reach / (ladder[-1] * farthest) * ladder
-        some = [_columns(Ogden(len(LADDER)), states, own) for own in exponents.reshape(-1, len(LADDER))]
-        columns, unit = np.hstack([own for own, _ in some]), np.concatenate([own for _, own in some])
-        for chosen in map(list, combinations(range(len(ladder)), terms)):
-            yield Candidate(tuple(exponents[chosen]), columns[:, chosen], unit[chosen])
+        exponents = reach / (ladder[-1] * max_log_strain) * ladder
+        blocks = [_columns(Ogden(len(LADDER)), states, block) for block in exponents.reshape(-1, len(LADDER))]
+        columns, unit_moduli = (np.concatenate(arrays, axis=-1) for arrays in zip(*blocks, strict=True))
+        for selection in map(list, combinations(range(len(ladder)), terms)):
+            yield Candidate(tuple(exponents[selection]), columns[:, selection], unit_moduli[selection])
 
 
 def _columns(material: Material, states: SeenStates, setting: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the stresses (n, k) and the initial shear moduli (k,), integers, of unit linear parameters."""
-    near = stress_basis(material, SimpleShear(), SHEARS, setting)
-    return stress_basis(material, states, states.points, setting), np.round(initial_slope(near), 4)
+    shear_stress = stress_basis(material, SimpleShear().at(SHEARS), setting)
+    return stress_basis(material, states.at(states.points), setting), np.round(initial_slope(shear_stress), 4)
 
 
 def _nearest(candidate: Candidate, weights: FloatArray, wanted: FloatArray, modulus: FloatArray) -> FloatArray:
     """Return the linear parameters (k, N) nearest to stresses (n, N) by weights (n,) that have these moduli (N,)."""
-    unit = candidate.unit
-    place = int(np.argmax(np.abs(unit)))
-    start = np.zeros((len(unit), len(modulus)))
-    start[place] = modulus / unit[place]
-    free = np.delete(np.eye(len(unit)), place, axis=1)
-    free[place] = -np.delete(unit, place) / unit[place]
+    unit_moduli = candidate.unit_moduli
+    pivot = int(np.argmax(np.abs(unit_moduli)))
+    start = np.zeros((len(unit_moduli), len(modulus)))
+    start[pivot] = modulus / unit_moduli[pivot]
+    free = np.delete(np.eye(len(unit_moduli)), pivot, axis=1)
+    free[pivot] = -np.delete(unit_moduli, pivot) / unit_moduli[pivot]
     columns = weights[:, None] * (candidate.columns @ free)
     size = np.abs(columns).max(axis=0, initial=0.0)
-    found = np.linalg.lstsq(columns / size, weights[:, None] * (wanted - candidate.columns @ start), rcond=1e-12)[0]
-    return np.asarray(start + free @ (found / size[:, None]))
+    solution = np.linalg.lstsq(columns / size, weights[:, None] * (wanted - candidate.columns @ start), rcond=1e-12)[0]
+    return np.asarray(start + free @ (solution / size[:, None]))

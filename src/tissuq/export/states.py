@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.stability import stable_draws
-from tissuq.ensemble import Ensemble
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, SimpleShear, loading_modes
 from tissuq.mechanics.arithmetic import exp, library
-from tissuq.mechanics.path import invariant_rates
+from tissuq.mechanics.invariants import invariant_rates
+from tissuq.posterior.ensemble import Ensemble
 
 __all__ = [
     "ANGLES",
@@ -32,16 +32,16 @@ FloatArray = NDArray[np.float64]
 ANGLES = (1.0, 15.0, 30.0, 45.0, 59.0)
 """Lode angles in degrees: from uniaxial tension, 0, by planar tension, 30, to equibiaxial tension, 60.
 
-At 0 and 60 two stretches are equal, and the difference of their stresses tells nothing; just beside, it tells the
+At 0 and 60 two stretches are equal, and the difference of their stresses carries no information; nearby it gives the
 stiffness against making them differ.
 """
-POINTS = 30
-"""Of a mode in equal steps; of a ray of states ever denser towards the end of what was measured, where fits are bad."""
-FARTHEST = 5.0
-"""Logarithmic strain beyond which no state is followed."""
+POINTS_PER_PATH = 30
+"""Points of a mode, in equal steps, and of a ray of states, denser towards the end of the measured range."""
+MAX_LOG_STRAIN = 5.0
+"""Largest logarithmic strain of a state."""
 PAIRS = np.array([[1.0, -1.0, 0.0], [1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
-LEAST = 0.01
-"""Of the stress of a neo-Hookean material with the same modulus: a stress that is smaller counts as this."""
+MIN_RELATIVE_STRESS = 0.01
+"""Smallest stress by which errors are divided, as a fraction of that of a neo-Hookean material of equal modulus."""
 SHEARS = np.array([1e-3, 2e-3])
 """Amounts of simple shear, from which the initial modulus follows."""
 
@@ -62,15 +62,15 @@ class SeenStates(Path):
         Lode angles, degrees.
     """
 
-    def __init__(self, most: tuple[float, float], angles: Sequence[float] = ANGLES) -> None:
-        rays = np.concatenate([_ray(most, np.radians(angle)) for angle in angles])
+    def __init__(self, max_invariants: tuple[float, float], angles: Sequence[float] = ANGLES) -> None:
+        rays = np.concatenate([_ray(max_invariants, np.radians(angle)) for angle in angles])
         self.stretches = rays
         self.base = np.tile(np.exp(rays.T), 3)
         self.direction = np.repeat(PAIRS.T, len(rays), axis=1)
 
     @cached_property
     def points(self) -> FloatArray:
-        """What its stresses are asked at: places among the states, three times, once for each difference."""
+        """Indices of the states, three times, once for each difference of stresses."""
         return np.arange(float(self.base.shape[1]))
 
     @cached_property
@@ -79,10 +79,10 @@ class SeenStates(Path):
         return np.asarray(np.abs((self.direction * self.base**2).sum(axis=0)))
 
     def moved(self, point: Any, step: Any) -> Deformation:
-        own, place = library(point), point.astype(int)
-        base, direction = own.asarray(self.base)[:, place], own.asarray(self.direction)[:, place]
-        first, second, third = base * exp(direction * step)
-        return Deformation.along_axes((first, second, third))
+        arrays, index = library(point), point.astype(int)
+        base, direction = arrays.asarray(self.base)[:, index], arrays.asarray(self.direction)[:, index]
+        l1, l2, l3 = base * exp(direction * step)
+        return Deformation.along_axes((l1, l2, l3))
 
 
 def curve_modes() -> list[LoadingMode]:
@@ -92,14 +92,14 @@ def curve_modes() -> list[LoadingMode]:
 
 def mode_stretches(low: float, high: float) -> FloatArray:
     """Return the stretches at which a mode is compared: in equal steps on either side of the reference, without it."""
-    ends = (np.linspace(1.0, end, POINTS + 1)[1:] for end in (low, high) if end != 1.0)
+    ends = (np.linspace(1.0, end, POINTS_PER_PATH + 1)[1:] for end in (low, high) if end != 1.0)
     return np.sort(np.concatenate([*ends]))
 
 
 def moduli(ensemble: Ensemble) -> FloatArray:
     """Return the initial shear moduli (N,) of draws, MPa, to which a discrepancy that is an energy adds nothing."""
-    alone = replace(ensemble, draws=tuple(replace(draw, discrepancy=None) for draw in ensemble))
-    return initial_slope(alone.stress(SimpleShear(), SHEARS).T)
+    without_discrepancy = replace(ensemble, draws=tuple(replace(draw, discrepancy=None) for draw in ensemble))
+    return initial_slope(without_discrepancy.stress(SimpleShear(), SHEARS).T)
 
 
 def initial_slope(stress: FloatArray) -> FloatArray:
@@ -108,41 +108,42 @@ def initial_slope(stress: FloatArray) -> FloatArray:
     return np.asarray((4 * near - far) / 3)
 
 
-def differences(found: Ensemble, wanted: Ensemble) -> dict[str, FloatArray]:
+def differences(draws: Ensemble, reference: Ensemble) -> dict[str, FloatArray]:
     """Return the relative differences of stresses, (N, n) each, by loading mode and in the ``states`` that were seen.
 
     A stress that is less than a hundredth of the neo-Hookean one with the draw's modulus counts as that.
     """
-    modulus, states = moduli(wanted)[:, None], SeenStates(wanted.most)
-    paths: dict[str, tuple[Path, FloatArray, FloatArray]] = {}
+    modulus, states = moduli(reference)[:, None], SeenStates(reference.most)
+    paths: dict[str, tuple[LoadingMode | Path, FloatArray, FloatArray]] = {}
     for mode in curve_modes():
-        stretch = mode_stretches(*wanted.ranges[mode.name])
-        paths[mode.name] = mode, stretch, np.abs(0.5 * invariant_rates(mode, stretch)[0])
+        stretch = mode_stretches(*reference.ranges[mode.name])
+        paths[mode.name] = mode, stretch, np.abs(0.5 * invariant_rates(mode.at(stretch))[0])
     paths["states"] = states, states.points, states.of_unit_modulus
-    apart = {}
+    relative = {}
     for name, (path, points, size) in paths.items():
-        truth = wanted.stress(path, points)
-        apart[name] = (found.stress(path, points) - truth) / np.maximum(np.abs(truth), LEAST * np.abs(modulus) * size)
-    return apart
+        truth = reference.stress(path, points)
+        floor = MIN_RELATIVE_STRESS * np.abs(modulus) * size
+        relative[name] = (draws.stress(path, points) - truth) / np.maximum(np.abs(truth), floor)
+    return relative
 
 
 def are_stable(ensemble: Ensemble) -> NDArray[np.bool_]:
     """Return whether draws (N,) are stable over the range that was measured, in every mode of one stretch."""
 
-    def curves_of(places: NDArray[np.intp]) -> Any:
-        some = replace(ensemble, draws=tuple(ensemble[int(place)] for place in places))
-        return lambda points, path: some.stress(path, points)
+    def curves_of(indices: NDArray[np.intp]) -> Any:
+        selected = replace(ensemble, draws=tuple(ensemble[int(index)] for index in indices))
+        return selected.stresses_at
 
     return stable_draws(curves_of, len(ensemble), ensemble.model.experiment, curve_modes())
 
 
-def _ray(most: tuple[float, float], angle: float) -> FloatArray:
+def _ray(max_invariants: tuple[float, float], angle: float) -> FloatArray:
     """Return the logarithmic strains (n, 3) of a Lode angle, to where an invariant is the largest that was measured."""
     direction = np.cos(angle - 2 * np.pi / 3 * np.array([0.0, 1.0, -1.0]))
-    low, high = 0.0, FARTHEST
+    low, high = 0.0, MAX_LOG_STRAIN
     for _ in range(60):
         middle = 0.5 * (low + high)
         logs = 2 * middle * direction
-        is_inside = np.expm1(logs).sum() <= most[0] and np.expm1(-logs).sum() <= most[1]
+        is_inside = np.expm1(logs).sum() <= max_invariants[0] and np.expm1(-logs).sum() <= max_invariants[1]
         low, high = (middle, high) if is_inside else (low, middle)
-    return np.outer(low * np.sin(np.linspace(0.0, np.pi / 2, POINTS + 1)[1:]), direction)
+    return np.outer(low * np.sin(np.linspace(0.0, np.pi / 2, POINTS_PER_PATH + 1)[1:]), direction)

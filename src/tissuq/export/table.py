@@ -7,10 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.ensemble import Ensemble
-from tissuq.export.cards import CardFormat, Cards, CardSettings
-from tissuq.export.heading import distances_from_median, draw_row, ensemble_lines, file_name, words_of
+from tissuq.export.cards import (
+    CardFormat,
+    Cards,
+    CardSettings,
+    distances_from_median,
+    draw_row,
+    ensemble_lines,
+    file_name,
+    words_of,
+)
 from tissuq.export.states import SeenStates, moduli
+from tissuq.posterior.ensemble import Ensemble
 
 __all__ = ["Table"]
 
@@ -39,13 +47,12 @@ class Table(CardFormat):
             f"stresses, W1 and W2 in {settings.unit}; W1 = dW/dI1, W2 = dW/dI2; incompressible; no projection",
         ]
         files, index = {}, []
-        for place, (own, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
-            name = file_name(ensemble, place, ".csv")
-            heading = [f"draw {place + 1} of {len(ensemble)}: {words_of(ensemble[place], settings)}", *common]
-            files[name] = _table(heading, _rows(states, stress[place]))
-            index.append(
-                {"file": name, **draw_row(ensemble[place], settings, float(own)), "from_median": float(distance)}
-            )
+        for draw_index, (modulus, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
+            name = file_name(ensemble, draw_index, ".csv")
+            heading = [f"draw {draw_index + 1} of {len(ensemble)}: {words_of(ensemble[draw_index], settings)}", *common]
+            files[name] = _table(heading, _rows(states, stress[draw_index]))
+            row = draw_row(ensemble[draw_index], settings, float(modulus))
+            index.append({"file": name, **row, "from_median": float(distance)})
         note = "The tables are exact: W1 and W2 of material and discrepancy at states whose invariants were measured."
         return Cards(files, tuple(index), (note,))
 
@@ -55,16 +62,14 @@ def _rows(states: SeenStates, stress: FloatArray) -> FloatArray:
     count = len(stress) // 3
     squares = states.base[:, :count].T ** 2
     of_12, of_13, of_23 = stress.reshape(3, count)
-    one, two, three = squares.T
-    sums = [0.5 * each / apart for each, apart in ((of_12, one - two), (of_13, one - three), (of_23, two - three))]
-    by_third, by_second, by_first = sums  # W1 + l_k^2 W2
-    second = np.where(
-        one - two > two - three, (by_first - by_second) / (one - two), (by_second - by_third) / (two - three)
-    )
-    first = by_second - two * second
+    square_1, square_2, square_3 = squares.T
+    gap_12, gap_13, gap_23 = square_1 - square_2, square_1 - square_3, square_2 - square_3
+    sum_3, sum_2, sum_1 = 0.5 * of_12 / gap_12, 0.5 * of_13 / gap_13, 0.5 * of_23 / gap_23  # W1 + l_k^2 W2
+    w2 = np.where(gap_12 > gap_23, (sum_1 - sum_2) / gap_12, (sum_2 - sum_3) / gap_23)
+    w1 = sum_2 - square_2 * w2
     angles = np.repeat(ANGLES, count // len(ANGLES))
     invariants = squares.sum(axis=1), (1 / squares).sum(axis=1)
-    return np.column_stack([angles, np.sqrt(squares), *invariants, first, second, of_13, of_23])
+    return np.column_stack([angles, np.sqrt(squares), *invariants, w1, w2, of_13, of_23])
 
 
 def _table(heading: Sequence[str], rows: FloatArray) -> str:

@@ -2,10 +2,9 @@
 
 from tissuq.finite_elements.case import Case, Mesh, Supports, cases
 from tissuq.finite_elements.clamped_bar import ClampedBar
-from tissuq.finite_elements.forces import bar_force, case_forces, indentation_force
 from tissuq.finite_elements.indentation import Indentation
 from tissuq.finite_elements.material import FElupeMaterial
-from tissuq.finite_elements.response import Response, respond
+from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond
 from tissuq.finite_elements.simulation import Failure, Simulation, simulate
 from tissuq.finite_elements.spread import Band, Shares, band_of, shares_of
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from math import inf
+from math import ceil, inf, log
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.registry import variants
 
-__all__ = ["AXIAL", "RADIAL", "Case", "Mesh", "Supports", "cases"]
+__all__ = ["AXIAL", "RADIAL", "Case", "Mesh", "Supports", "cases", "graded", "grid"]
 
 FloatArray = NDArray[np.float64]
 
@@ -63,6 +63,7 @@ class Case(ABC):
     Where a size is called ``fineness``, twice as much of it halves all cells.
     """
 
+    entry_point_group: ClassVar[str] = "tissuq.cases"
     name: ClassVar[str]
     description: ClassVar[str]
     travel_name: ClassVar[str]
@@ -95,3 +96,24 @@ class Case(ABC):
 def cases() -> dict[str, type[Case]]:
     """Return every case by name."""
     return variants(Case)
+
+
+def graded(length: float, smallest_cell: float, growth: float) -> FloatArray:
+    """Return places from 0 to a length whose distances grow from about the smallest one, each by the same factor.
+
+    Examples
+    --------
+    >>> graded(7.0, 1.0, 2.0).tolist()
+    [0.0, 1.0, 3.0, 7.0]
+    """
+    count = max(1, ceil(log(1 + length / smallest_cell * (growth - 1)) / log(growth) - 1e-9))
+    fractions = (growth ** np.arange(count + 1) - 1) / (growth**count - 1)
+    return np.asarray(length * fractions)
+
+
+def grid(axial: FloatArray, radial: FloatArray) -> Mesh:
+    """Return the mesh of all pairs of places along the axis and distances from it."""
+    points = np.stack(np.meshgrid(axial, radial, indexing="ij"), axis=-1).reshape(-1, 2)
+    number = np.arange(len(points)).reshape(len(axial), len(radial))
+    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    return Mesh(points, np.stack([corner.ravel() for corner in corners], axis=-1))

@@ -8,15 +8,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports
-from tissuq.finite_elements.grading import graded, grid
+from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports, graded, grid
 
 __all__ = ["ClampedBar"]
 
 FloatArray = NDArray[np.float64]
 
-SMALLEST, GROWTH = 0.04, 1.4
-"""Of the cells at the clamp's rim with fineness 1: their size in radii, and how much larger each next one is."""
+SMALLEST_CELL, GROWTH = 0.04, 1.4
+"""Size of the cells at the clamp's rim with fineness 1, in radii, and ratio of the sizes of neighbouring cells."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class ClampedBar(Case):
     Attributes
     ----------
     elongation, bar_length, bar_radius : float
-        In mm, of the whole bar.
+        Sizes of the whole bar, mm.
     fineness : float
         Twice as fine halves all cells.
     """
@@ -45,16 +44,16 @@ class ClampedBar(Case):
         return self.elongation
 
     def mesh(self) -> Mesh:
-        smallest, growth = self.bar_radius * SMALLEST / self.fineness, GROWTH ** (1 / self.fineness)
+        smallest_cell, growth = self.bar_radius * SMALLEST_CELL / self.fineness, GROWTH ** (1 / self.fineness)
         half = self.bar_length / 2
         axial, radial = (
-            half - graded(half, smallest, growth)[::-1],
-            self.bar_radius - graded(self.bar_radius, smallest, growth)[::-1],
+            half - graded(half, smallest_cell, growth)[::-1],
+            self.bar_radius - graded(self.bar_radius, smallest_cell, growth)[::-1],
         )
         return grid(axial, radial)
 
     def supports(self, points: FloatArray) -> Supports:
         axial, radial = points[:, AXIAL], points[:, RADIAL]
-        near = 1e-9 * self.bar_length
-        middle, clamp = axial < near, axial > self.bar_length / 2 - near
-        return Supports(np.stack([middle, clamp | (radial < near)], axis=-1), clamp, 0.5)
+        tolerance = 1e-9 * self.bar_length
+        middle, clamp = axial < tolerance, axial > self.bar_length / 2 - tolerance
+        return Supports(np.stack([middle, clamp | (radial < tolerance)], axis=-1), clamp, 0.5)

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports
-from tissuq.finite_elements.grading import graded, grid
+from tissuq.finite_elements.case import AXIAL, RADIAL, Case, Mesh, Supports, graded, grid
 
 __all__ = ["Indentation"]
 
@@ -18,8 +17,8 @@ FloatArray = NDArray[np.float64]
 
 Contact = Literal["bonded", "frictionless"]
 
-SMALLEST, GROWTH = 0.05, 1.3
-"""Of the cells at the punch's edge with fineness 1: their size in punch radii, and how much larger each next one is."""
+SMALLEST_CELL, GROWTH = 0.05, 1.3
+"""Size of the cells at the punch's edge with fineness 1, in punch radii, and ratio of neighbouring cells' sizes."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Indentation(Case):
     Attributes
     ----------
     depth, punch_radius, height, radius : float
-        In mm. The usual ones are those of tests of brain slices: a punch 1.5 mm wide, a slice 5 mm thick.
+        Sizes in mm. Defaults are those of tests of brain slices: a punch 1.5 mm wide, a slice 5 mm thick.
     contact : str
         ``"bonded"`` or ``"frictionless"``.
     fineness : float
@@ -54,8 +53,8 @@ class Indentation(Case):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.contact not in get_args(Contact):
-            known = " or ".join(get_args(Contact))
-            raise InputError(f"case '{self.name}': contact must be {known}, not {self.contact!r}.")
+            contacts = " or ".join(get_args(Contact))
+            raise InputError(f"case '{self.name}': contact must be {contacts}, not {self.contact!r}.")
         if self.depth >= self.height or self.punch_radius >= self.radius:
             raise InputError(
                 f"case '{self.name}': the depth ({self.depth:g} mm) must be less than the height ({self.height:g} mm), "
@@ -67,20 +66,20 @@ class Indentation(Case):
         return self.depth
 
     def mesh(self) -> Mesh:
-        a, smallest, growth = (
+        a, smallest_cell, growth = (
             self.punch_radius,
-            self.punch_radius * SMALLEST / self.fineness,
+            self.punch_radius * SMALLEST_CELL / self.fineness,
             GROWTH ** (1 / self.fineness),
         )
-        inside, outside = graded(a, smallest, growth), graded(self.radius - a, smallest, growth)
+        inside, outside = graded(a, smallest_cell, growth), graded(self.radius - a, smallest_cell, growth)
         radial = np.concatenate([a - inside[::-1], a + outside[1:]])
-        return grid(self.height - graded(self.height, smallest, growth)[::-1], radial)
+        return grid(self.height - graded(self.height, smallest_cell, growth)[::-1], radial)
 
     def supports(self, points: FloatArray) -> Supports:
         axial, radial = points[:, AXIAL], points[:, RADIAL]
-        near = 1e-9 * self.radius
-        base = axial < near
-        punch = (axial > self.height - near) & (radial < self.punch_radius + near)
+        tolerance = 1e-9 * self.radius
+        base = axial < tolerance
+        punch = (axial > self.height - tolerance) & (radial < self.punch_radius + tolerance)
         sticks = punch & (self.contact == "bonded")
-        fixed = np.stack([base, base | (radial < near) | sticks], axis=-1)
+        fixed = np.stack([base, base | (radial < tolerance) | sticks], axis=-1)
         return Supports(fixed, punch, -1.0)

@@ -1,19 +1,31 @@
-"""A draw of a posterior, or any isotropic material with values, as a material of FElupe."""
+"""A draw of a posterior, or an isotropic material with values, as a material of FElupe: energy, stress and tangent."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.errors import InputError
-from tissuq.finite_elements.distortional import distortional_energy
-from tissuq.finite_elements.tensors import first_piola_kirchhoff, tangent, volumetric_stress, volumetric_tangent
+from tissuq.errors import InputError, ModelError
 from tissuq.mechanics import Material
+from tissuq.mechanics.pieces import PiecewiseEnergy
+from tissuq.mechanics.stress import differentiator
+from tissuq.posterior.ensemble import EnergyDraw
 
-__all__ = ["FElupeMaterial"]
+__all__ = [
+    "DistortionalEnergy",
+    "FElupeMaterial",
+    "distortional_energy",
+    "first_piola_kirchhoff",
+    "principal",
+    "tangent",
+    "volumetric_stress",
+    "volumetric_tangent",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -67,28 +79,196 @@ class FElupeMaterial:
     def gradient(self, x: Sequence[Any]) -> list[Any]:
         """Return [P, state variables], the first Piola-Kirchhoff stress (3, 3, ...) at [F, state variables]."""
         F, shape = _points(x[0])
-        found = first_piola_kirchhoff(self.energy.slopes, F)
+        stress = first_piola_kirchhoff(self.energy.slopes, F)
         if self.bulk_modulus:
-            found += volumetric_stress(self.bulk_modulus, F)
-        return [(found / self.unit).reshape(3, 3, *shape), x[-1]]
+            stress += volumetric_stress(self.bulk_modulus, F)
+        return [(stress / self.unit).reshape(3, 3, *shape), x[-1]]
 
     def hessian(self, x: Sequence[Any]) -> list[Any]:
         """Return [dP/dF], (3, 3, 3, 3, ...), at [F, state variables]."""
         F, shape = _points(x[0])
-        found = tangent(self.energy.derivatives, F)
+        tangents = tangent(self.energy.derivatives, F)
         if self.bulk_modulus:
-            found += volumetric_tangent(self.bulk_modulus, F)
-        return [(found / self.unit).reshape(3, 3, 3, 3, *shape)]
+            tangents += volumetric_tangent(self.bulk_modulus, F)
+        return [(tangents / self.unit).reshape(3, 3, 3, 3, *shape)]
 
     def function(self, x: Sequence[Any]) -> list[Any]:
         """Return [W], the energy (...) at [F, state variables]."""
         F, shape = _points(x[0])
         stretches = np.asarray(np.linalg.svd(np.moveaxis(F, -1, 0), compute_uv=False).T, dtype=np.float64)
-        found = self.energy(stretches) + self.bulk_modulus / 2 * (stretches.prod(axis=0) - 1) ** 2
-        return [(found / self.unit).reshape(shape)]
+        energy = self.energy(stretches) + self.bulk_modulus / 2 * (stretches.prod(axis=0) - 1) ** 2
+        return [(energy / self.unit).reshape(shape)]
 
 
 def _points(F: Any) -> tuple[FloatArray, tuple[int, ...]]:
     """Return gradients (3, 3, n) and the shape of what n counts."""
-    given = np.asarray(F, dtype=np.float64)
-    return given.reshape(3, 3, -1), given.shape[2:]
+    gradients = np.asarray(F, dtype=np.float64)
+    return gradients.reshape(3, 3, -1), gradients.shape[2:]
+
+
+Slopes = Callable[[FloatArray], FloatArray]
+Derivatives = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+EQUAL_STRETCH_TOLERANCE = 1e-5
+"""Relative difference of stretches below which a quotient of differences gives way to its limit: both have errors of
+about 1e-10 there, the quotient that of rounding and the limit that of its next term."""
+
+
+def principal(F: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the principal stretches (3, n) of gradients (3, 3, n), and their axes n_i and N_i as columns (n, 3, 3).
+
+    They are not numbers where the volume is not positive, so that a solver sees that a step was too large.
+    """
+    matrices = np.moveaxis(F, -1, 0)
+    squares, material_axes = np.linalg.eigh(np.swapaxes(matrices, 1, 2) @ matrices)
+    with np.errstate(invalid="ignore"):
+        stretches = np.where(np.linalg.det(matrices)[:, None] > 0, np.sqrt(squares), np.nan)
+    return stretches.T, matrices @ material_axes / stretches[:, None, :], material_axes
+
+
+def first_piola_kirchhoff(slopes: Slopes, F: FloatArray) -> FloatArray:
+    """Return P = sum_i w_i n_i x N_i, (3, 3, n), with w_i = dW/dl_i."""
+    stretches, spatial_axes, material_axes = principal(F)
+    stress = (spatial_axes * slopes(stretches).T[:, None, :]) @ np.swapaxes(material_axes, 1, 2)
+    return np.moveaxis(stress, 0, -1)
+
+
+def tangent(derivatives: Derivatives, F: FloatArray) -> FloatArray:
+    """Return dP/dF, (3, 3, 3, 3, n).
+
+    In the principal axes it has the components A_iijj = d2W/dl_i dl_j and, for i not j, A_ijij = (a + b) / 2 and
+    A_ijji = (a - b) / 2, where a = (w_i - w_j) / (l_i - l_j), which becomes d2W/dl_i dl_i - d2W/dl_i dl_j for equal
+    stretches, and b = (w_i + w_j) / (l_i + l_j).
+
+    References
+    ----------
+    Ogden (1997), Non-linear elastic deformations, section 6.1.4.
+    """
+    stretches, spatial_axes, material_axes = principal(F)
+    slopes, curvature = derivatives(stretches)
+    components = np.zeros((3, 3, 3, 3, F.shape[-1]))
+    for i in range(3):
+        components[i, i, i, i] = curvature[i, i]
+        for j in range(i):
+            a = _quotient(stretches[[i, j]], slopes[[i, j]], curvature[[i, j]][:, [i, j]])
+            b = (slopes[i] + slopes[j]) / (stretches[i] + stretches[j])
+            components[i, i, j, j] = components[j, j, i, i] = curvature[i, j]
+            components[i, j, i, j] = components[j, i, j, i] = (a + b) / 2
+            components[i, j, j, i] = components[j, i, i, j] = (a - b) / 2
+    axes = np.einsum("nai,nbj->nabij", spatial_axes, material_axes).reshape(-1, 9, 9)
+    full = axes @ np.moveaxis(components.reshape(9, 9, -1), -1, 0) @ np.swapaxes(axes, 1, 2)
+    return np.asarray(np.moveaxis(full, 0, -1).reshape(components.shape))
+
+
+def _quotient(stretches: FloatArray, slopes: FloatArray, curvature: FloatArray) -> FloatArray:
+    """Return (w_i - w_j) / (l_i - l_j), and its limit where the stretches are nearly equal."""
+    difference = stretches[0] - stretches[1]
+    is_near = np.abs(difference) < EQUAL_STRETCH_TOLERANCE * stretches[0]
+    limit = (curvature[0, 0] + curvature[1, 1] - 2 * curvature[0, 1]) / 2
+    return np.asarray(np.where(is_near, limit, (slopes[0] - slopes[1]) / np.where(is_near, 1.0, difference)))
+
+
+def volumetric_stress(bulk: float, F: FloatArray) -> FloatArray:
+    """Return the stress K (J - 1) J F^-T of K/2 (J - 1)^2."""
+    J, inverse = _volume(F)
+    return np.asarray(bulk * (J - 1) * J * inverse)
+
+
+def volumetric_tangent(bulk: float, F: FloatArray) -> FloatArray:
+    """Return K J ((2 J - 1) F^-T x F^-T - (J - 1) F^-T (il) F^-T), the tangent of K/2 (J - 1)^2."""
+    J, inverse = _volume(F)
+    outer = np.einsum("ijn,kln->ijkln", inverse, inverse)
+    return np.asarray(bulk * J * ((2 * J - 1) * outer - (J - 1) * np.swapaxes(outer, 1, 3)))
+
+
+def _volume(F: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return J (n,) and F^-T (3, 3, n)."""
+    matrices = np.moveaxis(F, -1, 0)
+    return np.linalg.det(matrices), np.moveaxis(np.swapaxes(np.linalg.inv(matrices), 1, 2), 0, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class DistortionalEnergy:
+    """W(J^(-1/3) l1, J^(-1/3) l2, J^(-1/3) l3) of an isotropic material, J = l1 l2 l3.
+
+    The compiled derivatives serve all draws of a posterior, because the parameters are arguments.
+
+    Attributes
+    ----------
+    materials : tuple of Material
+        Materials whose energies are added.
+    values : tuple of tuple of float
+        The parameters of each material.
+    discrepancy : PiecewiseEnergy or None
+        Energy of the discrepancy.
+    """
+
+    materials: tuple[Material, ...]
+    values: tuple[tuple[float, ...], ...]
+    discrepancy: PiecewiseEnergy | None = None
+
+    def slopes(self, stretches: FloatArray) -> FloatArray:
+        """Return the gradient (3, n), MPa, at principal stretches (3, n)."""
+        return np.asarray(_compiled(self.materials)[0](self.values, self.discrepancy, stretches))
+
+    def derivatives(self, stretches: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the gradient (3, n) and the Hessian (3, 3, n), MPa, at principal stretches (3, n)."""
+        gradient, hessian = _compiled(self.materials)[1](self.values, self.discrepancy, stretches)
+        return np.asarray(gradient), np.asarray(hessian)
+
+    def __call__(self, stretches: FloatArray) -> FloatArray:
+        """Return the energy (n,), MPa, at principal stretches (3, n)."""
+        isochoric = tuple(np.asarray(stretches) / np.prod(stretches, axis=0) ** (1 / 3))
+        terms = zip(self.materials, self.values, strict=True)
+        energy = sum(material.energy(isochoric, numbers) for material, numbers in terms)
+        return np.asarray(energy if self.discrepancy is None else energy + self.discrepancy(isochoric))
+
+    @property
+    def initial_shear_modulus(self) -> float:
+        """Half of what the energy's second derivative along l1 - l2 is at the reference, in MPa."""
+        _, hessian = self.derivatives(np.ones((3, 1)))
+        return float(hessian[0, 0, 0] - hessian[0, 1, 0]) / 2
+
+
+def distortional_energy(material: Material, values: ArrayLike | None = None) -> DistortionalEnergy:
+    """Return the energy of a draw of an ensemble, or of a material with values of its parameters.
+
+    Raises
+    ------
+    ModelError
+        When the material has fibres, or there is not one value for each parameter.
+    """
+    if isinstance(material, EnergyDraw):
+        kinds, numbers = zip(*material.parts, strict=True)
+        return DistortionalEnergy(kinds, numbers, material.discrepancy)
+    if not material.is_isotropic:
+        raise ModelError(
+            f"material '{material.name}' has fibres; finite elements are available for isotropic materials only, which "
+            "depend on the principal stretches alone."
+        )
+    parameter_values = tuple(map(float, np.atleast_1d(np.asarray([] if values is None else values, dtype=np.float64))))
+    if len(parameter_values) != len(material.parameters):
+        symbols = ", ".join(parameter.symbol for parameter in material.parameters)
+        raise ModelError(
+            f"material '{material.name}' needs one value for each of {symbols}, and was given {parameter_values}."
+        )
+    return DistortionalEnergy((material,), (parameter_values,))
+
+
+@lru_cache(maxsize=64)
+def _compiled(materials: tuple[Material, ...]) -> tuple[Any, Any]:
+    """Return two compiled functions of numbers and stretches (3, n): the gradients, and these with the Hessians."""
+    jax = differentiator()
+
+    def energy(point: Any, values: Sequence[Sequence[Any]], discrepancy: PiecewiseEnergy | None) -> Any:
+        isochoric = tuple(point / (point[0] * point[1] * point[2]) ** (1 / 3))
+        total = sum(material.energy(isochoric, numbers) for material, numbers in zip(materials, values, strict=True))
+        return total if discrepancy is None else total + discrepancy(isochoric)
+
+    slopes, curvature = jax.grad(energy), jax.hessian(energy)
+    gradients = jax.vmap(slopes, (1, None, None), -1)
+    joint = jax.vmap(lambda *arguments: (slopes(*arguments), curvature(*arguments)), (1, None, None), (-1, -1))
+    return tuple(
+        jax.jit(lambda values, discrepancy, stretches, batched=batched: batched(stretches, values, discrepancy))
+        for batched in (gradients, joint)
+    )

@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.errors import ModelError
+from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.case import AXIAL, Case
 from tissuq.finite_elements.material import FElupeMaterial
-from tissuq.finite_elements.optional import felupe
 from tissuq.mechanics import Material
 
-__all__ = ["CellFields", "Solver"]
+__all__ = ["CellFields", "Solver", "felupe"]
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, FloatArray, FloatArray]
 
-HALVINGS = 6
-"""How often a load step is halved before a material is given up."""
+MAX_HALVINGS = 6
+"""Largest number of halvings of a load step."""
 TOLERANCE = 1e-8
-"""Of the residual, relative to the reaction forces."""
-ROUNDED = 1e-6
-"""The same, where rounding keeps it from becoming smaller: of a small load on a nearly incompressible body."""
-ITERATIONS = 20
-SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-"""Of a Newton step, the largest of which is taken that is not too bad."""
-GROWN = 1.5
-"""How much larger the residual may become in a step: on the way to a solution it need not always fall."""
+"""Largest residual of an equilibrium, relative to the reaction forces."""
+ROUNDING_TOLERANCE = 1e-6
+"""The same where rounding keeps the residual from falling further: small loads on a nearly incompressible body."""
+MAX_ITERATIONS = 20
+STEP_FRACTIONS = (1.0, 0.5, 0.25, 0.125, 0.0625)
+"""Fractions of a Newton step; the largest that keeps the residual within its limit is taken."""
+MAX_RESIDUAL_GROWTH = 1.5
+"""Largest factor by which the residual may grow in a step: on the way to a solution it need not always fall."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class CellFields:
     Attributes
     ----------
     displacement : (n, 2) array, mm
-        Of the points, along the axis and from it.
-    first, second : (c,) array
+        Displacements of the points, along the axis and from it.
+    first_invariant, second_invariant : (c,) array
         I1 - 3 and I2 - 3 of the distortion.
     largest : (c,) array
         The largest principal stretch.
@@ -49,8 +49,8 @@ class CellFields:
     """
 
     displacement: FloatArray
-    first: FloatArray
-    second: FloatArray
+    first_invariant: FloatArray
+    second_invariant: FloatArray
     largest: FloatArray
     von_mises: FloatArray
 
@@ -90,14 +90,14 @@ class Solver:
         return self._path[-1][0]
 
     def advance(self, target: float) -> str:
-        """Go on to a travel in as many load steps as it needs, or say why this is not possible."""
-        whole = step = target - self.reached
+        """Advance to a travel in as many load steps as needed; return the reason if this fails, else an empty text."""
+        full_step = step = target - self.reached
         while self.reached < target:
-            goal = min(self.reached + step, target) if step < whole else target
+            goal = min(self.reached + step, target) if step < full_step else target
             problem = self._attempt(goal)
             if not problem:
                 continue
-            if step <= whole / 2**HALVINGS:
+            if step <= full_step / 2**MAX_HALVINGS:
                 return f"{problem}, also with load steps of {step:.2g} mm"
             step /= 2
         return ""
@@ -114,23 +114,24 @@ class Solver:
         F, J, squares = self._strains()
         cauchy = np.einsum("ijqc,kjqc->ikqc", self._solid.results.stress[0], F) / J * self._modulus
         deviator = cauchy - np.einsum("iiqc->qc", cauchy) / 3 * np.eye(3)[:, :, None, None]
-        found = (
+        values = (
             squares.sum(axis=-1) - 3,
             (1 / squares).sum(axis=-1) - 3,
             np.sqrt(squares.max(axis=-1)) * J ** (1 / 3),
             np.sqrt(1.5 * (deviator**2).sum(axis=(0, 1))),
         )
         weights = self._volumes / self._volumes.sum(axis=0)
-        return CellFields(u.copy(), *((each * weights).sum(axis=0) for each in found))
+        return CellFields(u.copy(), *((value * weights).sum(axis=0) for value in values))
 
-    def shares_beyond(self, most: tuple[float, float]) -> tuple[float, float]:
+    def shares_beyond(self, max_invariants: tuple[float, float]) -> tuple[float, float]:
         """Return the shares of volume and of strain energy where I1 - 3 or I2 - 3 is beyond the given ones."""
         self._residual(self._path[-1][1])
         F, _, squares = self._strains()
-        is_beyond = (squares.sum(axis=-1) - 3 > most[0]) | ((1 / squares).sum(axis=-1) - 3 > most[1])
+        max_1, max_2 = max_invariants
+        is_beyond = (squares.sum(axis=-1) - 3 > max_1) | ((1 / squares).sum(axis=-1) - 3 > max_2)
         energies = self._umat.function([F, None])[0] * self._volumes
-        shares = (float((each * is_beyond).sum() / each.sum()) for each in (self._volumes, energies))
-        return next(shares), next(shares)
+        fractions = (float((weights * is_beyond).sum() / weights.sum()) for weights in (self._volumes, energies))
+        return next(fractions), next(fractions)
 
     def _strains(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return F (3, 3, q, c), J (q, c), and the squared principal stretches (q, c, 3) of the distortion."""
@@ -142,82 +143,83 @@ class Solver:
     def _attempt(self, goal: float) -> str:
         """Add the equilibrium at a travel to the path, from the last one or from where the last two point."""
         state, problem = self._state(), ""
-        for guess in (self._path[-1][1], self._further(goal)):
-            found, problem = self._equilibrium(guess, goal)
-            if found is not None:
-                self._path = [self._path[-1], (goal, found)]
+        for guess in (self._path[-1][1], self._extrapolated(goal)):
+            displacement, problem = self._equilibrium(guess, goal)
+            if displacement is not None:
+                self._path = [self._path[-1], (goal, displacement)]
                 return ""
             self._restore(state)
         return problem
 
-    def _further(self, goal: float) -> FloatArray:
+    def _extrapolated(self, goal: float) -> FloatArray:
         """Return displacements on the straight line through the last two equilibria."""
-        now, u = self._path[-1]
-        before, earlier = self._path[0]
-        return u if now == before else np.asarray(u + (u - earlier) * (goal - now) / (now - before))
+        travel, u = self._path[-1]
+        travel_0, u_0 = self._path[0]
+        return u if travel == travel_0 else np.asarray(u + (u - u_0) * (goal - travel) / (travel - travel_0))
 
     def _equilibrium(self, guess: FloatArray, travel: float) -> tuple[FloatArray | None, str]:
-        """Return displacements in equilibrium, or why there are none found."""
+        """Return displacements in equilibrium, or the reason why Newton's method found none."""
         from scipy.sparse.linalg import spsolve
 
-        u, residual, given = guess, self._residual(guess), self._rate * travel
+        u, residual, prescribed = guess, self._residual(guess), self._rate * travel
         moved = self._rate != 0
-        shares: Sequence[float] = SHARES if np.allclose(u[moved], given[moved]) else SHARES[:1]  # all the way at first
-        for _ in range(ITERATIONS):
+        fractions: Sequence[float] = STEP_FRACTIONS
+        if not np.allclose(u[moved], prescribed[moved]):
+            fractions = STEP_FRACTIONS[:1]  # the first iteration imposes all of the prescribed displacement
+        for _ in range(MAX_ITERATIONS):
             if not np.isfinite(residual).all():
                 return None, "cells turned inside out"
             tangent = self._solid.assemble.matrix().tocsr()[self._free]
             change = np.zeros(u.size)
-            change[self._held] = (given - u).ravel()[self._held]
+            change[self._held] = (prescribed - u).ravel()[self._held]
             right = -residual[self._free] - tangent[:, self._held] @ change[self._held]
             change[self._free] = spsolve(tangent[:, self._free].tocsc(), right)
             self.iterations += 1
-            before = residual
-            u, residual = self._step(u, residual, change.reshape(u.shape), shares)
-            shares = SHARES
-            if self._is_balanced(residual, before):
+            previous = residual
+            u, residual = self._step(u, residual, change.reshape(u.shape), fractions)
+            fractions = STEP_FRACTIONS
+            if self._is_balanced(residual, previous):
                 return u, ""
-        return None, f"Newton's method did not converge in {ITERATIONS} iterations"
+        return None, f"Newton's method did not converge in {MAX_ITERATIONS} iterations"
 
-    def _is_balanced(self, residual: FloatArray, before: FloatArray) -> bool:
+    def _is_balanced(self, residual: FloatArray, previous: FloatArray) -> bool:
         """Whether a residual is small, or nearly so and, by rounding, no smaller than the one before."""
-        free, held, last = (
-            float(np.linalg.norm(each)) for each in (residual[self._free], residual[self._held], before[self._free])
-        )
-        return free < TOLERANCE * held or last / 2 < free < ROUNDED * held
+        forces = residual[self._free], residual[self._held], previous[self._free]
+        free, held, previous_free = (float(np.linalg.norm(values)) for values in forces)
+        return free < TOLERANCE * held or previous_free / 2 < free < ROUNDING_TOLERANCE * held
 
     def _step(
-        self, u: FloatArray, residual: FloatArray, change: FloatArray, shares: Sequence[float]
+        self, u: FloatArray, residual: FloatArray, change: FloatArray, fractions: Sequence[float]
     ) -> tuple[FloatArray, FloatArray]:
-        """Return displacements and residual after the largest share of a change that is not too bad, or the least."""
-        state, limit = self._state(), GROWN * np.linalg.norm(residual[self._free])
-        for share in shares:
+        """Return displacements and residual after the largest fraction of a change that is within the limit."""
+        state, limit = self._state(), MAX_RESIDUAL_GROWTH * np.linalg.norm(residual[self._free])
+        for share in fractions:
             self._restore(state)
             tried = u + share * change
-            found = self._residual(tried)
-            if np.linalg.norm(found[self._free]) < limit:
+            tried_residual = self._residual(tried)
+            if np.linalg.norm(tried_residual[self._free]) < limit:
                 break
-        return tried, found
+        return tried, tried_residual
 
     def _residual(self, u: FloatArray) -> FloatArray:
         """Return the internal forces of displacements (n, 2), (2 n,), in initial shear moduli times mm^2."""
         self._field[0].values[:] = u
         try:
-            found = self._solid.assemble.vector(self._field).toarray()
+            internal = self._solid.assemble.vector(self._field).toarray()
         except np.linalg.LinAlgError:
             return np.full(u.size, np.nan)
-        return np.asarray(found[:, 0])
+        return np.asarray(internal[:, 0])
 
     def _state(self) -> State:
         """Return displacements, pressures and volumes, which Newton's method changes together."""
         state = self._solid.results.state
         return state.u.copy(), state.p.copy(), state.J.copy()
 
-    def _restore(self, kept: State) -> None:
+    def _restore(self, saved: State) -> None:
         """Go back to an earlier state: a step that failed leaves nothing behind that is not a number."""
         state = self._solid.results.state
-        self._field[0].values[:] = kept[0]
-        state.u[:], state.p[:], state.J[:] = kept
+        self._field[0].values[:] = saved[0]
+        state.u[:], state.p[:], state.J[:] = saved
         state.F = self._field.extract()
 
 
@@ -229,3 +231,20 @@ def _stiffness(material: Material, modulus: float) -> float:
             "positive one."
         )
     return modulus
+
+
+def felupe() -> Any:
+    """Return FElupe, imported when it is first needed.
+
+    Raises
+    ------
+    InputError
+        When it is not installed.
+    """
+    try:
+        import felupe as library
+    except ImportError as error:
+        raise InputError(
+            "finite elements need FElupe: install tissuq with its extra 'fe' (pip install 'tissuq[fe]')."
+        ) from error
+    return library

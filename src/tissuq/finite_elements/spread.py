@@ -4,24 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 
-__all__ = ["PROBABILITY", "Band", "Shares", "band_of", "held_probability", "shares_of", "standard_errors"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "PROBABILITY",
+    "Band",
+    "Shares",
+    "band_of",
+    "band_probability",
+    "force_table",
+    "shares_of",
+    "standard_errors",
+]
 
 FloatArray = NDArray[np.float64]
 
 PROBABILITY = 0.95
-RESAMPLES = 400
-"""Of the draws, with replacement, for the errors."""
+BOOTSTRAP_RESAMPLES = 400
+"""Number of bootstrap resamples of the draws for standard errors."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """Over draws, one value a step: arrays (s,)."""
+    """Mean, sd and interval of draws at every step: arrays (s,)."""
 
     mean: FloatArray
     sd: FloatArray
@@ -31,16 +44,16 @@ class Band:
 
 @dataclass(frozen=True)
 class Shares:
-    """Of the variance of a new measurement; they add up to one, and single ones can be negative or above one.
+    """Shares of the variance of a new measurement; they add up to one, and a single one can be negative or above one.
 
     With Q a draw's quantity and Q0 that of its parameters alone, Var Q = Cov(Q, Q0) + Cov(Q, Q - Q0): the parameters'
-    part and the discrepancy's. A negative one says that the two compensate each other in the posterior.
+    part and the discrepancy's. A negative one means that the two compensate each other in the posterior.
 
     Attributes
     ----------
     parameters, discrepancy, noise : (s,) arrays
     correlation : (s,) array
-        Of Q0 and Q - Q0; not a number without discrepancy.
+        Correlation of Q0 and Q - Q0; not a number without discrepancy.
 
     References
     ----------
@@ -53,19 +66,19 @@ class Shares:
     correlation: FloatArray
 
 
-def held_probability(draws: int) -> float:
+def band_probability(draws: int) -> float:
     """Return the probability that a band of so many draws holds: 95 %, or what the range of fewer than 39 draws holds.
 
     Examples
     --------
-    >>> held_probability(64), round(held_probability(16), 2)
+    >>> band_probability(64), round(band_probability(16), 2)
     (0.95, 0.88)
     """
     return min(PROBABILITY, (draws - 1) / (draws + 1))
 
 
 def band_of(values: FloatArray) -> Band:
-    """Return mean, sd and the ends of the central interval of draws (N, s), which holds `held_probability`.
+    """Return mean, sd and the ends of the central interval of draws (N, s), which holds `band_probability`.
 
     Raises
     ------
@@ -74,21 +87,22 @@ def band_of(values: FloatArray) -> Band:
     """
     if len(values) < 2:
         raise InputError(f"a band needs two draws or more, and there are {len(values)}.")
-    tail = (1 - held_probability(len(values))) / 2
+    tail = (1 - band_probability(len(values))) / 2
     low, high = np.quantile(values, [tail, 1 - tail], axis=0, method="weibull")
     return Band(values.mean(axis=0), values.std(axis=0, ddof=1), low, high)
 
 
-def shares_of(complete: FloatArray, alone: FloatArray, noise_sd: float = 0.0) -> Shares:
+def shares_of(complete: FloatArray, material_only: FloatArray, noise_sd: float = 0.0) -> Shares:
     """Return what the variance of draws (N, s) is due to, given the same draws (N, s) without their discrepancy."""
-    centred, own = complete - complete.mean(axis=0), alone - alone.mean(axis=0)
-    rest = centred - own
+    centred, centred_material = complete - complete.mean(axis=0), material_only - material_only.mean(axis=0)
+    discrepancy = centred - centred_material
     total = (centred**2).mean(axis=0) * len(complete) / (len(complete) - 1) + noise_sd**2
-    parts = [(centred * each).sum(axis=0) / (len(complete) - 1) for each in (own, rest)]
+    terms = centred_material, discrepancy
+    covariances = [(centred * term).sum(axis=0) / (len(complete) - 1) for term in terms]
     with np.errstate(invalid="ignore", divide="ignore"):
-        size = np.sqrt((own**2).sum(axis=0) * (rest**2).sum(axis=0))
-        correlation = (own * rest).sum(axis=0) / size
-        return Shares(parts[0] / total, parts[1] / total, noise_sd**2 / total, correlation)
+        size = np.sqrt((centred_material**2).sum(axis=0) * (discrepancy**2).sum(axis=0))
+        correlation = (centred_material * discrepancy).sum(axis=0) / size
+        return Shares(covariances[0] / total, covariances[1] / total, noise_sd**2 / total, correlation)
 
 
 def standard_errors(
@@ -99,9 +113,74 @@ def standard_errors(
     Draws of a quasi-random sequence have smaller errors than that.
     """
     generator, count = np.random.default_rng(seed), len(draws[0])
-    found: dict[str, list[FloatArray]] = {}
-    for _ in range(RESAMPLES):
-        chosen = generator.integers(count, size=count)
-        for name, value in statistics(*(each[chosen] for each in draws)).items():
-            found.setdefault(name, []).append(value)
-    return {name: np.std(each, axis=0, ddof=1) for name, each in found.items()}
+    replicates: dict[str, list[FloatArray]] = {}
+    for _ in range(BOOTSTRAP_RESAMPLES):
+        rows = generator.integers(count, size=count)
+        for name, value in statistics(*(values[rows] for values in draws)).items():
+            replicates.setdefault(name, []).append(value)
+    return {name: np.std(values, axis=0, ddof=1) for name, values in replicates.items()}
+
+
+BAND = ("mean", "sd", "low", "high")
+SHARES = ("parameters", "discrepancy", "noise", "correlation")
+
+
+def force_table(
+    travel: FloatArray,
+    complete: FloatArray,
+    material_only: FloatArray,
+    without: FloatArray | None,
+    noise_sd: float,
+    travel_name: str = "travel",
+) -> pd.DataFrame:
+    """Return band and shares of the variance at every step, each with its standard error (``_error``).
+
+    Parameters
+    ----------
+    travel : (s,) array, mm
+    complete, material_only : (N, s) arrays, N
+        Draws, and the same draws without discrepancy; not a number where a draw did not get that far.
+    without : (M, s) array, N, or None
+        Draws of a fit without discrepancy.
+    noise_sd : float
+        Standard deviation of a new measurement of the force, N.
+    travel_name : str
+
+    Returns
+    -------
+    pandas.DataFrame
+        The travel; draws that got there; mean, sd, low and high (N); the shares of the variance of a new measurement;
+        the sd of what the discrepancy adds (``discrepancy_sd``); and the band of the draws alone and of the fit without
+        discrepancy, with the prefixes ``alone_`` and ``without_``.
+    """
+    import pandas as pd
+
+    rows = []
+    for step, travel_at_step in enumerate(travel):
+        row: dict[str, Any] = {f"{travel_name}_mm": float(travel_at_step)}
+        is_reached = np.isfinite(complete[:, step]) & np.isfinite(material_only[:, step])
+        row["draws"] = int(is_reached.sum())
+        if row["draws"] > 1:
+            row |= _with_errors(complete[is_reached, step], material_only[is_reached, step], noise_sd)
+            row["discrepancy_sd"] = float((complete - material_only)[is_reached, step].std(ddof=1))
+        for name, values in (("alone", material_only[is_reached, step]), ("without", _reached(without, step))):
+            if len(values) > 1:
+                row |= {f"{name}_{key}": float(getattr(band_of(values[:, None]), key)[0]) for key in BAND}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _reached(values: FloatArray | None, step: int) -> FloatArray:
+    return np.zeros(0) if values is None else values[np.isfinite(values[:, step]), step]
+
+
+def _with_errors(complete: FloatArray, material_only: FloatArray, noise_sd: float) -> dict[str, float]:
+    def statistics(complete: FloatArray, material_only: FloatArray) -> dict[str, FloatArray]:
+        band, shares = band_of(complete), shares_of(complete, material_only, noise_sd)
+        return {name: getattr(band, name) for name in BAND} | {name: getattr(shares, name) for name in SHARES}
+
+    draws = complete[:, None], material_only[:, None]
+    estimates, errors = statistics(*draws), standard_errors(statistics, *draws)
+    return {name: float(estimates[name][0]) for name in estimates} | {
+        f"{name}_error": float(errors[name][0]) for name in errors
+    }

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes, lower_triangle
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.kronecker import quasi_random
 from tissuq.inference.marginal import (
     Marginal,
@@ -18,7 +19,6 @@ from tissuq.inference.marginal import (
     marginal_of_points,
 )
 from tissuq.inference.nested import MOST_NESTED
-from tissuq.inference.solution import Components
 
 __all__ = ["Bounded", "bounded"]
 
@@ -38,19 +38,19 @@ class Bounded:
 
     Attributes
     ----------
-    free : Components
+    free : GaussianMixture
         Gaussian: together they have less than 1e-8 of the posterior outside the bounds.
-    cut : dict of int to Components
+    cut : dict of int to GaussianMixture
         Gaussian before a bound of one parameter, by the parameter's place, cut them; weights are those within.
-    crossed : Components
+    crossed : GaussianMixture
         The others, which several bounds cut.
     box : Boxes
         The bounds (1, p).
     """
 
-    free: Components
-    cut: dict[int, Components]
-    crossed: Components
+    free: GaussianMixture
+    cut: dict[int, GaussianMixture]
+    crossed: GaussianMixture
     box: Boxes
 
     @property
@@ -58,7 +58,7 @@ class Bounded:
         """Whether any bound matters."""
         return bool(self.cut) or len(self.crossed.weights) > 0
 
-    def components(self) -> Components:
+    def components(self) -> GaussianMixture:
         """Return all as one mixture: Gaussians, and draws within the bounds from what these cut."""
         whole = self.free
         for each in (*self.cut.values(), self.crossed):
@@ -105,10 +105,10 @@ class Bounded:
             found.append((share * own.weights.sum(), marginal))
         return found
 
-    def _boxes(self, components: Components) -> Boxes:
+    def _boxes(self, components: GaussianMixture) -> Boxes:
         return self.box.repeated(len(components.weights))
 
-    def _drawn(self, components: Components) -> Components:
+    def _drawn(self, components: GaussianMixture) -> GaussianMixture:
         """Return draws within the bounds, as components without extent."""
         few = components.thinned(DRAWN)
         count, p = few.mean.shape
@@ -117,7 +117,7 @@ class Bounded:
         points = self._boxes(few).draws(few.mean, few.root, uniforms)
         return _of_points(few, components.weights.sum() * np.ones(points.shape[:2]) / points.shape[1], points)
 
-    def _points(self, components: Components) -> Components:
+    def _points(self, components: GaussianMixture) -> GaussianMixture:
         """Return weighted points within the bounds."""
         number = max(64, POINTS // len(components.weights))
         log_shares, points = self._boxes(components).points(components.mean, components.root, number)
@@ -125,19 +125,19 @@ class Bounded:
         return _of_points(components, shares / shares.sum(axis=1, keepdims=True), points)
 
 
-def _of_points(components: Components, shares: FloatArray, points: FloatArray) -> Components:
+def _of_points(components: GaussianMixture, shares: FloatArray, points: FloatArray) -> GaussianMixture:
     """Return components without extent: points (M, R, p) that have shares (M, R) of the weights of M components."""
     weights = (components.weights[:, None] * shares).ravel()
     rows, p = np.repeat(np.arange(len(points)), points.shape[1]), points.shape[2]
     return replace(components[rows], weights=weights, mean=points.reshape(-1, p), root=np.zeros((len(rows), p, p)))
 
 
-def bounded(components: Components, beyond: FloatArray, box: Boxes) -> Bounded:
+def bounded(components: GaussianMixture, beyond: FloatArray, box: Boxes) -> Bounded:
     """Return a posterior's components sorted by what bounds (1, p) do to them.
 
     Parameters
     ----------
-    components : Components
+    components : GaussianMixture
         Gaussian before the bounds; weights after them.
     beyond : (M, p) array
         The mass of each parameter beyond its bounds.

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.gaussian import interval_quantile, log_interval
 from tissuq.inference.kronecker import SHIFTS, quasi_random
 from tissuq.inference.nested import MOST_NESTED, nested_draws, nested_log_mass
+from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
 __all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes", "lower_triangle"]
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache, partial
 from math import log, pi
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import solve_triangular
 
+from tissuq.experiments.modes import States
+from tissuq.inference.algebra import Fit, condition
 from tissuq.inference.reduction import Reducer, divided_columns
 from tissuq.mechanics import traced_stress_basis
-from tissuq.model import StatisticalModel
+from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["Density", "given_density", "joint_density"]
 
@@ -45,17 +49,17 @@ def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
         reduced = {name: array[0] for name, array in vars(Reducer([model])(np.zeros((1, 0)))).items()}
         data |= {name: reduced[name] for name in ("counts", "values", "levels", "inverse", "log_size")}
         data |= {"centre": reduced["centre"][0], "squares": reduced["squares"][0]}
-        data["count"] = float(len(model.experiment))
+        data["count"] = float(model.experiment.size)
     else:
         data |= _measurements(model)
         if not model.bent_symbols:
-            data["columns"] = tuple(np.asarray(part) for part in _orthogonal(model, model.design, data["stress"]))
+            data["columns"] = jax.tree.map(np.asarray, _orthogonal(model, model.design, data["stress"]))
     return _remembered(_given, model), data
 
 
 def _measurements(model: StatisticalModel) -> dict[str, Any]:
-    data: dict[str, Any] = {"stretch": model.experiment.stretch, "stress": model.stress}
-    data["other"] = model.discrepancy.mean_basis(model.experiment.mode, model.experiment.stretch)
+    data: dict[str, Any] = {"points": model.states.points, "stress": model.stress}
+    data |= {"other": model.discrepancy.mean_basis(model.states), "count": float(model.experiment.size)}
     return data | {"levels": model.levels if model.noise.depends_on_level else np.zeros(1)}
 
 
@@ -66,8 +70,8 @@ def _is_reduced(model: StatisticalModel) -> bool:
 
 def _remembered(density: Callable[..., Any], model: StatisticalModel) -> Density:
     """Return one function object for all models that differ only in their data, so that JAX compiles it once."""
-    parts = model.material, model.discrepancy, model.noise, model.experiment.mode, model.whitening
-    return _shared(density, _Key((*parts, tuple(model.priors.items())), model))
+    identity = model.material, model.discrepancy, model.noise, model.states.paths, model.whitening, model.condensed
+    return _shared(density, _Key((*identity, tuple(model.priors.items())), model))
 
 
 class _Key:
@@ -97,8 +101,13 @@ def _design(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[st
     if not model.bent_symbols:
         return data["design"]
     bent = jnp.stack([values[symbol] for symbol in model.bent_symbols])
-    own = traced_stress_basis(model.material, model.experiment.mode, data["stretch"], bent)
-    return model.white(jnp.hstack([own, data["other"]]))
+    of_material = traced_stress_basis(model.material, _states(model, data), bent)
+    return model.rows(jnp.hstack([of_material, data["other"]]))
+
+
+def _states(model: StatisticalModel, data: Mapping[str, Any]) -> States:
+    """Return the states of the measurements at points that JAX may trace."""
+    return replace(model.states, points=data["points"])
 
 
 def _whitened(
@@ -108,8 +117,9 @@ def _whitened(
     n = len(columns)
     white = jnp.broadcast_to(model.white_variance(values, data["levels"]), n)
     if not model.is_correlated:
-        return columns / jnp.sqrt(white)[:, None], jnp.log(white).sum()
-    correlation = model.white(model.white(model.correlation(data["stretch"], data["stretch"], values)).T)
+        return columns / jnp.sqrt(white)[:, None], data["count"] * jnp.log(white).mean()
+    states = _states(model, data)
+    correlation = model.white(model.white(model.correlation(states, states, values)).T)
     root = jnp.linalg.cholesky(model.correlated_variance(values) * correlation + jnp.diag(white))
     return solve_triangular(root, columns, lower=True), 2 * jnp.log(jnp.diag(root)).sum()
 
@@ -119,52 +129,42 @@ def _joint(model: StatisticalModel, vector: Any, data: Mapping[str, Any]) -> Any
     columns = jnp.asarray([model.symbols.index(symbol) for symbol in model.column_symbols])
     residual = data["stress"] - _design(model, values, data) @ vector[columns]
     (whitened, log_determinant) = _whitened(model, values, data, residual[:, None])
-    exponent = (whitened**2).sum() + log_determinant + len(residual) * log(2 * pi)
+    exponent = (whitened**2).sum() + log_determinant + data["count"] * log(2 * pi)
     return _log_prior(model, values) + model.log_whitening - 0.5 * exponent
 
 
-def _orthogonal(model: StatisticalModel, design: Any, stress: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the data matrix [Q, F, e], the inverse triangle of the linear columns, their centre and log size."""
+def _orthogonal(model: StatisticalModel, design: Any, stress: Any) -> tuple[Any, Fit]:
+    """Return the data matrix [Q, F, e], and the fit that it is the basis of."""
     free, fixed = divided_columns(model)
     basis, triangle = jnp.linalg.qr(design[:, free])
     inverse = solve_triangular(triangle, jnp.eye(len(free)))
     centre = inverse @ (basis.T @ stress)
     columns = jnp.hstack([basis, design[:, fixed], (stress - design[:, free] @ centre)[:, None]])
-    return columns, inverse, centre, jnp.log(jnp.abs(jnp.diag(triangle))).sum()
+    return columns, Fit(inverse, jnp.log(jnp.abs(jnp.diag(triangle))).sum(), centre)
 
 
 def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
     values = dict(zip(model.nonlinear, h, strict=True))
-    p = len(model.linear)
-    moments, log_determinant, count, (inverse, centre, log_size) = _moments(model, values, data)
+    moments, log_determinant, fit = _moments(model, values, data)
     fixed = [values[symbol] for symbol in model.column_symbols if symbol not in model.linear]
-    rest = jnp.stack([*(-value for value in fixed), jnp.ones(())])
-    offset, weight = data["mean"] - centre, data["precision"]
-    precision = moments[:p, :p] + inverse.T @ (weight[:, None] * inverse)
-    pull = moments[:p, p:] @ rest + inverse.T @ (weight * offset)
-    misfit = rest @ moments[p:, p:] @ rest + weight @ offset**2
-    cholesky = jnp.linalg.cholesky(precision)
-    whitened = solve_triangular(cholesky, pull, lower=True)
-    root = inverse @ solve_triangular(cholesky, jnp.eye(p), lower=True).T
-    exponent = misfit - whitened @ whitened + log_determinant + (count - p) * log(2 * pi)
-    log_likelihood = (
-        data["constant"] + model.log_whitening - jnp.log(jnp.diag(cholesky)).sum() - log_size - 0.5 * exponent
-    )
-    return log_likelihood, _log_prior(model, values), centre + root @ whitened, root
+    multipliers = jnp.stack([*(-value for value in fixed), jnp.ones(())])
+    prior = data["mean"], data["precision"], data["constant"] + model.log_whitening
+    conditional = condition(moments, log_determinant, fit, multipliers, prior, data["count"])
+    return conditional.log_likelihood, _log_prior(model, values), conditional.mean, conditional.root
 
 
-def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
-    """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, the number of measurements, and what Q rests on."""
+def _moments(model: StatisticalModel, values: Mapping[str, Any], data: Mapping[str, Any]) -> tuple[Any, Any, Fit]:
+    """Return D' V^-1 D for the data matrix D = [Q, F, e], log |V|, and the fit that D is the basis of."""
     q = len(model.column_symbols) + 1
     if _is_reduced(model):
         variances = model.white_variance(values, data["levels"]) + model.correlated_variance(values) * data["values"]
         variances = jnp.broadcast_to(variances, data["counts"].shape)
         moments = ((1 / variances) @ data["squares"]).reshape(q, q)
-        rests_on = data["inverse"], data["centre"], data["log_size"]
-        return moments, data["counts"] @ jnp.log(variances), data["count"], rests_on
+        fit = Fit(data["inverse"], data["log_size"], data["centre"])
+        return moments, data["counts"] @ jnp.log(variances), fit
     if model.bent_symbols:
-        columns, *rest = _orthogonal(model, _design(model, values, data), data["stress"])
+        columns, fit = _orthogonal(model, _design(model, values, data), data["stress"])
     else:
-        columns, *rest = data["columns"]
+        columns, fit = data["columns"]
     whitened, log_determinant = _whitened(model, values, data, columns)
-    return whitened.T @ whitened, log_determinant, len(columns), rest
+    return whitened.T @ whitened, log_determinant, fit

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.box import Boxes
-from tissuq.model import StatisticalModel
-from tissuq.priors import Prior
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Prior
 
 __all__ = ["LinearPriors", "times_gaussians"]
 
@@ -45,8 +45,8 @@ class LinearPriors:
 
     def log_mass(self, mean: FloatArray, root: FloatArray) -> FloatArray:
         """Return the log mass (M,) of Gaussians (M, p) times all these priors but uniform densities, within bounds."""
-        mean, root, found = self.times(mean, root)
-        return found + self.box.repeated(len(mean)).log_mass(mean, root)[0]
+        mean, root, log_mass = self.times(mean, root)
+        return log_mass + self.box.repeated(len(mean)).log_mass(mean, root)[0]
 
     def strain(self, mean: FloatArray, root: FloatArray) -> FloatArray:
         """Return by how much (M,) the sum of squares of the data grows where the parameters obey their priors.
@@ -78,13 +78,13 @@ def times_gaussians(
     Means (M, q), roots (M, q, q) and the logarithms (M,) of the masses.
     """
     log_mass = np.zeros(len(mean))
-    for place, prior in enumerate(priors):
+    for index, prior in enumerate(priors):
         centre, precision, log_height = prior.gaussian or (0.0, 0.0, 0.0)
         if not precision:
             continue
-        along = root[:, place]
+        along = root[:, index]
         variance = (along**2).sum(axis=1) + 1 / precision
-        miss = centre - mean[:, place]
+        miss = centre - mean[:, index]
         covariance = np.einsum("mij,mj->mi", root, along)
         mean = mean + covariance * (miss / variance)[:, None]
         shrink = 1 / (variance + np.sqrt(variance / precision))  # Potter's square root of the update

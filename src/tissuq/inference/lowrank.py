@@ -9,9 +9,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.discrepancy import Discrepancy
+from tissuq.experiments.modes import States
 from tissuq.inference.threads import one_thread
-from tissuq.model import StatisticalModel
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = ["FEW_POINTS", "Spectrum", "correlation_spectrum", "scaled_spectrum"]
 
@@ -45,61 +46,59 @@ def correlation_spectrum(model: StatisticalModel, shape: tuple[float, ...]) -> S
     shape : tuple of float
         Values of the parameters on which the correlation depends.
     """
-    points = model.experiment.stretch
+    states = model.experiment.states
     if model.is_repeated:
-        return _of_repeats(points)
-    if model.is_joint:
-        return _decompose(model.discrepancy, points, shape, model.white)
-    if len(points) <= FEW_POINTS:
-        return _remembered(model.discrepancy, points.tobytes(), shape)
-    return _decompose(model.discrepancy, points, shape)
+        return _of_repeats(states.abscissa)
+    if model.whitening is None and len(states) <= FEW_POINTS:
+        return _remembered(model.discrepancy, states, shape)
+    return _decompose(model.discrepancy, states, shape, model.white)
 
 
 def scaled_spectrum(model: StatisticalModel, shape: Mapping[str, float], scale: FloatArray) -> Spectrum:
     """Return the spectrum of a model's correlation at its measurements, rows and columns divided by a scale (n,)."""
-    points = model.experiment.stretch
-    correlation = model.white(model.white(model.correlation(points, points, shape)).T)
+    states = model.experiment.states
+    correlation = model.white(model.white(model.correlation(states, states, shape)).T)
     correlation = correlation / np.multiply.outer(scale, scale)
     values, vectors = np.linalg.eigh(correlation)
-    kept = values > ROUNDING * np.trace(correlation)
-    return Spectrum(vectors[:, kept], values[kept])
+    is_positive = values > ROUNDING * np.trace(correlation)
+    return Spectrum(vectors[:, is_positive], values[is_positive])
 
 
-def _of_repeats(points: FloatArray) -> Spectrum:
-    """Return the spectrum of the correlation that is one at equal points and zero elsewhere."""
-    _, place, count = np.unique(points, return_inverse=True, return_counts=True)
-    vectors = np.zeros((len(points), len(count)))
-    vectors[np.arange(len(points)), place] = 1 / np.sqrt(count[place])
+def _of_repeats(stretch: FloatArray) -> Spectrum:
+    """Return the spectrum of the correlation that is one at equal stretches (n,) and zero elsewhere."""
+    _, group, count = np.unique(stretch, return_inverse=True, return_counts=True)
+    vectors = np.zeros((len(stretch), len(count)))
+    vectors[np.arange(len(stretch)), group] = 1 / np.sqrt(count[group])
     return Spectrum(vectors, count.astype(np.float64))
 
 
 @lru_cache(maxsize=512)
-def _remembered(discrepancy: Discrepancy, points: bytes, shape: tuple[float, ...]) -> Spectrum:
-    return _decompose(discrepancy, np.frombuffer(points), shape)
+def _remembered(discrepancy: Discrepancy, states: States, shape: tuple[float, ...]) -> Spectrum:
+    return _decompose(discrepancy, states, shape)
 
 
 def _decompose(
     discrepancy: Discrepancy,
-    points: FloatArray,
+    states: States,
     shape: tuple[float, ...],
     white: Callable[[FloatArray], FloatArray] = lambda columns: columns,
 ) -> Spectrum:
     values = dict(zip(discrepancy.shape_symbols, shape, strict=True))
-    if len(points) <= FEW_POINTS:
+    if len(states) <= FEW_POINTS:
         with one_thread():
-            spectrum, vectors = np.linalg.eigh(white(white(discrepancy.correlation(points, points, values)).T))
-        kept = spectrum > ROUNDING * spectrum.sum()
-        return Spectrum(vectors[:, kept], spectrum[kept])
-    variance = np.asarray(discrepancy.relative_variance(points, values))
-    root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), points, variance)
+            spectrum, vectors = np.linalg.eigh(white(white(discrepancy.correlation(states, states, values)).T))
+        is_positive = spectrum > ROUNDING * spectrum.sum()
+        return Spectrum(vectors[:, is_positive], spectrum[is_positive])
+    variance = np.asarray(discrepancy.relative_variance(states, values))
+    root = _pivoted_root(lambda a, b: discrepancy.correlation(a, b, values), states, variance)
     vectors, singular, _ = np.linalg.svd(white(root), full_matrices=False)
     return Spectrum(vectors, singular**2)
 
 
 def _pivoted_root(
-    correlation: Callable[[FloatArray, FloatArray], FloatArray], points: FloatArray, remaining: FloatArray
+    correlation: Callable[[States, States], FloatArray], states: States, remaining: FloatArray
 ) -> FloatArray:
-    n = len(points)
+    n = len(states)
     root = np.zeros((n, n if n <= 64 else 64))
     for rank in range(n):
         pivot = int(remaining.argmax())
@@ -107,7 +106,7 @@ def _pivoted_root(
             return root[:, :rank]
         if rank == root.shape[1]:
             root = np.hstack([root, np.zeros((n, min(rank, n - rank)))])
-        column = correlation(points, points[pivot : pivot + 1])[:, 0] - root[:, :rank] @ root[pivot, :rank]
+        column = correlation(states, states.one(pivot))[:, 0] - root[:, :rank] @ root[pivot, :rank]
         root[:, rank] = column / np.sqrt(remaining[pivot])
         remaining = np.maximum(remaining - root[:, rank] ** 2, 0.0)
         remaining[pivot] = 0.0

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.gaussian import log_interval
+from tissuq.inference.enumerators.quadrature import Lines, Quadrature
+from tissuq.inference.enumerators.warp import Warp
 from tissuq.inference.nested import nested_log_density, nested_points
-from tissuq.inference.quadrature import Lines, Quadrature
-from tissuq.inference.warp import Warp
+from tissuq.parameters.normal_interval import log_interval
 
 __all__ = [
+    "HermiteCubics",
     "Marginal",
     "blended",
     "marginal_of_crossed_mixture",
@@ -99,7 +100,6 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
 
     Density and distribution are computed at few points, and between them by cubics that share their slopes.
     """
-    from scipy.interpolate import CubicHermiteSpline
     from scipy.special import ndtr
 
     weights = weights / weights.sum()
@@ -118,8 +118,8 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
         mean,
         sd,
         points,
-        np.maximum(CubicHermiteSpline(coarse, density, slope)(points), 0.0),
-        _proper(CubicHermiteSpline(coarse, cumulative, density)(points)),
+        np.maximum(HermiteCubics(coarse, density, slope)(points), 0.0),
+        _proper(HermiteCubics(coarse, cumulative, density)(points)),
     )
 
 
@@ -140,8 +140,6 @@ def marginal_of_cut_mixture(
     ends : tuple of float
         The bounds.
     """
-    from scipy.interpolate import CubicHermiteSpline
-
     weights, means, covariances = _alike(weights / weights.sum(), means, covariances, (place, which))
     sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (place, which))
     low, high = ((end - means[:, which]) / sd_cut for end in ends)
@@ -170,9 +168,9 @@ def marginal_of_cut_mixture(
         log_density += log_given
         rise += correlation / rest * (_height(low_given, log_given) - _height(high_given, log_given))
     heights = weights[:, None] * np.exp(log_density)
-    smooth = CubicHermiteSpline(coarse, heights.sum(axis=0), (heights * rise / sd[:, None]).sum(axis=0))
+    smooth = HermiteCubics(coarse, heights.sum(axis=0), (heights * rise / sd[:, None]).sum(axis=0))
     points = _between(coarse)
-    cumulative = smooth.antiderivative()(points)
+    cumulative = smooth.integral(points)
     return Marginal(mean, float(np.sqrt(variance)), points, np.maximum(smooth(points), 0.0), _proper(cumulative))
 
 
@@ -328,6 +326,35 @@ def _cut_moments(low: FloatArray, high: FloatArray, log_mass: FloatArray) -> tup
 def _height(score: FloatArray, log_mass: FloatArray) -> FloatArray:
     """Return the standard normal density over a mass."""
     return np.asarray(np.exp(-0.5 * score**2 - log_mass) / np.sqrt(2 * np.pi))
+
+
+class HermiteCubics:
+    """Cubics through values (k,) at points, of given slopes: those of SciPy, whose import takes longer than a fit."""
+
+    def __init__(self, points: FloatArray, values: FloatArray, slopes: FloatArray) -> None:
+        width = np.diff(points)
+        secant = np.diff(values) / width
+        bend = (slopes[:-1] + slopes[1:] - 2 * secant) / width
+        self.points = points
+        self.coefficients = values[:-1], slopes[:-1], (secant - slopes[:-1]) / width - bend, bend / width
+
+    def __call__(self, at: FloatArray) -> FloatArray:
+        """Return the values at points (g,) within the outermost."""
+        index, step = self._steps(at)
+        return np.asarray(sum(factor[index] * step**power for power, factor in enumerate(self.coefficients)))
+
+    def integral(self, at: FloatArray) -> FloatArray:
+        """Return the integrals from the first point to others (g,)."""
+        index, step = self._steps(at)
+        width = np.diff(self.points)
+        terms = [(power, factor / power) for power, factor in enumerate(self.coefficients, 1)]
+        before = np.append(0.0, np.cumsum(sum(factor * width**power for power, factor in terms)))
+        return np.asarray(before[index] + sum(factor[index] * step**power for power, factor in terms))
+
+    def _steps(self, at: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return the interval (g,) of each point, and how far in it the point lies."""
+        index = np.searchsorted(self.points[1:-1], at, side="right")
+        return index, at - self.points[index]
 
 
 def _between(coarse: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.gaussian import interval_quantile, log_interval
+from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
 __all__ = ["MOST_NESTED", "nested_draws", "nested_log_density", "nested_log_mass", "nested_points"]
 

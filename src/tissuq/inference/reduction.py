@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.lowrank import FEW_POINTS, Spectrum, correlation_spectrum
-from tissuq.model import StatisticalModel
-from tissuq.statistics import CHUNK, upper_triangle
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.statistics import CHUNK, upper_triangle
 
 __all__ = ["Reducer", "Reductions", "divided_columns"]
 
@@ -66,17 +66,18 @@ class Reductions:
     levels: FloatArray
 
     @classmethod
-    def of(cls, parts: Sequence[Reduction]) -> Reductions:
+    def of(cls, reductions: Sequence[Reduction]) -> Reductions:
         """Stack reductions of the same data."""
-        rank = max(len(part.counts) for part in parts)
-        directions = np.zeros((3, len(parts), rank))
-        squares = np.zeros((len(parts), len(parts[0].squares), rank, parts[0].squares.shape[2]))
-        for place, part in enumerate(parts):
-            own = slice(len(part.counts))
-            directions[:, place, own] = part.counts, part.values, part.levels
-            squares[place, :, own] = part.squares
+        rank = max(len(reduction.counts) for reduction in reductions)
+        directions = np.zeros((3, len(reductions), rank))
+        squares = np.zeros((len(reductions), len(reductions[0].squares), rank, reductions[0].squares.shape[2]))
+        for index, reduction in enumerate(reductions):
+            directions_of_one = slice(len(reduction.counts))
+            directions[:, index, directions_of_one] = reduction.counts, reduction.values, reduction.levels
+            squares[index, :, directions_of_one] = reduction.squares
         inverse, log_size, centre = (
-            np.array([getattr(part, name) for part in parts]) for name in ("inverse", "log_size", "centre")
+            np.array([getattr(reduction, name) for reduction in reductions])
+            for name in ("inverse", "log_size", "centre")
         )
         return cls(inverse, log_size, centre, squares, *directions)
 
@@ -108,7 +109,7 @@ class Reducer:
     def _at(self, settings: Sequence[tuple[float, ...]]) -> list[Reduction]:
         """Reduce at settings of the structure; at many at once where the data are few."""
         model = self._models[0]
-        n, bent = len(model.experiment), len(model.bent_symbols)
+        n, bent = model.experiment.size, len(model.bent_symbols)
         if bent:
             bases = (model.design_at(np.array(setting[:bent])) for setting in settings)
             fits = (_Fit.of(self._models, basis) for basis in bases)
@@ -138,7 +139,7 @@ class _Fit:
         free, fixed = divided_columns(models[0])
         basis, triangle = np.linalg.qr(design[:, free])
         inverse = np.asarray(np.linalg.inv(triangle), dtype=np.float64)
-        stresses = np.array([each.stress for each in models])
+        stresses = np.array([model.stress for model in models])
         centre = (stresses @ basis) @ inverse.T
         residual = stresses - centre @ design[:, free].T
         log_size = float(np.log(np.abs(np.diag(triangle))).sum())
@@ -148,8 +149,8 @@ class _Fit:
         self, squares: FloatArray, counts: FloatArray, values: FloatArray, levels: FloatArray | None = None
     ) -> Reduction:
         """Return the reduction with these sums of squares."""
-        rest = np.zeros(len(counts)) if levels is None else levels
-        return Reduction(self.inverse, self.log_size, self.centre, squares, counts, values, rest)
+        levels_of_directions = np.zeros(len(counts)) if levels is None else levels
+        return Reduction(self.inverse, self.log_size, self.centre, squares, counts, values, levels_of_directions)
 
 
 def _from_statistics(models: Sequence[StatisticalModel]) -> Reduction:
@@ -165,50 +166,50 @@ def _from_statistics(models: Sequence[StatisticalModel]) -> Reduction:
         data[:p, -1] = 0.0
         centres.append(inverse @ triangle[:p, -1])
         squares.append((data.T @ data).reshape(1, -1))
-    one = np.ones(1)
+    single = np.ones(1)
     return Reduction(
         inverse,
         float(np.log(np.abs(np.diag(triangle)[:p])).sum()),
         np.array(centres),
         np.array(squares),
-        len(models[0].experiment) * one,
-        0 * one,
-        0 * one,
+        models[0].experiment.size * single,
+        0 * single,
+        0 * single,
     )
 
 
 def _reduced(model: StatisticalModel, fit: _Fit, shapes: Sequence[tuple[float, ...]]) -> list[Reduction]:
     """Reduce by all measurements, in the directions in which their errors are independent, for some correlations."""
-    n = len(model.experiment)
+    n = model.experiment.size
     if model.is_correlated:
         return _along_spectra(fit, [correlation_spectrum(model, shape) for shape in shapes])
     if not model.noise.depends_on_level:
         squares = _products(fit.shared, fit.residual).sum(axis=1, keepdims=True)
         return [fit.reduction(squares, np.array([float(n)]), np.zeros(1))]
-    levels, place, number = np.unique(model.levels, return_inverse=True, return_counts=True)
+    levels, level_index, count = np.unique(model.levels, return_inverse=True, return_counts=True)
     by_level = np.zeros((len(levels), len(fit.residual), (fit.shared.shape[1] + 1) ** 2))
     for start in range(0, n, CHUNK):
         block = slice(start, start + CHUNK)
-        np.add.at(by_level, place[block], _products(fit.shared[block], fit.residual[:, block]).swapaxes(0, 1))
-    return [fit.reduction(by_level.swapaxes(0, 1), number.astype(np.float64), np.zeros(len(levels)), levels)]
+        np.add.at(by_level, level_index[block], _products(fit.shared[block], fit.residual[:, block]).swapaxes(0, 1))
+    return [fit.reduction(by_level.swapaxes(0, 1), count.astype(np.float64), np.zeros(len(levels)), levels)]
 
 
 def _along_spectra(fit: _Fit, spectra: Sequence[Spectrum]) -> list[Reduction]:
     """Reduce along the eigenvectors of K correlations; all that is outside them shares one variance."""
     n, ranks = len(fit.shared), [len(spectrum.values) for spectrum in spectra]
     vectors = np.zeros((len(spectra), n, max(ranks)))
-    for place, spectrum in enumerate(spectra):
-        vectors[place, :, : ranks[place]] = spectrum.vectors
+    for index, spectrum in enumerate(spectra):
+        vectors[index, :, : ranks[index]] = spectrum.vectors
     shared, residual = vectors.swapaxes(1, 2) @ fit.shared, fit.residual @ vectors
     inside = _products(shared, residual)
     outside = _products(fit.shared - vectors @ shared, fit.residual - residual @ vectors.swapaxes(1, 2)).sum(axis=2)
     return [
         fit.reduction(
-            np.concatenate([inside[place, :, :rank], outside[place, :, None]], axis=1),
+            np.concatenate([inside[index, :, :rank], outside[index, :, None]], axis=1),
             np.append(np.ones(rank), n - rank),
-            np.append(spectra[place].values, 0.0),
+            np.append(spectra[index].values, 0.0),
         )
-        for place, rank in enumerate(ranks)
+        for index, rank in enumerate(ranks)
     ]
 
 
@@ -222,4 +223,4 @@ def _products(shared: FloatArray, own: FloatArray) -> FloatArray:
 def divided_columns(model: StatisticalModel) -> tuple[list[int], list[int]]:
     """Return the places of the columns that are integrated in closed form, and of the others."""
     free = [model.column_symbols.index(symbol) for symbol in model.linear]
-    return free, [place for place in range(len(model.column_symbols)) if place not in free]
+    return free, [column for column in range(len(model.column_symbols)) if column not in free]

@@ -28,8 +28,8 @@ def systematic(weights: FloatArray, count: int, offset: float | FloatArray = 0.5
     """
     edges = np.cumsum(weights, axis=1)
     ticks = (np.arange(count) + offset) / count * edges[:, -1:]
-    chosen = [np.searchsorted(edge, tick, side="right") for edge, tick in zip(edges, ticks, strict=True)]
-    return np.asarray(np.minimum(chosen, edges.shape[1] - 1), dtype=np.intp)
+    indices = [np.searchsorted(edge, tick, side="right") for edge, tick in zip(edges, ticks, strict=True)]
+    return np.asarray(np.minimum(indices, edges.shape[1] - 1), dtype=np.intp)
 
 
 def resampled_at_random(log_weights: FloatArray, generator: np.random.Generator) -> NDArray[np.intp]:

@@ -1,94 +1,22 @@
-"""What every route of inference returns: the posterior as a mixture of Gaussians, with draws and marginals."""
+"""What every route of inference returns: a posterior as a mixture of Gaussians, with draws and marginals."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, widened
-from tissuq.inference.resampling import systematic
-from tissuq.model import StatisticalModel
+from tissuq.model.discrepancy import side_by_side
+from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["CHAINS", "Components", "Diagnostics", "Marginals", "Solution"]
+__all__ = ["Diagnostics", "Marginals", "Solution", "shares_of_members"]
 
 FloatArray = NDArray[np.float64]
-
-CHAINS, DRAWS = 4, 1000
-"""Of the draws from a mixture."""
-
-
-@dataclass(frozen=True, eq=False)
-class Components:
-    """A posterior as M weighted settings of the nonlinear parameters, the linear ones Gaussian given each.
-
-    Attributes
-    ----------
-    weights : (M,) array
-        Non-negative, sum one.
-    settings : (M, d) array
-        Values of the nonlinear parameters.
-    mean : (M, p) array
-        Means of the linear parameters.
-    root : (M, p, p) array
-        Roots of their covariances; zero where a component is a point.
-    member : (M,) array, optional
-        Where a discrepancy is an average, which of its members; its weights then follow the linear parameters.
-    """
-
-    weights: FloatArray
-    settings: FloatArray
-    mean: FloatArray
-    root: FloatArray
-    member: NDArray[np.intp] | None = None
-
-    def __getitem__(self, chosen: NDArray[Any]) -> Components:
-        member = None if self.member is None else self.member[chosen]
-        return Components(self.weights[chosen], self.settings[chosen], self.mean[chosen], self.root[chosen], member)
-
-    def joined(self, other: Components) -> Components:
-        """Return these components followed by others; the weights of both together must sum to one."""
-        is_average = self.member is not None and other.member is not None
-        names = ("weights", "settings", "mean", "root", *(["member"] if is_average else []))
-        return Components(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
-
-    def drawn(self, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
-        """Return the component (chains, draws) of every draw, and its linear parameters (chains, draws, p)."""
-        generator = np.random.default_rng(seed)
-        chosen = generator.choice(len(self.weights), size=(CHAINS, DRAWS), p=self.weights)
-        noise = generator.standard_normal((CHAINS, DRAWS, self.root.shape[2]))
-        return chosen, self.mean[chosen] + np.einsum("cdij,cdj->cdi", self.root[chosen], noise)
-
-    def weighted(self, weights: FloatArray) -> Components:
-        """Return the same components with other weights (M,)."""
-        return replace(self, weights=weights)
-
-    def thinned(self, count: int) -> Components:
-        """Return few components that stand for all, their weights summing to one.
-
-        The lightest, together less than 1e-7 of all, are left out; if more than ``count`` remain, systematic
-        resampling in their order, which keeps neighbours apart, picks equally weighted ones.
-        """
-        order = np.argsort(self.weights)
-        heavy = self[np.sort(order[np.cumsum(self.weights[order]) > 1e-7 * self.weights.sum()])]
-        total = heavy.weights.sum()
-        if len(heavy.weights) <= count:
-            return heavy.weighted(heavy.weights / total)
-        picked = heavy.resampled(count)
-        return picked.weighted(picked.weights / total)
-
-    def resampled(self, count: int) -> Components:
-        """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""
-        if len(self.weights) <= count:
-            return self
-        chosen = self[systematic(self.weights[None], count)[0]]
-        return chosen.weighted(np.full(count, self.weights.sum() / count))
 
 
 @dataclass(frozen=True)
@@ -107,9 +35,15 @@ class Diagnostics:
 class Marginals(Mapping[str, Marginal]):
     """The marginal posterior of every parameter, each computed when it is first asked for."""
 
-    def __init__(self, symbols: Sequence[str], compute: Callable[[str], Marginal]) -> None:
-        self._symbols, self._compute = tuple(symbols), compute
+    def __init__(self, symbols: tuple[str, ...], compute: Callable[[str], Marginal]) -> None:
+        self._symbols, self._compute = symbols, compute
         self._known: dict[str, Marginal] = {}
+
+    @classmethod
+    def of(cls, model: StatisticalModel, compute: Callable[[str], Marginal]) -> Marginals:
+        """Return those of a model's parameters; of stresses with the error that all tests have in common."""
+        error = dict.fromkeys(model.column_symbols, model.common_error)
+        return cls(model.symbols, lambda symbol: widened(compute(symbol), error.get(symbol, 0.0)))
 
     def __getitem__(self, symbol: str) -> Marginal:
         if symbol not in self._symbols:
@@ -125,70 +59,114 @@ class Marginals(Mapping[str, Marginal]):
         return len(self._symbols)
 
 
-class Solution(ABC):
-    """The posterior of one model; marginals and draws are computed when they are first asked for.
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The posterior of one model, by any route.
 
     Attributes
     ----------
     model : StatisticalModel
     route : str
-        Which method was used, and ``reason`` says why it was taken and what it did.
-    components : Components
-        The posterior as a mixture; predictions rest on it.
-    marginals : Marginals
+        Which method was used.
+    reason : str
+        Why it was taken and what it did.
+    represent : callable
+        Returns the posterior as a mixture of Gaussians; called once, when `mixture` is first needed.
+    marginals : mapping of str to Marginal
         One for each parameter, by its symbol.
-    draws : dict of str to (chains, draws) array
-        Draws of every parameter. On the exact route they are independent of each other, and those of nonlinear
-        parameters take the values of the quadrature's points: for densities and intervals use the marginals.
+    represent_tails : callable, optional
+        The same with more components in the tails, for `wide_mixture`.
+    seed : int
+        Of the draws from the mixture.
+    sampled : (chains, draws, p) array, optional
+        Linear parameters of the draws of a sampler, in the order of the mixture's components, which then are the
+        settings of the draws.
     log_evidence, log_evidence_error : float or None
         Log of p(y) with respect to the normalised priors, y in MPa; None where there is none.
     diagnostics : Diagnostics or None
         Of the sampler; None on the exact route.
-    drawn_discrepancy : (chains, draws, n) array or None
-        The discrepancy's stress at the measurements in every draw, MPa, where it has weights of its own.
     members : mapping of str to float
         Posterior probabilities of the members, where the discrepancy is an average.
     stable_in : tuple of str
         Loading modes in which what is not stable is left out.
+    stable_share : float
+        Share of the posterior that is stable in these, before the rest is left out.
+    stable_prior_share : float or None
+        The same of the prior; None where it is not known.
+    is_of_data : bool
+        Whether it is the posterior given the model's measurements; that of a new patient is of somebody else.
     """
 
     model: StatisticalModel
     route: str
     reason: str
-    components: Components
+    represent: Callable[[], GaussianMixture]
+    marginals: Mapping[str, Marginal]
+    represent_tails: Callable[[], GaussianMixture] | None = None
+    seed: int = 0
+    sampled: FloatArray | None = None
     log_evidence: float | None = None
     log_evidence_error: float | None = None
     diagnostics: Diagnostics | None = None
-    drawn_discrepancy: FloatArray | None = None
-    members: Mapping[str, float] = MappingProxyType({})
+    members: Mapping[str, float] = field(default_factory=dict)
     stable_in: tuple[str, ...] = ()
-
-    @property
-    def wide_components(self) -> Components:
-        """The posterior as a mixture that has components in the tails, too, where importance weights may need them."""
-        return self.components
+    stable_share: float = 1.0
+    stable_prior_share: float | None = None
+    is_of_data: bool = True
 
     @cached_property
-    def marginals(self) -> Marginals:
-        """The marginal posterior of every parameter; of stresses with the error that all tests have in common."""
-        return Marginals(self.model.symbols, self._widened_marginal)
+    def mixture(self) -> GaussianMixture:
+        """The posterior as a mixture; predictions rest on it."""
+        return self.represent()
 
-    def _widened_marginal(self, symbol: str) -> Marginal:
-        return widened(self._marginal(symbol), self.model.common_error if symbol in self.model.column_symbols else 0.0)
+    @cached_property
+    def wide_mixture(self) -> GaussianMixture:
+        """The same with components in the tails, too, where importance weights may need them."""
+        return self.mixture if self.represent_tails is None else self.represent_tails()
 
-    @abstractmethod
-    def _marginal(self, symbol: str) -> Marginal:
-        """Return the marginal posterior of one parameter."""
-
-    @property
-    @abstractmethod
+    @cached_property
     def draws(self) -> dict[str, FloatArray]:
-        """Draws of every parameter."""
+        """Draws (chains, draws) of every parameter.
+
+        On the exact route they are independent of each other, and those of nonlinear parameters take the values of the
+        quadrature's points: for densities and intervals use the marginals.
+        """
+        component, linear = self._drawn
+        columns = np.moveaxis(np.concatenate([self.mixture.settings[component], linear], axis=2), 2, 0)
+        symbols = (*self.model.nonlinear, *self.model.linear)  # the weights of an energy discrepancy follow them
+        named = dict(zip(symbols, columns, strict=False))
+        return {symbol: named[symbol] for symbol in self.model.symbols}
 
     @property
-    @abstractmethod
     def component_of_draw(self) -> NDArray[np.intp]:
-        """The place among `components` of every draw (chains, draws)."""
+        """The index of every draw's component of `mixture` (chains, draws)."""
+        return self._drawn[0]
+
+    @cached_property
+    def drawn_discrepancy(self) -> FloatArray | None:
+        """The discrepancy's stress (chains, draws, m) at the model's `states` in every draw, whitened, MPa.
+
+        None where it has no weights of its own.
+        """
+        component, linear = self._drawn
+        if self.mixture.member is None:
+            return None
+        model, members, start = self.model, self.mixture.member[component], len(self.model.linear)
+        values = np.zeros((*members.shape, len(model.states)))
+        for member in np.unique(members):
+            terms = model.energy_members[member].stress_features(model.states)
+            features = side_by_side([np.asarray(model.white(term)) for term in terms], values.shape[2])
+            drawn = members == member
+            values[drawn] = linear[drawn][:, start : start + features.shape[1]] @ features.T
+        return values
+
+    @cached_property
+    def _drawn(self) -> tuple[NDArray[np.intp], FloatArray]:
+        """The component of every draw, and its linear parameters and weights."""
+        if self.sampled is None:
+            return self.mixture.draw(self.seed)
+        chains, draws, _ = self.sampled.shape
+        return np.arange(chains * draws).reshape(chains, draws), self.sampled
 
     @property
     def is_approximate(self) -> bool:
@@ -198,5 +176,14 @@ class Solution(ABC):
     @property
     def shape(self) -> tuple[int, int]:
         """The number of chains, and of draws in each."""
-        chains, draws = next(iter(self.draws.values())).shape
+        chains, draws = self.component_of_draw.shape
         return chains, draws
+
+
+def shares_of_members(model: StatisticalModel, members: NDArray[np.intp], weights: FloatArray) -> dict[str, float]:
+    """Return the probability of every sum of blocks, its length scales together, for weighted members (M,)."""
+    share_of_name: dict[str, float] = {}
+    shares = np.bincount(members, weights, minlength=len(model.energy_members))
+    for member, share in zip(model.energy_members, shares, strict=True):
+        share_of_name[member.name] = share_of_name.get(member.name, 0.0) + float(share)
+    return share_of_name

@@ -1,8 +1,8 @@
 """What the material says: strain energies, and stress as their derivative along a loading mode."""
 
 from tissuq.mechanics.fibres import FibreMaterial
+from tissuq.mechanics.laws import MooneyRivlin, NeoHookean, Ogden1, Ogden2, Ogden3, Yeoh
 from tissuq.mechanics.material import Material, StretchMaterial
-from tissuq.mechanics.materials import MooneyRivlin, NeoHookean, Ogden1, Ogden2, Ogden3, Yeoh
 from tissuq.mechanics.named import material_named
 from tissuq.mechanics.simulate import simulate
 from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, stress_basis, traced_stress_basis

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tissuq.parameters import Parameter
-from tissuq.priors import LogUniform
+from tissuq.parameters.parameter import Parameter
+from tissuq.parameters.priors import LogUniform
 
 __all__ = ["LIMIT", "cos", "exp", "expm1", "library", "log", "log_left", "positive_part", "sin", "sqrt"]
 

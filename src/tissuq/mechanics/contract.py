@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.modes import Path, loading_modes
+from tissuq.mechanics.invariants import largest_invariants
 from tissuq.mechanics.material import Material
-from tissuq.mechanics.path import invariants
-from tissuq.mechanics.stress import engineering_stress, initial_shear_modulus, path_energy, traced_stress_basis
-from tissuq.parameters import Parameter
+from tissuq.mechanics.stress import (
+    differentiator,
+    engineering_stress,
+    initial_shear_modulus,
+    path_energy,
+    traced_stress_basis,
+)
+from tissuq.parameters.parameter import Parameter
 
 __all__ = ["Check", "checked", "some_values"]
 
@@ -67,7 +74,8 @@ def checked(material: Material) -> list[Check]:
     if is_linear.any():
         twice = np.where(is_linear, [2.0, *3.0 + np.arange(1, len(values))], 1.0) * values
         both = engineering_stress(material, first, points, twice)
-        basis = np.asarray(traced_stress_basis(material, first, points, values[~is_linear]))
+        compiled = differentiator().jit(partial(traced_stress_basis, material, first.at(points)))
+        basis = np.asarray(compiled(values[~is_linear]))
         symbols = ", ".join(each.symbol for each in material.parameters if each.is_linear)
         wrong = (both - basis @ twice[is_linear]) / np.abs(both).max()
         checks.append(_check(f"the stress is proportional to {symbols}", wrong, "it differs by {:.3g}"))
@@ -79,14 +87,14 @@ def some_values(material: Material, change: FloatArray) -> FloatArray:
 
     They are one, or medians of priors.
     """
-    largest = max(float(invariants(path, at)[0].max()) for path, at in _paths(material, change).items())
+    largest = max(largest_invariants(path.at(points))[0] for path, points in _paths(material, change).items())
     return np.array([_value(each, largest) for each in material.parameters])
 
 
 def _paths(material: Material, change: FloatArray) -> dict[Path, FloatArray]:
     """Return the path of every stress of every loading mode that the material takes, with points on it."""
     modes = [kind() for kind in loading_modes().values()]
-    paths = {path: mode.excursion(change) for mode in modes for path in mode.channels}
+    paths = {path: mode.excursion(change) for mode in modes for path in mode.paths}
     return {path: points for path, points in paths.items() if not material.why_not(path.moved(points, 0.0))}
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tissuq.experiments.modes import Deformation
-from tissuq.parameters import Parameter
+from tissuq.parameters.parameter import Parameter
 from tissuq.registry import variants
 
 __all__ = ["Material", "StretchMaterial", "materials"]
@@ -26,6 +26,7 @@ class Material(ABC):
     are a `FibreMaterial`. The sum of two materials is a material.
     """
 
+    entry_point_group: ClassVar[str] = "tissuq.materials"
     name: ClassVar[str]
     formula: ClassVar[str]
     source: ClassVar[str]
@@ -37,7 +38,7 @@ class Material(ABC):
     """Whether it has no stiffness of its own at the reference, so that it is only part of a sum."""
 
     def __add__(self, other: Material) -> Material:
-        from tissuq.mechanics.materials.sums import added
+        from tissuq.mechanics.laws.sums import added
 
         return added(self, other)
 

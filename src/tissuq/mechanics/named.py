@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
-from typing import Any
-
 from tissuq.errors import ModelError
 from tissuq.mechanics.fibres import FibreMaterial
+from tissuq.mechanics.laws.ogden import Ogden
+from tissuq.mechanics.laws.polynomial import Rivlin
+from tissuq.mechanics.laws.sums import added
 from tissuq.mechanics.material import Material
-from tissuq.mechanics.materials.ogden import Ogden
-from tissuq.mechanics.materials.polynomial import Rivlin
-from tissuq.mechanics.materials.sums import added
 from tissuq.mechanics.user_law import LAW, as_material, load_material
-from tissuq.registry import find, variants
+from tissuq.registry import find, load_plugins, variants
 
-__all__ = ["FORMS", "GROUP", "material_named", "plugins"]
+__all__ = ["FORMS", "material_named", "plugins"]
 
-GROUP = "tissuq.materials"
-"""The entry points through which other packages add materials."""
 FAMILIES = Rivlin, Ogden, FibreMaterial
 SUMS = {
     "standard-reinforcing": "neo-hookean+standard-fibres",
@@ -75,8 +70,8 @@ def _single(name: str, laws: bool) -> Material:
         if found is not None:
             return found
     if name not in variants(Material):
-        for point in entry_points(group=GROUP, name=name):
-            return _loaded(point)
+        for plugin in load_plugins(Material.entry_point_group, as_material, name):
+            return plugin
     return find(Material, "material", name, ModelError)()
 
 
@@ -88,14 +83,4 @@ def plugins() -> list[Material]:
     ModelError
         When one of them cannot be used.
     """
-    return [_loaded(point) for point in entry_points(group=GROUP)]
-
-
-def _loaded(point: Any) -> Material:
-    try:
-        return as_material(point.load(), point.value)
-    except Exception as error:
-        raise ModelError(
-            f"the material '{point.name}' of another package ({point.value}) cannot be used: {error}. Repair or "
-            "uninstall that package."
-        ) from error
+    return load_plugins(Material.entry_point_group, as_material)

@@ -67,7 +67,7 @@ def simulate(
         raise InputError(f"noise_sd must be zero or positive, not {noise_sd}.")
     points = checked_points(true_mode, stretch)
     values = [parameters[symbol] for symbol in symbols]
-    stresses = [engineering_stress(true_material, path, points, values) for path in true_mode.channels]
+    stresses = [engineering_stress(true_material, path, points, values) for path in true_mode.paths]
     stress = stresses[0] if len(stresses) == 1 else np.column_stack(stresses)
     noise = noise_sd * np.random.default_rng(seed).standard_normal(stress.shape)
     recipe = ", ".join(

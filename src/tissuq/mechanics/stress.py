@@ -1,37 +1,49 @@
-"""The one stress function: the derivative of any strain energy along any loading mode."""
+"""The one stress function: the derivative of any strain energy along any path."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import Path, SimpleShear
+from tissuq.experiments.modes import LoadingMode, Path, SimpleShear, States
+from tissuq.experiments.modes.path import UNMEASURED
 from tissuq.mechanics.complex_step import complex_step_stress
 from tissuq.mechanics.material import Material
 
-__all__ = ["engineering_stress", "initial_shear_modulus", "path_energy", "stress_basis", "traced_stress_basis"]
+__all__ = [
+    "engineering_stress",
+    "initial_shear_modulus",
+    "path_energy",
+    "stress_basis",
+    "stresses_at",
+    "traced_stress_basis",
+]
+
+FloatArray = NDArray[np.float64]
 
 
-def path_energy(material: Material, mode: Path, stretch: Any, values: Any, step: Any = 0.0) -> Any:
-    """Return the strain energy (MPa) of a material a step further than a stretch of a mode; JAX differentiates it."""
-    return material.energy_of(mode.moved(stretch, step), values)
+def path_energy(material: Material, path: Path, point: Any, values: Any, step: Any = 0.0) -> Any:
+    """Return the strain energy (MPa) of a material a step further than a point of a path; JAX differentiates it."""
+    return material.energy_of(path.moved(point, step), values)
 
 
-def engineering_stress(material: Material, mode: Path, stretch: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
+def engineering_stress(
+    material: Material, mode: LoadingMode | Path, stretch: ArrayLike, values: ArrayLike
+) -> NDArray[np.float64]:
     """Return the engineering stress, (1 / loaded axes) dW/dstretch.
 
     Parameters
     ----------
     material : Material
         The strain energy.
-    mode : Path
-        A loading mode with one stress, or one of a mode's channels.
+    mode : LoadingMode or Path
+        A loading mode with one stress, or one of a mode's paths.
     stretch : (n,) or (n, c) array, dimensionless
         Points of the mode.
     values : (k,) or (m, k) array
@@ -44,21 +56,27 @@ def engineering_stress(material: Material, mode: Path, stretch: ArrayLike, value
     Raises
     ------
     ModelError
-        When the material cannot be stretched so far with these parameters.
+        When the material cannot be stretched so far with these parameters, or the mode has several stresses.
 
     References
     ----------
     Zeraatpisheh, Bordas & Beex (2021), eq. 3 to 11.
     """
-    values, points = np.asarray(values, dtype=np.float64), np.asarray(stretch, dtype=np.float64)
-    curves = complex_step_stress(material, mode, points, np.atleast_2d(values))
+    return stresses_at(material, mode.at(stretch), values)
+
+
+def stresses_at(material: Material, states: States, values: ArrayLike) -> FloatArray:
+    """Return the `engineering_stress` at states (n,) of any paths."""
+    values = np.asarray(values, dtype=np.float64)
+    rows = np.atleast_2d(values)
+    curves = complex_step_stress(material, states, rows)
     if curves is None:
         with _explained(material):
-            curves = np.asarray(_curves(material, mode)(points, np.atleast_2d(values)))
+            curves = _scattered(states, lambda path, points: _curves(material, path)(points, rows))
     is_borne = np.isfinite(curves).all(axis=0)
     if not is_borne.all():
-        symbols = ", ".join(each.symbol for each in material.parameters)
-        beyond = mode.abscissa(points)[~is_borne][0]
+        symbols = ", ".join(parameter.symbol for parameter in material.parameters)
+        beyond = states.abscissa[~is_borne][0]
         raise ModelError(
             f"material '{material.name}' has no finite stress at a stretch of {beyond:g} with the "
             f"values of {symbols} that it was given: it has locked, or its energy is too large for a number."
@@ -66,17 +84,15 @@ def engineering_stress(material: Material, mode: Path, stretch: ArrayLike, value
     return curves if values.ndim == 2 else np.asarray(curves[0])
 
 
-def stress_basis(material: Material, mode: Path, stretch: ArrayLike, nonlinear: ArrayLike = ()) -> NDArray[np.float64]:
+def stress_basis(material: Material, states: States, nonlinear: ArrayLike = ()) -> FloatArray:
     """Return the stresses of unit linear parameters: the columns of a model linear in them.
 
     Parameters
     ----------
     material : Material
         The strain energy, proportional to its k linear parameters.
-    mode : Path
-        A loading mode with one stress, or one of a mode's channels.
-    stretch : (n,) or (n, c) array, dimensionless
-        Points of the mode.
+    states : States
+        n of them, on any paths.
     nonlinear : (s,) or (m, s) array
         Values of the other parameters in the material's order; several rows give several bases.
 
@@ -93,31 +109,35 @@ def stress_basis(material: Material, mode: Path, stretch: ArrayLike, nonlinear: 
     --------
     >>> from tissuq.experiments.modes import Uniaxial
     >>> from tissuq.mechanics import Ogden1, stress_basis
-    >>> stress_basis(Ogden1(), Uniaxial(), [0.5, 1.0, 2.0], nonlinear=[2.0]).ravel().round(12).tolist()
+    >>> stress_basis(Ogden1(), Uniaxial().at([0.5, 1.0, 2.0]), nonlinear=[2.0]).ravel().round(12).tolist()
     [-3.5, 0.0, 1.75]
     """
-    settings, points = np.asarray(nonlinear, dtype=np.float64), np.asarray(stretch, dtype=np.float64)
+    settings = np.asarray(nonlinear, dtype=np.float64)
     rows = np.atleast_2d(settings)
     _check_nonlinear(material, rows.shape[1:])
     is_linear = np.array([parameter.is_linear for parameter in material.parameters])
     values = np.repeat(np.eye(is_linear.size)[is_linear][None], len(rows), axis=0)
     values[:, :, ~is_linear] = rows[:, None]
-    found = complex_step_stress(material, mode, points, values.reshape(-1, is_linear.size))
-    if found is not None:
-        bases = np.ascontiguousarray(found.reshape(len(rows), -1, len(points)).swapaxes(1, 2))
-    else:
-        bases = np.asarray(_bases(material, mode)(points, rows))
+    curves = complex_step_stress(material, states, values.reshape(-1, is_linear.size))
+    if curves is None:
+        curves = _scattered(states, lambda path, points: _bases(material, path)(points, rows))
+    bases = np.ascontiguousarray(curves.reshape(len(rows), -1, len(states)).swapaxes(1, 2))
     return bases if settings.ndim == 2 else np.asarray(bases[0])
 
 
-def traced_stress_basis(material: Material, mode: Path, stretch: Any, nonlinear: Any) -> Any:
+def traced_stress_basis(material: Material, states: States, nonlinear: Any) -> Any:
     """Return the (n, k) `stress_basis` at nonlinear values (s,) in JAX: to be differentiated, mapped and compiled."""
     _check_nonlinear(material, np.shape(nonlinear))
     jnp = differentiator().numpy
     is_linear = np.array([parameter.is_linear for parameter in material.parameters])
-    unit = jnp.asarray(np.eye(is_linear.size)[is_linear])
+    values = jnp.asarray(np.eye(is_linear.size)[is_linear]).at[:, ~is_linear].set(nonlinear)
     with _explained(material):
-        return _stresses(material, mode)(jnp.asarray(stretch), unit.at[:, ~is_linear].set(nonlinear)).T
+        columns = [
+            (numbers, _stresses(material, path)(jnp.asarray(points), values).T)
+            for path, points, numbers in states.by_path()
+        ]
+    order = np.argsort(np.concatenate([numbers for numbers, _ in columns]))
+    return jnp.concatenate([column for _, column in columns])[order] if len(columns) > 1 else columns[0][1]
 
 
 def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:
@@ -136,34 +156,47 @@ def initial_shear_modulus(material: Material, values: ArrayLike) -> float:
         return float(_initial_slope(material)(np.asarray(values, dtype=np.float64)))
 
 
-def _stresses(material: Material, mode: Path) -> Any:
-    """Return the function of stretches (n,) and parameter values (m, k) that gives stresses (m, n)."""
+def _stresses(material: Material, path: Path) -> Any:
+    """Return the function of points (n,) and parameter values (m, k) that gives stresses (m, n)."""
     jax = differentiator()
 
-    def stress(stretch: Any, values: Any) -> Any:
-        slope = jax.grad(path_energy, argnums=4)(material, mode, stretch, values, 0.0)
-        return slope / mode.loaded_axes
+    def stress(point: Any, values: Any) -> Any:
+        slope = jax.grad(path_energy, argnums=4)(material, path, point, values, 0.0)
+        return slope / path.loaded_axes
 
     return jax.vmap(jax.vmap(stress, (0, None)), (None, 0))
 
 
 @lru_cache(maxsize=256)
-def _curves(material: Material, mode: Path) -> Any:
-    return differentiator().jit(_stresses(material, mode))
+def _curves(material: Material, path: Path) -> Any:
+    return differentiator().jit(_stresses(material, path))
 
 
 @lru_cache(maxsize=256)
-def _bases(material: Material, mode: Path) -> Any:
+def _bases(material: Material, path: Path) -> Any:
+    """Return the compiled function of points (n,) and nonlinear values (m, s) that gives bases (m, k, n)."""
     jax = differentiator()
-    basis = partial(traced_stress_basis, material, mode)
+
+    def basis(points: Any, nonlinear: Any) -> Any:
+        return traced_stress_basis(material, States((path,), (points,), (UNMEASURED,)), nonlinear).T
+
     return jax.jit(jax.vmap(basis, (None, 0)))
+
+
+def _scattered(states: States, function: Callable[[Path, FloatArray], Any]) -> FloatArray:
+    """Return what a function of a path and points (g,) gives, (..., g), for all states (..., n)."""
+    columns = [(numbers, np.asarray(function(path, points))) for path, points, numbers in states.by_path()]
+    if len(columns) == 1:
+        return columns[0][1]
+    order = np.argsort(np.concatenate([numbers for numbers, _ in columns]))
+    return np.concatenate([column for _, column in columns], axis=-1)[..., order]
 
 
 @lru_cache(maxsize=256)
 def _initial_slope(material: Material) -> Any:
     jax = differentiator()
     slope = jax.grad(jax.grad(path_energy, argnums=2), argnums=2)
-    return jax.jit(lambda values: slope(material, SimpleShear(), 0.0, values))
+    return jax.jit(lambda values: slope(material, SimpleShear().path, 0.0, values))
 
 
 @contextmanager

@@ -16,8 +16,8 @@ from typing import Any
 from tissuq.errors import InputError, ModelError
 from tissuq.mechanics.contract import checked
 from tissuq.mechanics.material import Material
-from tissuq.parameters import Parameter
-from tissuq.priors import Prior
+from tissuq.parameters.parameter import Parameter
+from tissuq.parameters.priors import Prior
 
 __all__ = ["LAW", "FunctionLaw", "as_material", "failures_of", "load_material", "run_file"]
 

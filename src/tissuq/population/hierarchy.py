@@ -1,11 +1,11 @@
 """The population: mean, spread and correlation of the specimens' parameters, every specimen integrated in closed form.
 
-On the line (`coordinates`), with d pooled parameters and what the data of specimen i say of them (`likelihoods`),
+In the coordinates of `likelihoods`, with d pooled parameters and the likelihood of each specimen i,
 
     theta_i ~ N(m, S),   S = diag(tau) Omega diag(tau),
     m ~ N(0, 5²),   tau ~ half-normal(spread),   Omega ~ LKJ(2).
 
-A Gaussian of a likelihood times N(m, S) integrates in closed form, so that the sampler meets m, tau and Omega only: no
+A Gaussian of a likelihood times N(m, S) integrates in closed form, so that only m, tau and Omega are sampled: no
 funnel, and as many dimensions for fifty specimens as for three. Each theta_i is then drawn exactly, given these.
 """
 
@@ -22,25 +22,25 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.nuts import NutsDraws, NutsSettings, sample_nuts
+from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nuts
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.resampling import systematic
 from tissuq.population.likelihoods import likelihoods_of
-from tissuq.population.mixture import Mixture
 
 __all__ = ["Hierarchy", "sample_hierarchy"]
 
 FloatArray = NDArray[np.float64]
 
-WIDE = 5.0
-"""Sd of the prior of the mean: on the line of logarithms, a factor of 150 either way from the middle specimen."""
-CONCENTRATION = 2.0
-"""Of the LKJ prior of the correlations: one would be uniform."""
-DRAWS = 1000
-"""In each of four chains."""
-FEW, MANY = 16, 200
-"""Gaussians for each specimen while sampling, and for the correction of the draws."""
-BATCH = 20
-"""Draws corrected at once: what bounds the memory."""
+MEAN_PRIOR_SD = 5.0
+"""Sd of the prior of the mean; of a logarithm it is a factor of 150 either way from the median specimen."""
+LKJ_CONCENTRATION = 2.0
+"""Concentration of the LKJ prior of the correlations; one would be uniform."""
+DRAWS_PER_CHAIN = 1000
+"""Number of draws in each of four chains."""
+SAMPLING_COMPONENTS, CORRECTION_COMPONENTS = 16, 200
+"""Number of Gaussians per specimen for sampling, and for the correction of the draws."""
+CORRECTION_BATCH = 20
+"""Number of draws corrected at once, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Hierarchy:
         Lower triangle A of the covariance A A' between specimens.
     specimens : (chains, draws, I, d) array
     sampled : NutsDraws
-        Of m, tau and Omega, and how well they were sampled.
+        Draws of m, tau and Omega, with their diagnostics.
     effective : float
         Share of the draws that remain effective after their correction.
     """
@@ -80,9 +80,9 @@ class Hierarchy:
     def diagnostics(self) -> NutsDraws:
         """The run with the parameters of every specimen among its quantities."""
         chains, draws, count, size = self.specimens.shape
-        names = [f"parameter {k + 1} of specimen {place + 1}" for place in range(count) for k in range(size)]
-        every = np.concatenate([self.sampled.values, self.specimens.reshape(chains, draws, -1)], axis=2)
-        return self.sampled.of(every, (*self.sampled.names, *names))
+        names = [f"parameter {k + 1} of specimen {index + 1}" for index in range(count) for k in range(size)]
+        values = np.concatenate([self.sampled.values, self.specimens.reshape(chains, draws, -1)], axis=2)
+        return self.sampled.of(values, (*self.sampled.names, *names))
 
     def new(self, generator: np.random.Generator) -> FloatArray:
         """Return a new specimen (chains, draws, d) for every draw of the population."""
@@ -91,12 +91,12 @@ class Hierarchy:
 
 
 def sample_hierarchy(
-    mixtures: Sequence[Mixture], reference: FloatArray, symbols: Sequence[str], spread: float, seed: int
+    mixtures: Sequence[GaussianMixture], reference: FloatArray, symbols: Sequence[str], spread: float, seed: int
 ) -> Hierarchy:
     """Return draws of the population that specimens come from.
 
-    The sampler meets every specimen as a few Gaussians. Its draws are then weighted by what many more say, and
-    resampled by these weights; specimens are drawn from the many.
+    The sampler represents every specimen by a few Gaussians. Its draws are then weighted by the likelihood of many
+    more Gaussians and resampled by these weights; specimens are drawn from the larger number.
 
     Parameters
     ----------
@@ -108,26 +108,28 @@ def sample_hierarchy(
         Sd of the half-normal prior of every spread on the line.
     seed : int
     """
-    few, many = ({k: jnp.asarray(v) for k, v in vars(likelihoods_of(mixtures, reference, count)).items()}
-                 for count in (FEW, MANY))  # fmt: skip
+    coarse, fine = ({k: jnp.asarray(v) for k, v in vars(likelihoods_of(mixtures, reference, count)).items()}
+                 for count in (SAMPLING_COMPONENTS, CORRECTION_COMPONENTS))  # fmt: skip
     size = len(symbols)
     pairs = [(i, j) for i in range(size) for j in range(i)]
-    names = [f"{what} of {symbol}" for what in ("mean", "spread") for symbol in symbols]
+    names = [f"{quantity} of {symbol}" for quantity in ("mean", "spread") for symbol in symbols]
     names += [f"partial correlation of {symbols[i]} and {symbols[j]}" for i, j in pairs]
     lower = np.r_[np.full(size, -np.inf), np.zeros(size), -np.ones(len(pairs))]
     upper = np.r_[np.full(2 * size, np.inf), np.ones(len(pairs))]
     start = np.r_[np.zeros(size), np.full(size, 0.3 * spread), np.zeros(len(pairs))]
-    settings = NutsSettings(draws=DRAWS, thinning=1, seed=seed)
-    sampled = sample_nuts(_log_posterior, lower, upper, start, settings, names, few | {"spread": jnp.asarray(spread)})
+    settings = NutsSettings(draws=DRAWS_PER_CHAIN, thinning=1, seed=seed)
+    sampled = sample_nuts(
+        _log_posterior, lower, upper, start, settings, names, coarse | {"spread": jnp.asarray(spread)}
+    )
     points = jnp.asarray(sampled.values.reshape(-1, len(names)))
     keys = jax.random.split(jax.random.key(seed + 1), len(points))
-    mean, root, specimens, gain = (np.asarray(found) for found in _completed(points, keys, few, many))
+    mean, root, specimens, gain = (np.asarray(array) for array in _corrected_draws(points, keys, coarse, fine))
     weights = np.exp(gain - gain.max())
     shape = sampled.values.shape[:2]
-    chosen = systematic(weights.reshape(shape), DRAWS) + DRAWS * np.arange(shape[0])[:, None]
+    kept_draws = systematic(weights.reshape(shape), DRAWS_PER_CHAIN) + DRAWS_PER_CHAIN * np.arange(shape[0])[:, None]
     effective = float(weights.sum() ** 2 / (weights**2).sum() / len(weights))
-    corrected = sampled.of(sampled.values.reshape(-1, len(names))[chosen], sampled.names)
-    return Hierarchy(mean[chosen], root[chosen], specimens[chosen], corrected, effective)
+    corrected = sampled.of(sampled.values.reshape(-1, len(names))[kept_draws], sampled.names)
+    return Hierarchy(mean[kept_draws], root[kept_draws], specimens[kept_draws], corrected, effective)
 
 
 def _population(position: Any) -> tuple[Any, Any]:
@@ -140,11 +142,11 @@ def _population(position: Any) -> tuple[Any, Any]:
     mean, tau, partial = position[:size], position[size : 2 * size], position[2 * size :]
     rows = []
     for i in range(size):
-        row, left = [], jnp.asarray(1.0)
+        row, remaining = [], jnp.asarray(1.0)
         for j in range(i):
-            row.append(partial[i * (i - 1) // 2 + j] * jnp.sqrt(left))
-            left = left * (1 - partial[i * (i - 1) // 2 + j] ** 2)
-        rows.append(jnp.stack([*row, jnp.sqrt(left), *[jnp.asarray(0.0)] * (size - i - 1)]))
+            row.append(partial[i * (i - 1) // 2 + j] * jnp.sqrt(remaining))
+            remaining = remaining * (1 - partial[i * (i - 1) // 2 + j] ** 2)
+        rows.append(jnp.stack([*row, jnp.sqrt(remaining), *[jnp.asarray(0.0)] * (size - i - 1)]))
     return mean, tau[:, None] * jnp.stack(rows)
 
 
@@ -158,8 +160,8 @@ def _log_posterior(position: Any, data: Any) -> Any:
     size = _size(position)
     tau, partial = position[size : 2 * size], position[2 * size :]
     level = jnp.array([j + 1 for i in range(size) for j in range(i)])
-    power = CONCENTRATION - 1 + 0.5 * (size - 1 - level)
-    prior = -0.5 * (position[:size] ** 2).sum() / WIDE**2 - 0.5 * (tau**2).sum() / data["spread"] ** 2
+    power = LKJ_CONCENTRATION - 1 + 0.5 * (size - 1 - level)
+    prior = -0.5 * (position[:size] ** 2).sum() / MEAN_PRIOR_SD**2 - 0.5 * (tau**2).sum() / data["spread"] ** 2
     prior += (power * jnp.log1p(-(partial**2))).sum()
     mean, root = _population(position)
     terms, _, _ = _terms(mean, root, data["log_factor"], data["pull"], data["precision"])
@@ -167,18 +169,18 @@ def _log_posterior(position: Any, data: Any) -> Any:
 
 
 @jax.jit
-def _completed(points: Any, keys: Any, few: Any, many: Any) -> Any:
+def _corrected_draws(points: Any, keys: Any, coarse: Any, fine: Any) -> Any:
     """Return mean, root, specimens (I, d) and what many Gaussians add to the log likelihood, for points (N, k)."""
 
-    def complete(each: Any) -> Any:
-        point, key = each
+    def complete(point_and_key: Any) -> Any:
+        point, key = point_and_key
         mean, root = _population(point)
-        before, _, _ = _terms(mean, root, **few)
-        terms, triangle, half = _terms(mean, root, **many)
-        gain = (jax.nn.logsumexp(terms, axis=1) - jax.nn.logsumexp(before, axis=1)).sum()
-        return mean, root, _drawn(key, mean, root, terms, triangle, half), gain
+        coarse_terms, _, _ = _terms(mean, root, **coarse)
+        terms, triangle, half = _terms(mean, root, **fine)
+        gain = (jax.nn.logsumexp(terms, axis=1) - jax.nn.logsumexp(coarse_terms, axis=1)).sum()
+        return mean, root, _specimen_draws(key, mean, root, terms, triangle, half), gain
 
-    return jax.lax.map(complete, (points, keys), batch_size=BATCH)
+    return jax.lax.map(complete, (points, keys), batch_size=CORRECTION_BATCH)
 
 
 def _terms(mean: Any, root: Any, log_factor: Any, pull: Any, precision: Any) -> tuple[Any, list[list[Any]], list[Any]]:
@@ -190,29 +192,29 @@ def _terms(mean: Any, root: Any, log_factor: Any, pull: Any, precision: Any) -> 
     """
     size = mean.shape[0]
     at_mean = pull - precision @ mean
-    along, inside = at_mean @ root, jnp.eye(size) + root.T @ precision @ root
+    projected, precision_of_z = at_mean @ root, jnp.eye(size) + root.T @ precision @ root
     triangle: list[list[Any]] = []
     half: list[Any] = []
     for i in range(size):
         row: list[Any] = []
         for j in range(i):
-            row.append((inside[..., i, j] - sum(row[k] * triangle[j][k] for k in range(j))) / triangle[j][j])
-        row.append(jnp.sqrt(inside[..., i, i] - sum(each**2 for each in row)))
+            row.append((precision_of_z[..., i, j] - sum(row[k] * triangle[j][k] for k in range(j))) / triangle[j][j])
+        row.append(jnp.sqrt(precision_of_z[..., i, i] - sum(entry**2 for entry in row)))
         triangle.append(row)
-        half.append((along[..., i] - sum(row[k] * half[k] for k in range(i))) / row[i])
+        half.append((projected[..., i] - sum(row[k] * half[k] for k in range(i))) / row[i])
     log_size = sum(jnp.log(triangle[i][i]) for i in range(size))
     at_zero = 0.5 * ((pull + at_mean) * mean).sum(axis=-1)
-    return log_factor + at_zero + 0.5 * sum(each**2 for each in half) - log_size, triangle, half
+    return log_factor + at_zero + 0.5 * sum(entry**2 for entry in half) - log_size, triangle, half
 
 
-def _drawn(key: Any, mean: Any, root: Any, terms: Any, triangle: Any, half: Any) -> Any:
+def _specimen_draws(key: Any, mean: Any, root: Any, terms: Any, triangle: Any, half: Any) -> Any:
     """Return theta (I, d) of all specimens given a population."""
-    first, second = jax.random.split(key)
-    chosen = jax.random.categorical(first, terms, axis=1)
-    own, size = jnp.arange(len(chosen)), mean.shape[0]
-    score = jax.random.normal(second, (len(chosen), size))
+    component_key, score_key = jax.random.split(key)
+    component = jax.random.categorical(component_key, terms, axis=1)
+    specimen, size = jnp.arange(len(component)), mean.shape[0]
+    score = jax.random.normal(score_key, (len(component), size))
     z: list[Any] = [None] * size
     for i in reversed(range(size)):
-        above = sum(triangle[k][i][own, chosen] * z[k] for k in range(i + 1, size))
-        z[i] = (half[i][own, chosen] + score[:, i] - above) / triangle[i][i][own, chosen]
+        solved = sum(triangle[k][i][specimen, component] * z[k] for k in range(i + 1, size))
+        z[i] = (half[i][specimen, component] + score[:, i] - solved) / triangle[i][i][specimen, component]
     return mean + jnp.stack(z, axis=1) @ root.T

@@ -1,6 +1,6 @@
-"""What each specimen's data say of the pooled parameters, its own fit's prior divided out: sums of Gaussians.
+"""The likelihood of each specimen's pooled parameters, as a sum of Gaussians in coordinates in which it is smooth.
 
-A specimen's posterior by itself is a mixture of thousands of Gaussians. On the line of the logarithms each of them is
+A specimen's separate posterior is a mixture of thousands of Gaussians. On the line of the logarithms each of them is
 still nearly one, as long as it is much narrower than its mean is large; wider ones are split. Few Gaussians then stand
 for all (`mixture`).
 
@@ -13,37 +13,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.kronecker import quasi_random
 from tissuq.inference.solution import Solution
-from tissuq.population.coordinates import Coordinates
-from tissuq.population.mixture import Mixture, reduced
-from tissuq.posterior import Posterior
+from tissuq.population.mixture import reduced
+from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.moments import values_of
 
-__all__ = ["Likelihoods", "likelihoods_of", "mixtures_of"]
+__all__ = ["Coordinates", "Likelihoods", "coordinates_of", "likelihoods_of", "mixtures_of"]
 
 FloatArray = NDArray[np.float64]
 
-REFERENCE = 2.0
-"""Sd of the reference on the line, at least: in logarithms, a factor of seven either way."""
-BEYOND = 3.0
-"""The same, as a multiple of the sd between the specimens."""
-NARROW = 0.02
-"""Sd over mean up to which a Gaussian is taken to be one of the logarithm, too."""
-SPLIT, NODES = 64, 60
-"""Wider Gaussians at most, and into how many narrow ones each is split."""
-REACH = 5.0
-"""Standard deviations of them that are split."""
-LEAST = 1e-4
-"""Where the line ends towards a modulus of zero, over the size of the modulus."""
-DRAWN = 4000
-"""Draws, at least, that stand for what has no extent in some direction."""
-KERNEL = 0.5
-"""Width of the kernel around draws over Silverman's: the clusters that they go into smooth them, too."""
+MIN_REFERENCE_SD = 2.0
+"""Smallest sd of the reference on the line; of a logarithm it is a factor of seven either way."""
+REFERENCE_SD_RATIO = 3.0
+"""Sd of the reference over the sd between the specimens."""
+MAX_NARROW_RATIO = 0.02
+"""Largest sd over mean of a Gaussian whose logarithm is taken to be Gaussian, too."""
+MAX_WIDE_COMPONENTS, NODES_PER_COMPONENT = 64, 60
+"""Largest number of wider Gaussians, and the number of narrow ones into which each is split."""
+SPLIT_SD = 5.0
+"""Half-width of the split range, in standard deviations."""
+MIN_MODULUS_RATIO = 1e-4
+"""Smallest modulus on the line, over the size of the modulus."""
+MIN_DRAWS = 4000
+"""Smallest number of draws that represent Gaussians without extent in some direction."""
+KERNEL_WIDTH_RATIO = 0.5
+"""Width of the kernel around draws over Silverman's, because their clusters smooth them, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +54,10 @@ class Likelihoods:
     Attributes
     ----------
     log_factor : (I, K) array
-        Minus infinity where a specimen needs fewer Gaussians.
+        Logarithms of the factors; minus infinity where a specimen needs fewer Gaussians.
     pull : (I, K, d) array
     precision : (I, K, d, d) array
-        Positive semidefinite.
+        Positive semidefinite precision matrices.
     """
 
     log_factor: FloatArray
@@ -64,116 +65,176 @@ class Likelihoods:
     precision: FloatArray
 
 
-def mixtures_of(posteriors: Sequence[Posterior], coordinates: Coordinates) -> tuple[list[Mixture], FloatArray]:
+def mixtures_of(posteriors: Sequence[Posterior], coordinates: Coordinates) -> tuple[list[GaussianMixture], FloatArray]:
     """Return every specimen's posterior on the line with a reference for its prior, and the reference's sd (d,)."""
-    found = [_on_line(posterior.solution, coordinates) for posterior in posteriors]
-    between = np.std([each.moments()[0] for each in found], axis=0)
-    reference = np.hypot(REFERENCE, BEYOND * between)
-    return [_under(reference, *each, coordinates) for each in zip(found, posteriors, strict=True)], reference
+    mixtures = [_on_line(posterior.solution, coordinates) for posterior in posteriors]
+    between = np.std([mixture.moments()[0] for mixture in mixtures], axis=0)
+    reference = np.hypot(MIN_REFERENCE_SD, REFERENCE_SD_RATIO * between)
+    return [_under(reference, *mixture, coordinates) for mixture in zip(mixtures, posteriors, strict=True)], reference
 
 
-def likelihoods_of(mixtures: Sequence[Mixture], reference: FloatArray, most: int) -> Likelihoods:
+def likelihoods_of(mixtures: Sequence[GaussianMixture], reference: FloatArray, max_components: int) -> Likelihoods:
     """Return mixtures, by at most so many Gaussians each, with the reference of sd (d,) divided out of them."""
-    few = [reduced(each, most) for each in mixtures]
-    count, size = max(len(each.weights) for each in few), len(reference)
-    log_factor = np.full((len(few), count), -np.inf)
-    pull = np.zeros((len(few), count, size))
-    precision = np.zeros((len(few), count, size, size))
-    for place, each in enumerate(few):
-        values, vectors = np.linalg.eigh(each.covariances / np.outer(reference, reference))
+    reduced_mixtures = [reduced(mixture, max_components) for mixture in mixtures]
+    count, size = max(len(mixture.weights) for mixture in reduced_mixtures), len(reference)
+    log_factor = np.full((len(reduced_mixtures), count), -np.inf)
+    pull = np.zeros((len(reduced_mixtures), count, size))
+    precision = np.zeros((len(reduced_mixtures), count, size, size))
+    for index, mixture in enumerate(reduced_mixtures):
+        values, vectors = np.linalg.eigh(mixture.covariance / np.outer(reference, reference))
         values = np.minimum(values, 1.0)  # a cluster is hardly ever wider than the reference
         sides = vectors.swapaxes(1, 2) / reference
-        own, k = sides.swapaxes(1, 2) @ (sides / values[:, :, None]), len(values)
-        pull[place, :k] = (own @ each.means[:, :, None])[:, :, 0]
-        precision[place, :k] = sides.swapaxes(1, 2) @ (sides * (1 / values - 1)[:, :, None])
-        log_size = -0.5 * np.log(values).sum(axis=1) - 0.5 * (pull[place, :k] * each.means).sum(axis=1)
-        log_factor[place, :k] = np.log(each.weights) + log_size
+        covariance, k = sides.swapaxes(1, 2) @ (sides / values[:, :, None]), len(values)
+        pull[index, :k] = (covariance @ mixture.mean[:, :, None])[:, :, 0]
+        precision[index, :k] = sides.swapaxes(1, 2) @ (sides * (1 / values - 1)[:, :, None])
+        log_size = -0.5 * np.log(values).sum(axis=1) - 0.5 * (pull[index, :k] * mixture.mean).sum(axis=1)
+        log_factor[index, :k] = np.log(mixture.weights) + log_size
     return Likelihoods(log_factor, pull, precision)
 
 
-def _on_line(solution: Solution, coordinates: Coordinates) -> Mixture:
+def _on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
     """Return the posterior of one specimen as Gaussians on the line."""
-    mean, root = values_of(solution.model, solution.components, coordinates.symbols)
-    every = Mixture(solution.components.weights, mean, root @ root.swapaxes(1, 2))
+    mean, root = values_of(solution.model, solution.mixture, coordinates.symbols)
+    mixture = GaussianMixture.of_covariances(solution.mixture.weights, mean, root @ root.swapaxes(1, 2))
     sd = np.linalg.norm(root, axis=2)
     is_point = (sd == 0).any(axis=1)
-    is_narrow = ~is_point & (~coordinates.is_log | (sd <= NARROW * mean)).all(axis=1)
-    parts = [_mapped(every[is_narrow], coordinates)]
+    is_narrow = ~is_point & (~coordinates.is_log | (sd <= MAX_NARROW_RATIO * mean)).all(axis=1)
+    pieces = [_mapped(mixture[is_narrow], coordinates)]
     if (~is_narrow & ~is_point).any():
-        parts.append(_split(reduced(every[~is_narrow & ~is_point], SPLIT), coordinates))
+        pieces.append(_split(reduced(mixture[~is_narrow & ~is_point], MAX_WIDE_COMPONENTS), coordinates))
     if is_point.any():
-        parts.append(_smoothed(every[is_point], coordinates))
-    return Mixture(*(np.concatenate(each) for each in zip(*(vars(part).values() for part in parts), strict=True)))
+        pieces.append(_smoothed(mixture[is_point], coordinates))
+    return reduce(GaussianMixture.joined, pieces)
 
 
-def _mapped(mixture: Mixture, coordinates: Coordinates) -> Mixture:
+def _mapped(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMixture:
     """Return Gaussians on the line for Gaussians of parameters that are narrow: to second order in their width."""
-    slope = np.where(coordinates.is_log, 1 / np.where(coordinates.is_log, mixture.means, 1.0), 1 / coordinates.scale)
-    covariances = mixture.covariances * slope[:, :, None] * slope[:, None, :]
+    slope = np.where(coordinates.is_log, 1 / np.where(coordinates.is_log, mixture.mean, 1.0), 1 / coordinates.scale)
+    covariances = mixture.covariance * slope[:, :, None] * slope[:, None, :]
     shift = np.where(coordinates.is_log, -0.5 * np.diagonal(covariances, axis1=1, axis2=2), 0.0)
-    return Mixture(mixture.weights, coordinates.to_line(mixture.means) + shift, covariances)
+    return GaussianMixture.of_covariances(mixture.weights, coordinates.to_line(mixture.mean) + shift, covariances)
 
 
-def _split(mixture: Mixture, coordinates: Coordinates) -> Mixture:
+def _split(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMixture:
     """Return Gaussians on the line for wider ones: each cut into narrow ones along its parameter of least precision.
 
     Where a bound does not cut them already, what lies below zero is left out.
     """
-    variance = np.diagonal(mixture.covariances, axis1=1, axis2=2)
-    relative = np.sqrt(variance) / np.abs(mixture.means) * coordinates.is_log
+    variance = np.diagonal(mixture.covariance, axis1=1, axis2=2)
+    relative = np.sqrt(variance) / np.abs(mixture.mean) * coordinates.is_log
     row, along = np.arange(len(variance)), relative.argmax(axis=1)
-    middle, sd = mixture.means[row, along], np.sqrt(variance[row, along])
-    least = LEAST * (np.abs(middle) + sd)
-    low, high = (np.log(np.maximum(middle + sign * REACH * sd, least)) for sign in (-1, 1))
-    logs = low[:, None] + np.linspace(0, 1, NODES) * (high - low)[:, None]
+    centre, sd = mixture.mean[row, along], np.sqrt(variance[row, along])
+    smallest_modulus = MIN_MODULUS_RATIO * (np.abs(centre) + sd)
+    low, high = (np.log(np.maximum(centre + sign * SPLIT_SD * sd, smallest_modulus)) for sign in (-1, 1))
+    logs = low[:, None] + np.linspace(0, 1, NODES_PER_COMPONENT) * (high - low)[:, None]
     step = np.diff(logs[:, :2], axis=1)
-    score = (np.exp(logs) - middle[:, None]) / sd[:, None]
+    score = (np.exp(logs) - centre[:, None]) / sd[:, None]
     weights = mixture.weights[:, None] * np.exp(-0.5 * score**2 + logs) * step / (np.sqrt(2 * np.pi) * sd[:, None])
-    pull = mixture.covariances[row, :, along] / sd[:, None]
-    means = mixture.means[:, None] + score[:, :, None] * pull[:, None]
-    own = (0.5 * step * np.exp(logs) / sd[:, None])[:, :, None, None] ** 2  # of the score, around a node
-    rest = mixture.covariances - pull[:, :, None] * pull[:, None, :]
-    covariances = rest[:, None] + own * (pull[:, :, None] * pull[:, None, :])[:, None]
+    pull = mixture.covariance[row, :, along] / sd[:, None]
+    means = mixture.mean[:, None] + score[:, :, None] * pull[:, None]
+    node_variance = (0.5 * step * np.exp(logs) / sd[:, None])[:, :, None, None] ** 2  # of the score, around a node
+    conditional_covariance = mixture.covariance - pull[:, :, None] * pull[:, None, :]
+    covariances = conditional_covariance[:, None] + node_variance * (pull[:, :, None] * pull[:, None, :])[:, None]
     size = means.shape[2]
     is_inside = (np.where(coordinates.is_log, means, 1.0) > 0).all(axis=2)
-    kept = Mixture(weights[is_inside], means[is_inside], covariances[is_inside].reshape(-1, size, size))
-    return _mapped(kept, coordinates)
+    positive = GaussianMixture.of_covariances(
+        weights[is_inside], means[is_inside], covariances[is_inside].reshape(-1, size, size)
+    )
+    return _mapped(positive, coordinates)
 
 
-def _smoothed(mixture: Mixture, coordinates: Coordinates) -> Mixture:
+def _smoothed(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMixture:
     """Return draws from Gaussians with no extent in some direction, with a kernel that keeps the moments."""
     from scipy.special import ndtri
 
-    count, size = mixture.means.shape
-    each = -(-DRAWN // count)
-    values, vectors = np.linalg.eigh(mixture.covariances)
+    count, size = mixture.mean.shape
+    draws_per_component = -(-MIN_DRAWS // count)
+    values, vectors = np.linalg.eigh(mixture.covariance)
     side = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
-    score = ndtri(quasi_random(size, count * each)).reshape(count, each, size)
-    drawn = (mixture.means[:, None] + np.einsum("mdp,mep->med", side, score)).reshape(-1, size)
-    is_inside = (drawn[:, coordinates.is_log] > 0).all(axis=1)
-    weights, line = np.repeat(mixture.weights / each, each)[is_inside], coordinates.to_line(drawn[is_inside])
-    middle, covariance = Mixture(weights, line, np.zeros((len(line), size, size))).moments()
+    score = ndtri(quasi_random(size, count * draws_per_component)).reshape(count, draws_per_component, size)
+    draws = (mixture.mean[:, None] + np.einsum("mdp,mep->med", side, score)).reshape(-1, size)
+    is_inside = (draws[:, coordinates.is_log] > 0).all(axis=1)
+    weights, line = (
+        np.repeat(mixture.weights / draws_per_component, draws_per_component)[is_inside],
+        coordinates.to_line(draws[is_inside]),
+    )
+    centre, covariance = GaussianMixture.of_points(weights, np.zeros((len(line), 0)), line).moments()
     effective = weights.sum() ** 2 / (weights**2).sum()
-    width = KERNEL * (4 / (size + 2) / effective) ** (1 / (size + 4))
-    places = middle + np.sqrt(1 - width**2) * (line - middle)
-    return Mixture(weights, places, np.broadcast_to(width**2 * covariance, (len(places), size, size)))
+    width = KERNEL_WIDTH_RATIO * (4 / (size + 2) / effective) ** (1 / (size + 4))
+    points = centre + np.sqrt(1 - width**2) * (line - centre)
+    return GaussianMixture.of_covariances(
+        weights, points, np.broadcast_to(width**2 * covariance, (len(points), size, size))
+    )
 
 
-def _under(reference: FloatArray, mixture: Mixture, posterior: Posterior, coordinates: Coordinates) -> Mixture:
+def _under(
+    reference: FloatArray, mixture: GaussianMixture, posterior: Posterior, coordinates: Coordinates
+) -> GaussianMixture:
     """Return a posterior on the line with its prior there replaced by the reference.
 
     The prior on the line is that of the parameters times the slope, which is theta itself for a logarithm: both factors
     are exponentials of at most squares, so that every Gaussian stays one. The parameters' own prior is wide, and taken
     at the middle of each.
     """
-    values = coordinates.from_line(mixture.means)
+    values = coordinates.from_line(mixture.mean)
     priors = [posterior.model.priors[symbol] for symbol in coordinates.symbols]
     log_prior = sum(prior.log_density(column) for prior, column in zip(priors, values.T, strict=True))
-    pull = -(coordinates.is_log + mixture.means / reference**2)
-    own = mixture.covariances
-    shrunk = own - own @ np.linalg.solve(own + np.diag(reference**2), own)
-    log_size = -0.5 * np.linalg.slogdet(np.eye(len(reference)) + mixture.covariances / reference**2)[1]
-    log_factor = -(mixture.means * (coordinates.is_log + 0.5 * mixture.means / reference**2)).sum(axis=1)
+    pull = -(coordinates.is_log + mixture.mean / reference**2)
+    covariances = mixture.covariance
+    shrunk = covariances - covariances @ np.linalg.solve(covariances + np.diag(reference**2), covariances)
+    log_size = -0.5 * np.linalg.slogdet(np.eye(len(reference)) + mixture.covariance / reference**2)[1]
+    log_factor = -(mixture.mean * (coordinates.is_log + 0.5 * mixture.mean / reference**2)).sum(axis=1)
     log_factor += 0.5 * np.einsum("mi,mij,mj->m", pull, shrunk, pull) + log_size - log_prior
     weights = mixture.weights * np.exp(log_factor - log_factor.max())
-    return Mixture(weights / weights.sum(), mixture.means + np.einsum("mij,mj->mi", shrunk, pull), shrunk)
+    return GaussianMixture.of_covariances(
+        weights / weights.sum(), mixture.mean + np.einsum("mij,mj->mi", shrunk, pull), shrunk
+    )
+
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """The map from the pooled parameters to a line on which specimens are Gaussian.
+
+    A positive parameter is mapped to its logarithm, because moduli differ between specimens by factors. A parameter of
+    either sign (C20, C01, an exponent) is divided by its typical size, so that its spread is an absolute one.
+
+    Attributes
+    ----------
+    symbols : tuple of str
+        The pooled parameters.
+    is_log : (d,) array of bool
+    scale : (d,) array
+        Size of a unit of the line for parameters that are not logarithms; one for the others.
+    centre : (d,) array
+        Origin of the line: the median of the specimens.
+    """
+
+    symbols: tuple[str, ...]
+    is_log: BoolArray
+    scale: FloatArray
+    centre: FloatArray
+
+    def to_line(self, values: FloatArray) -> FloatArray:
+        """Return places (..., d) on the line for parameters (..., d); minus infinity for a modulus of zero."""
+        with np.errstate(divide="ignore"):
+            logs = np.log(np.where(self.is_log, np.maximum(values, 0.0), 1.0))
+        return np.asarray(np.where(self.is_log, logs, values / self.scale) - self.centre)
+
+    def from_line(self, line_values: FloatArray) -> FloatArray:
+        """Return parameters (..., d) for places (..., d) on the line."""
+        line = line_values + self.centre
+        return np.asarray(np.where(self.is_log, np.exp(np.where(self.is_log, line, 0.0)), line * self.scale))
+
+
+def coordinates_of(posteriors: Sequence[Posterior], symbols: Sequence[str]) -> Coordinates:
+    """Return the coordinates of pooled parameters, with origin and scale from the specimens' separate fits."""
+    parameters = {parameter.symbol: parameter for parameter in posteriors[0].model.material.parameters}
+    is_log = np.array([parameters[s].support[0] >= 0 and np.isinf(parameters[s].support[1]) for s in symbols])
+    medians = np.array([[float(p.marginals[s].quantile(0.5)) for s in symbols] for p in posteriors])
+    sizes = np.array([[np.hypot(p.marginals[s].mean, p.marginals[s].sd) for s in symbols] for p in posteriors])
+    scale = np.where(is_log, 1.0, np.median(sizes, axis=0))
+    start = Coordinates(tuple(symbols), is_log, scale, np.zeros(len(symbols)))
+    return Coordinates(tuple(symbols), is_log, scale, np.median(start.to_line(medians), axis=0))

@@ -2,47 +2,112 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.stability import calibrated_range
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.inference.solution import Components
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.marginal import marginal_of_points
+from tissuq.inference.solution import Diagnostics, Marginals, Solution
 from tissuq.mechanics import Material, engineering_stress, initial_shear_modulus
-from tissuq.population.coordinates import Coordinates
-from tissuq.posterior import Posterior
+from tissuq.model.discrepancy import NoDiscrepancy
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.population.likelihoods import Coordinates
+from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.moments import drawn_curves, values_of
 
-__all__ = ["matching_draws", "patient_curves"]
+if TYPE_CHECKING:
+    from tissuq.population.hierarchy import Hierarchy
+
+__all__ = ["matching_draws", "patient_curves", "patient_posterior"]
 
 FloatArray = NDArray[np.float64]
 
-SMALL = 1e-3
-"""Of the stretch, for the initial slope."""
-LEAST_MODULUS = 0.1
-"""Of the median initial modulus of a specimen: a draw nearer to zero does not scale its model error."""
+STRETCH_STEP = 1e-3
+"""Step of the stretch for the initial slope."""
+MIN_MODULUS_RATIO = 0.1
+"""Smallest initial modulus by which a model error is divided, as a share of the specimen's median modulus."""
 
 
-def matching_draws(posterior: Posterior, coordinates: Coordinates, places: FloatArray) -> Components:
-    """Return the draws of a specimen by itself, as points, whose pooled parameters come nearest to places (N, d)."""
+def matching_draws(posterior: Posterior, coordinates: Coordinates, targets: FloatArray) -> GaussianMixture:
+    """Return draws of a specimen's separate fit, as points, whose pooled parameters are nearest to targets (N, d)."""
     from scipy.spatial import KDTree
 
-    every = posterior.solution.components
-    chosen, drawn = every.drawn(posterior.seed)
-    which, linear, width = chosen.ravel(), drawn.reshape(-1, drawn.shape[2]), every.root.shape[1:]
-    points = replace(every[which], mean=linear, root=np.broadcast_to(np.zeros(width), (len(which), *width)))
-    own = coordinates.to_line(values_of(posterior.model, points, coordinates.symbols)[0])
-    own = np.maximum(own, -1e3)  # a modulus of zero
-    spread = own.std(axis=0) + 1e-300
-    return points[KDTree(own / spread).query(places / spread)[1]]
+    components = posterior.solution.mixture
+    selected, drawn = components.draw(posterior.seed)
+    rows, linear, width = selected.ravel(), drawn.reshape(-1, drawn.shape[2]), components.root.shape[1:]
+    points = replace(components[rows], mean=linear, root=np.broadcast_to(np.zeros(width), (len(rows), *width)))
+    line_values = coordinates.to_line(values_of(posterior.model, points, coordinates.symbols)[0])
+    line_values = np.maximum(line_values, -1e3)  # a modulus of zero
+    spread = line_values.std(axis=0) + 1e-300
+    return points[KDTree(line_values / spread).query(targets / spread)[1]]
+
+
+def patient_posterior(
+    posteriors: Sequence[Posterior],
+    complete: Posterior,
+    coordinates: Coordinates,
+    hierarchy: Hierarchy,
+    new: FloatArray,
+) -> Posterior:
+    """Return the posterior of the material of a patient who has not been measured, without discrepancy.
+
+    Parameters that are not pooled, and the noise, are those of a random specimen, from the draw whose pooled parameters
+    are nearest to the specimen's.
+
+    Parameters
+    ----------
+    posteriors : sequence of Posterior
+        Of every specimen by itself.
+    complete : Posterior
+        Of all measurements as of one specimen.
+    coordinates : Coordinates
+    hierarchy : Hierarchy
+    new : (chains, draws, d) array
+        The pooled parameters of new patients.
+    """
+    full = complete.model
+    used = {p.symbol for p in (*full.material.parameters, *full.noise.parameters)}
+    chosen = {symbol: prior for symbol, prior in full.chosen_priors.items() if symbol in used}
+    model = StatisticalModel(full.experiment, full.material, NoDiscrepancy(), full.noise, chosen)
+    chains, draws, count, size = hierarchy.specimens.shape
+    on_line, values = hierarchy.specimens.reshape(-1, count, size), np.empty((chains * draws, len(model.symbols)))
+    for i, posterior in enumerate(posteriors):
+        rows = np.arange(i, chains * draws, count)
+        matching = matching_draws(posterior, coordinates, on_line[rows, i])
+        values[rows], _ = values_of(posterior.model, matching, model.symbols)
+    values[:, [model.symbols.index(symbol) for symbol in coordinates.symbols]] = new.reshape(-1, size)
+    columns = dict(zip(model.symbols, values.T, strict=True))
+    settings, linear = (
+        np.array([columns[symbol] for symbol in symbols]).reshape(-1, chains * draws).T
+        for symbols in (model.nonlinear, model.linear)
+    )
+    weights = np.full(chains * draws, 1 / (chains * draws))
+    mixture = GaussianMixture.of_points(weights, settings, linear)
+    support = {parameter.symbol: parameter.support for parameter in model.parameters}
+    names = f"{count} specimens, pooled in {', '.join(coordinates.symbols)}"
+    solution = Solution(
+        model,
+        "population",
+        f"a new patient of the population of {names}; what is not pooled is that of a random specimen",
+        lambda: mixture,
+        Marginals.of(model, lambda symbol: marginal_of_points(columns[symbol], weights, support[symbol])),
+        sampled=linear.reshape(chains, draws, -1),
+        diagnostics=_diagnostics(hierarchy, values.reshape(chains, draws, -1), model.symbols),
+        is_of_data=False,
+    )
+    return Posterior(solution, complete.solver)
 
 
 def patient_curves(
     posterior: Posterior,
     coordinates: Coordinates,
-    draws: Components,
+    draws: GaussianMixture,
     new: FloatArray,
     stretch: FloatArray,
     *,
@@ -57,9 +122,9 @@ def patient_curves(
     Parameters
     ----------
     posterior : Posterior
-        The specimen by itself.
+        Separate fit of the specimen.
     coordinates : Coordinates
-    draws : Components
+    draws : GaussianMixture
         N draws of the specimen.
     new : (N, d) array
         The pooled parameters of the patients; what is not pooled is the specimen's.
@@ -71,26 +136,40 @@ def patient_curves(
         Add the specimen's discrepancy in the same draw, in proportion to the patient's initial modulus.
     """
     model = posterior.model
-    own, _ = values_of(model, draws, model.material_symbols)
-    values = own.copy()
+    specimen_values, _ = values_of(model, draws, model.material_symbols)
+    values = specimen_values.copy()
     values[:, [model.material_symbols.index(symbol) for symbol in coordinates.symbols]] = new
-    curves = engineering_stress(model.material, mode.channels[channel], stretch, values)
+    curves = engineering_stress(model.material, mode.paths[channel], stretch, values)
     if not discrepancy:
         return curves
-    was_measured = mode in model.experiment.modes
-    if not was_measured and not model.discrepancy.is_energy:
+    if mode not in model.experiment.modes and not model.discrepancy.is_energy:
         return np.full_like(curves, np.nan)
-    path, points = model.experiment.along(mode, stretch, channel)
-    _, error = drawn_curves(model, draws, points, mode=None if was_measured else path)
-    before, after = (_initial_modulus(model.material, each) for each in (own, values))
-    curves = curves + error * (after / np.maximum(before, LEAST_MODULUS * np.median(before)))[:, None]
+    _, error = drawn_curves(model, draws, model.experiment.states_at(stretch, mode, channel))
+    specimen_modulus, patient_modulus = (
+        _initial_modulus(model.material, parameters) for parameters in (specimen_values, values)
+    )
+    curves = (
+        curves
+        + error
+        * (patient_modulus / np.maximum(specimen_modulus, MIN_MODULUS_RATIO * np.median(specimen_modulus)))[:, None]
+    )
     low, high = calibrated_range(model.experiment, mode)
-    return np.where((stretch < low - SMALL) | (stretch > high + SMALL), np.nan, curves)
+    return np.where((stretch < low - STRETCH_STEP) | (stretch > high + STRETCH_STEP), np.nan, curves)
+
+
+def _diagnostics(hierarchy: Hierarchy, values: FloatArray, symbols: tuple[str, ...]) -> Diagnostics:
+    """Return how well draws (chains, draws, k) of the parameters are known; converged where the population has."""
+    population, patient = hierarchy.diagnostics, hierarchy.sampled.of(values, symbols)
+    rhat, ess_bulk, ess_tail = (
+        dict(zip(symbols, map(float, column), strict=True))
+        for column in (patient.rhat, patient.ess_bulk, patient.ess_tail)
+    )
+    return Diagnostics(bool(population.converged), population.verdict, rhat, ess_bulk, ess_tail)
 
 
 def _initial_modulus(material: Material, values: FloatArray) -> FloatArray:
     """Return the initial shear moduli (N,) of material parameters (N, p)."""
     if not material.is_isotropic:
-        return np.array([initial_shear_modulus(material, each) for each in values])
-    slope = engineering_stress(material, loading_mode("uniaxial"), np.array([1 + SMALL]), values)
-    return np.asarray(slope[:, 0] / (3 * SMALL))
+        return np.array([initial_shear_modulus(material, parameters) for parameters in values])
+    slope = engineering_stress(material, loading_mode("uniaxial"), np.array([1 + STRETCH_STEP]), values)
+    return np.asarray(slope[:, 0] / (3 * STRETCH_STEP))

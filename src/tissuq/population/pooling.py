@@ -1,33 +1,31 @@
-"""The call: from the experiments of several specimens to their population."""
+"""The call `fit_population`: from the experiments of several specimens to their population."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import reduce
 from typing import Literal
 
 import numpy as np
 
-from tissuq.discrepancy import Discrepancy
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.fitting import Method, fit_many
 from tissuq.mechanics import Material, material_named
-from tissuq.mechanics.joint import joined
-from tissuq.noise import Noise
-from tissuq.population.coordinates import coordinates_of
-from tissuq.population.likelihoods import mixtures_of
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.noise import Noise
+from tissuq.parameters.priors import Prior
+from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population
-from tissuq.priors import Prior
+from tissuq.posterior.fitting import fit_many
+from tissuq.posterior.solver import Method
 
-__all__ = ["LEAST", "fit_population"]
+__all__ = ["MIN_SPECIMENS", "fit_population"]
 
-LEAST = 3
-"""Specimens: two tell a difference, but no spread."""
-ALL = "all specimens"
-"""The name of what complete pooling takes for one specimen."""
+MIN_SPECIMENS = 3
+"""Smallest number of specimens: two determine a difference, but no spread."""
+ALL_SPECIMENS = "all specimens"
+"""Name of all specimens together, as complete pooling treats them."""
 
 
 def fit_population(
@@ -45,7 +43,7 @@ def fit_population(
 ) -> Population:
     """Identify the parameters of several specimens and of the population that they come from.
 
-    Every specimen is first fitted by itself, with wide priors and a discrepancy and noise of its own (no pooling). The
+    Every specimen is first fitted separately, with wide priors and its own discrepancy and noise (no pooling). The
     pooled parameters of the specimens, the positive ones by their logarithms, are then taken to be Gaussian with an
     unknown mean, spread and correlation (partial pooling): what a specimen's own data leave open is filled in from the
     others. All measurements taken for those of one specimen (complete pooling) stand beside.
@@ -54,15 +52,15 @@ def fit_population(
     ----------
     experiments : sequence of Experiment, or mapping of str to Experiment or sequence of them
         The tests of every specimen, in any loading modes. In a sequence, experiments of the same specimen (of the same
-        name, where they do not say a specimen) belong together. A specimen's tests in one mode are joined, so that they
-        can tell the noise (``noise="repeats"``); those in several modes are fitted together.
+        name, where no specimen is given) belong together. A specimen's tests in one mode are joined, so that they
+        can determine the noise (``noise="repeats"``); those in several modes are fitted together.
     parameters : sequence of str, optional
         The material's parameters that are pooled; all, unless given. The others stay each specimen's own.
     spread : float
         Sd of the half-normal prior of the spreads: of the logarithm; for parameters of either sign, in units of their
         typical size. One lets specimens differ by factors of ten.
     discrepancy, material, noise_sd, noise, priors, method, seed
-        As for `tissuq.fit`, for every specimen by itself. Priors of pooled parameters only serve that step: they are
+        As for `tissuq.fit`, for every separate fit. Priors of pooled parameters only serve that step: they are
         divided out, and must be wide.
 
     Raises
@@ -95,63 +93,68 @@ def fit_population(
     from tissuq.population.hierarchy import sample_hierarchy  # JAX and BlackJAX, when they are needed
 
     specimens = _by_specimen(experiments)
-    chosen = material_named(material)
-    symbols = _checked(parameters, chosen)
+    pooled_material = material_named(material)
+    symbols = _pooled_symbols(parameters, pooled_material)
     if not (np.isfinite(spread) and spread > 0):
         raise InputError(f"spread must be a positive number, not {spread!r}.")
-    *alone, complete = fit_many(
+    *single, complete = fit_many(
         [
-            *(_one(name, tests) for name, tests in specimens.items()),
-            _one(ALL, [test for tests in specimens.values() for test in tests]),
+            *(_one_specimen(name, tests) for name, tests in specimens.items()),
+            _one_specimen(ALL_SPECIMENS, [test for tests in specimens.values() for test in tests]),
         ],
         discrepancy=discrepancy,
-        material=chosen,
+        material=pooled_material,
         noise_sd=noise_sd,
         noise=noise,
         priors=priors,
         method=method,
         seed=seed,
     )
-    coordinates = coordinates_of(alone, symbols)
-    mixtures, reference = mixtures_of(alone, coordinates)
+    coordinates = coordinates_of(single, symbols)
+    mixtures, reference = mixtures_of(single, coordinates)
     hierarchy = sample_hierarchy(mixtures, reference, symbols, spread, seed)
-    return Population(dict(zip(specimens, alone, strict=True)), complete, coordinates, hierarchy, spread, seed)
+    return Population(dict(zip(specimens, single, strict=True)), complete, coordinates, hierarchy, spread, seed)
 
 
 def _by_specimen(
     experiments: Sequence[Experiment] | Mapping[str, Experiment | Sequence[Experiment]],
 ) -> dict[str, list[Experiment]]:
     """Return the tests of each specimen."""
-    found: dict[str, list[Experiment]] = {}
+    tests_of: dict[str, list[Experiment]] = {}
     if isinstance(experiments, Mapping):
-        found = {str(name): list(joined(tests).parts) for name, tests in experiments.items()}
+        tests_of = {str(name): list(Experiment.of(tests).tests) for name, tests in experiments.items()}
     elif experiments:
-        for each in joined(experiments).parts:
-            found.setdefault(each.specimen or each.name, []).append(each)
-    if len(found) < LEAST:
-        names = f" ({', '.join(found)})" if found else ""
+        for test in Experiment.of(experiments).tests:
+            tests_of.setdefault(test.specimen or test.name, []).append(test)
+    if len(tests_of) < MIN_SPECIMENS:
+        names = f" ({', '.join(tests_of)})" if tests_of else ""
         raise InputError(
-            f"a population needs {LEAST} specimens or more; there are {len(found)}{names}. Experiments of one name are "
-            "tests of one specimen: give every specimen a name of its own, or a mapping from names to experiments. "
-            "For a single specimen use tissuq.fit."
+            f"a population needs {MIN_SPECIMENS} specimens or more; there are {len(tests_of)}{names}. Experiments of "
+            "the same name are tests of one specimen: give every specimen its own name, or a mapping from names to "
+            "experiments. For a single specimen use tissuq.fit."
         )
-    return found
+    return tests_of
 
 
-def _one(name: str, tests: Sequence[Experiment]) -> Experiment:
-    """Return tests as those of one specimen: joined in each mode, so that no error of one against another is meant."""
+def _one_specimen(name: str, tests: Sequence[Experiment]) -> Experiment:
+    """Return tests as those of one specimen: joined in each mode, without errors of one test against another."""
     modes: dict[LoadingMode, list[Experiment]] = {}
     for test in tests:
         modes.setdefault(test.mode, []).append(test)
-    return joined([replace(reduce(Experiment.joined, own), name=name, specimen=name) for own in modes.values()])
+    return Experiment.of(
+        [
+            reduce(Experiment.joined, tests_in_mode).labelled(name=name, specimen=name)
+            for tests_in_mode in modes.values()
+        ]
+    )
 
 
-def _checked(parameters: Sequence[str] | None, material: Material) -> tuple[str, ...]:
-    known = tuple(parameter.symbol for parameter in material.parameters)
+def _pooled_symbols(parameters: Sequence[str] | None, material: Material) -> tuple[str, ...]:
+    symbols = tuple(parameter.symbol for parameter in material.parameters)
     if parameters is None:
-        return known
-    unknown = [symbol for symbol in parameters if symbol not in known]
+        return symbols
+    unknown = [symbol for symbol in parameters if symbol not in symbols]
     if isinstance(parameters, str) or unknown or not parameters:
-        found = parameters if isinstance(parameters, str) else ", ".join(unknown) or "none"
-        raise InputError(f"parameters to pool must be a list of {', '.join(known)}; found: {found}.")
-    return tuple(symbol for symbol in known if symbol in parameters)
+        given_text = parameters if isinstance(parameters, str) else ", ".join(unknown) or "none"
+        raise InputError(f"parameters to pool must be a list of {', '.join(symbols)}; found: {given_text}.")
+    return tuple(symbol for symbol in symbols if symbol in parameters)

@@ -1,4 +1,4 @@
-"""Several specimens together: the population, every specimen within it, and what is to be expected of a new patient."""
+"""Several specimens together: the population, every specimen within it, and the prediction of a new patient."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.population.coordinates import Coordinates
 from tissuq.population.labelled import labelled
-from tissuq.population.patient import matching_draws, patient_curves
-from tissuq.posterior import Posterior
+from tissuq.population.likelihoods import Coordinates
+from tissuq.population.patient import matching_draws, patient_curves, patient_posterior
+from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from tissuq.inference.nuts import NutsDraws
+    from tissuq.inference.enumerators.nuts import NutsDraws
     from tissuq.population.hierarchy import Hierarchy
 
 __all__ = ["Population"]
 
 FloatArray = NDArray[np.float64]
 
-LEAST_EFFECTIVE = 0.5
-"""Share of draws that must stay effective when they are corrected."""
-FEW = 5
-"""Specimens below which the prior of the spread has its say."""
-ENDS = ["median", "hdi_low", "hdi_high"]
+MIN_EFFECTIVE_SHARE = 0.5
+"""Smallest share of draws that must remain effective when they are corrected."""
+MIN_SPECIMENS_FOR_SPREAD = 5
+"""Smallest number of specimens for which the prior of the spread has little influence."""
+INTERVAL_COLUMNS = ["median", "hdi_low", "hdi_high"]
 
 
 class Population:
@@ -42,11 +42,11 @@ class Population:
     Attributes
     ----------
     posteriors : dict of str to Posterior
-        Every specimen by itself: no pooling.
+        Separate fit of every specimen: no pooling.
     complete : Posterior
-        The measurements of all specimens taken for one specimen: complete pooling.
+        The measurements of all specimens taken as those of one specimen: complete pooling.
     coordinates : Coordinates
-        What is pooled, and in which form: logarithms of positive parameters.
+        The pooled parameters and their form: logarithms of positive ones.
     hierarchy : Hierarchy
         Draws of the population and of the specimens within it, in these coordinates: partial pooling.
     spread_prior : float
@@ -98,42 +98,64 @@ class Population:
         return self.coordinates.from_line(self.hierarchy.new(np.random.default_rng([self.seed, 5])))
 
     @cached_property
+    def patient(self) -> Posterior:
+        """The posterior of the material of a patient who has not been measured, for predictions, cards and simulations.
+
+        It has no discrepancy: the model error of a new patient is known along measured curves only (`new_patient`).
+        Parameters that are not pooled, and the noise, are those of a random specimen.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.8, 0.9, 1.1, 1.2, 1.3]
+        >>> moduli = {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45}
+        >>> specimens = {name: tq.simulate("neo-hookean", {"C10": modulus}, stretch, noise_sd=0.01, seed=seed)
+        ...              for seed, (name, modulus) in enumerate(moduli.items())}
+        >>> patient = tq.fit_population(specimens, discrepancy="none", noise_sd=0.01).patient
+        >>> len(patient.ensemble(20))
+        20
+        """
+        posteriors = tuple(self.posteriors.values())
+        return patient_posterior(posteriors, self.complete, self.coordinates, self.hierarchy, self.new)
+
+    @cached_property
     def diagnostics(self) -> NutsDraws:
         """R-hat and effective sample sizes of the population and of every specimen, and a verdict."""
         return self.hierarchy.diagnostics
 
     @property
     def converged(self) -> bool:
-        """Whether sampling of the population, and of every specimen by itself, has converged."""
+        """Whether sampling of the population, and of every separate fit of a specimen, has converged."""
         fits = (*self.posteriors.values(), self.complete)
-        is_corrected = self.hierarchy.effective > LEAST_EFFECTIVE
+        is_corrected = self.hierarchy.effective > MIN_EFFECTIVE_SHARE
         return self.diagnostics.converged and is_corrected and not any(fit.solution.is_approximate for fit in fits)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader must know, in sentences."""
-        found = []
+        """Warnings that the user must read, in sentences."""
+        sentences = []
         if not self.diagnostics.converged:
-            found.append(self.diagnostics.verdict)
-        if self.hierarchy.effective <= LEAST_EFFECTIVE:
-            found.append(
-                f"only {self.hierarchy.effective:.0%} of the draws stay effective when corrected for the form in which "
-                "specimens were sampled: the specimens' posteriors are too far from few Gaussians."
+            sentences.append(self.diagnostics.verdict)
+        if self.hierarchy.effective <= MIN_EFFECTIVE_SHARE:
+            sentences.append(
+                f"only {self.hierarchy.effective:.0%} of the draws remain effective when they are corrected for the "
+                "approximation of the specimens' posteriors by a few Gaussians: the approximation is too poor."
             )
         failed = [name for name, fit in self.posteriors.items() if fit.solution.is_approximate]
         if failed:
-            found.append(
-                f"sampling has not converged for {', '.join(failed)} alone: the population rests on these, too."
+            sentences.append(
+                f"sampling has not converged for the separate fit of {', '.join(failed)}, on which the population "
+                "depends."
             )
-        if len(self.names) < FEW:
-            found.append(
-                f"{len(self.names)} specimens hardly tell a spread: its prior, half-normal with sd "
-                f"{self.spread_prior:g} of the logarithm, has its say in the interval of a new patient, too."
+        if len(self.names) < MIN_SPECIMENS_FOR_SPREAD:
+            sentences.append(
+                f"{len(self.names)} specimens determine the spread poorly: its prior, half-normal with sd "
+                f"{self.spread_prior:g} of the logarithm, influences the interval of a new patient, too."
             )
-        return tuple(found)
+        return tuple(sentences)
 
     def summary(self, prob: float = 0.95) -> pd.DataFrame:
-        """Return what is said of every pooled parameter (MPa), by partial and by complete pooling.
+        """Return median and interval of every pooled parameter (MPa), by partial and by complete pooling.
 
         Parameters
         ----------
@@ -152,17 +174,17 @@ class Population:
 
         _check_probability(prob)
         rows = {}
-        for place, symbol in enumerate(self.symbols):
+        for index, symbol in enumerate(self.symbols):
             for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
-                rows[symbol, name] = _interval(draws[..., place], prob)
-            alone = self.complete.marginals[symbol]
-            rows[symbol, "complete pooling"] = (float(alone.quantile(0.5)), *alone.hdi(prob))
-        return pd.DataFrame.from_dict(rows, orient="index", columns=ENDS).set_index(
+                rows[symbol, name] = _interval(draws[..., index], prob)
+            marginal = self.complete.marginals[symbol]
+            rows[symbol, "complete pooling"] = (float(marginal.quantile(0.5)), *marginal.hdi(prob))
+        return pd.DataFrame.from_dict(rows, orient="index", columns=INTERVAL_COLUMNS).set_index(
             pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
         )
 
     def specimen_summary(self, prob: float = 0.95) -> pd.DataFrame:
-        """Return every specimen's parameters (MPa) by itself and within the population.
+        """Return every specimen's parameters (MPa) from its separate fit and within the population.
 
         Returns
         -------
@@ -175,23 +197,25 @@ class Population:
         _check_probability(prob)
         rows, draws = {}, self.specimens
         for i, (name, posterior) in enumerate(self.posteriors.items()):
-            for place, symbol in enumerate(self.symbols):
-                alone = posterior.marginals[symbol]
-                own = float(alone.quantile(0.5)), *alone.hdi(prob)
-                rows[name, symbol] = (*_interval(draws[..., i, place], prob), *own)
+            for column, symbol in enumerate(self.symbols):
+                marginal = posterior.marginals[symbol]
+                single = float(marginal.quantile(0.5)), *marginal.hdi(prob)
+                rows[name, symbol] = (*_interval(draws[..., i, column], prob), *single)
         index = pd.MultiIndex.from_tuples(rows, names=["specimen", "parameter"])
-        return pd.DataFrame(list(rows.values()), index, [*ENDS, *(f"alone_{end}" for end in ENDS)])
+        return pd.DataFrame(
+            list(rows.values()), index, [*INTERVAL_COLUMNS, *(f"alone_{end}" for end in INTERVAL_COLUMNS)]
+        )
 
     def correlations(self, prob: float = 0.95) -> pd.DataFrame:
         """Return the correlation between specimens of every pair of parameters, on the line of `coordinates`."""
         import pandas as pd
 
         _check_probability(prob)
-        found, count = self.hierarchy.correlation, len(self.symbols)
+        correlation, count = self.hierarchy.correlation, len(self.symbols)
         pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
         names = [f"{self.symbols[i]}, {self.symbols[j]}" for i, j in pairs]
-        rows = [_interval(found[..., i, j], prob) for i, j in pairs]
-        return pd.DataFrame(np.reshape(rows, (len(rows), 3)), pd.Index(names, name="parameters"), ENDS)
+        rows = [_interval(correlation[..., i, j], prob) for i, j in pairs]
+        return pd.DataFrame(np.reshape(rows, (len(rows), 3)), pd.Index(names, name="parameters"), INTERVAL_COLUMNS)
 
     def new_patient(
         self,
@@ -202,11 +226,11 @@ class Population:
         discrepancy: bool = True,
         prob: float = 0.95,
     ) -> pd.DataFrame:
-        """Return the engineering stress that is to be expected of a patient who has not been measured.
+        """Return the engineering stress that is expected of a patient who has not been measured.
 
-        The material is drawn from the population. Nothing is known of a new patient's model error but that it is like
-        those that were seen: at every stretch it is the discrepancy of one at random of the specimens that were
-        measured there, in proportion to the initial modulus, from the same draw as that specimen's parameters.
+        The material is drawn from the population. A new patient's model error is taken to be like those of the
+        specimens: at every stretch it is the discrepancy of a random specimen that was measured there, in proportion
+        to the initial modulus, from the same draw as that specimen's parameters.
 
         Parameters
         ----------
@@ -217,7 +241,7 @@ class Population:
         channel : int
             Which of the mode's stresses, from 0, where it has several.
         discrepancy : bool
-            With the model error, or of the material alone.
+            Add the model error to the material's stress.
         prob : float
             Probability between low and high, equal tails.
 
@@ -229,29 +253,29 @@ class Population:
         import pandas as pd
 
         options: dict[str, Any] = {"discrepancy": discrepancy, "mode": mode, "channel": channel}
-        asked, points = asked_for([self.complete.solution], stretch, prob=prob, **options)
-        if len(asked.controls) > 1:
-            names = ", ".join(control.name for control in asked.controls)
+        loading, points = asked_for([self.complete.solution], stretch, prob=prob, **options)
+        if len(loading.controls) > 1:
+            names = ", ".join(control.name for control in loading.controls)
             raise InputError(
-                f"the stress of a new patient is predicted in loading modes with one control, and '{asked.name}' has "
+                f"the stress of a new patient is predicted in loading modes with one control, and '{loading.name}' has "
                 f"{names}."
             )
         chains, draws, count, size = self.hierarchy.specimens.shape
-        places, new = self.hierarchy.specimens.reshape(-1, count, size), self.new.reshape(-1, size)
+        line_values, new = self.hierarchy.specimens.reshape(-1, count, size), self.new.reshape(-1, size)
         curves = []
         for i, posterior in enumerate(self.posteriors.values()):
-            own = np.arange(i, chains * draws, count)
-            matching = matching_draws(posterior, self.coordinates, places[own, i])
-            given = posterior, self.coordinates, matching, new[own], points
-            curves.append(patient_curves(*given, mode=asked, channel=channel, discrepancy=discrepancy))
-        found = np.concatenate(curves)
-        unseen = np.isnan(found).all(axis=0)
+            rows = np.arange(i, chains * draws, count)
+            matching = matching_draws(posterior, self.coordinates, line_values[rows, i])
+            arguments = posterior, self.coordinates, matching, new[rows], points
+            curves.append(patient_curves(*arguments, mode=loading, channel=channel, discrepancy=discrepancy))
+        stresses = np.concatenate(curves)
+        unseen = np.isnan(stresses).all(axis=0)
         if unseen.any():
             raise InputError(
-                f"no specimen was measured at {asked.controls[0].name} {points[unseen][0]:g}, so that nothing is "
-                "known of the model error there: predict nearer to the data, or with discrepancy=False."
+                f"no specimen was measured at {loading.controls[0].name} {points[unseen][0]:g},so that the model "
+                "error there is unknown: predict nearer to the data, or with discrepancy=False."
             )
-        low, median, high = np.nanquantile(found, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
+        low, median, high = np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
         return pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
 
     @cached_property
@@ -261,7 +285,12 @@ class Population:
         Groups posterior (of the population and the specimens), new_patient, no_pooling, complete_pooling,
         observed_data and constant_data.
         """
-        return labelled(self)
+        labels: dict[str, str | float] = {
+            "spread_prior": f"half-normal({self.spread_prior:g})",
+            "seed": self.seed,
+            "converged": str(self.converged),
+        }
+        return labelled(self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new, labels)
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
@@ -275,9 +304,9 @@ class Population:
 def _interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:
     """Return the median of draws and the ends of the shortest interval that holds a share of them."""
     values = np.sort(draws, axis=None)
-    inside = round(prob * len(values))
-    start = int((values[inside:] - values[: len(values) - inside]).argmin())
-    return float(np.median(values)), float(values[start]), float(values[start + inside])
+    count = round(prob * len(values))
+    start = int((values[count:] - values[: len(values) - count]).argmin())
+    return float(np.median(values)), float(values[start]), float(values[start + count])
 
 
 def _check_probability(prob: float) -> None:

@@ -10,17 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.experiment import Experiment, checked_points
+from tissuq.experiments.experiment import Curve, Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading import STRESS_TYPES
-from tissuq.inference.solution import Components, Solution
-from tissuq.model import StatisticalModel
+from tissuq.experiments.reading.experiment_file import STRESS_TYPES
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.solution import Solution
+from tissuq.model.measurement_errors import ErrorPoints
+from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.mixture import Mixtures
 from tissuq.prediction.moments import stress_moments
 
 __all__ = [
     "Band",
     "asked_for",
+    "inside_band",
     "predict_average",
     "predict_band",
     "predictive_mixtures",
@@ -31,11 +34,11 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-BLOCK = 2000
+STRETCHES_OF_BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
 STEP = 1e-5
 """Of the stretch, for the slope of a curve."""
-MANY, FEW = 1500, 200
+COMPONENTS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 1500, 200
 """Components that stand for the posterior at a block of stretches, and at more."""
 
 
@@ -88,7 +91,7 @@ def predict_band(
 
 
 def predict_average(
-    parts: Sequence[tuple[float, Solution]],
+    weighted_solutions: Sequence[tuple[float, Solution]],
     stretch: ArrayLike,
     *,
     discrepancy: bool = True,
@@ -101,16 +104,16 @@ def predict_average(
 
     All else is as for `predict_band`.
     """
-    solutions = [solution for _, solution in parts]
-    asked, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
+    solutions = [solution for _, solution in weighted_solutions]
+    loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
-    every = predictive_mixtures(parts, points, asked, channel, discrepancy=discrepancy, noise=noise)
-    curves = [[each.mean, *map(each.quantile, tails)] for each in every]
-    return Band(asked.channels[channel].abscissa(points), *np.concatenate(curves, axis=1))
+    mixtures = predictive_mixtures(weighted_solutions, points, loading, channel, discrepancy=discrepancy, noise=noise)
+    curves = [[mixture.mean, *map(mixture.quantile, tails)] for mixture in mixtures]
+    return Band(loading.paths[channel].abscissa(points), *np.concatenate(curves, axis=1))
 
 
 def predictive_mixtures(
-    parts: Sequence[tuple[float, Solution]],
+    weighted_solutions: Sequence[tuple[float, Solution]],
     points: FloatArray,
     mode: LoadingMode,
     channel: int,
@@ -119,15 +122,15 @@ def predictive_mixtures(
     noise: bool,
 ) -> Iterator[Mixtures]:
     """Yield the predictive distributions of a stress at points of a mode, some points at a time."""
-    count = FEW if len(points) > BLOCK else MANY
-    mixture = [(weight, solution.model, solution.components.thinned(count)) for weight, solution in parts]
+    count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
+    mixture = [(weight, solution.model, solution.mixture.thinned(count)) for weight, solution in weighted_solutions]
     weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
-    for block in np.array_split(points, max(1, len(points) // BLOCK)):
+    for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
         moments = [
             _moments(model, components, block, mode, channel, discrepancy=discrepancy, noise=noise)
             for _, model, components in mixture
         ]
-        yield Mixtures(weights, *(np.concatenate(each) for each in zip(*moments, strict=True)))
+        yield Mixtures(weights, *(np.concatenate(blocks) for blocks in zip(*moments, strict=True)))
 
 
 def asked_for(
@@ -146,18 +149,18 @@ def asked_for(
     InputError, ModelError
         When they cannot.
     """
-    asked = loading_mode(mode) if mode is not None else _only_mode(solutions[0].model.experiment)
-    points = checked_points(asked, np.atleast_1d(stretch))
+    loading = loading_mode(mode) if mode is not None else _only_mode(solutions[0].model.experiment)
+    points = checked_points(loading, np.atleast_1d(stretch))
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
-    if not 0 <= channel < len(asked.stresses):
-        raise InputError(f"mode '{asked.name}' has the stresses {', '.join(asked.stresses)}: no number {channel}.")
+    if not 0 <= channel < len(loading.stresses):
+        raise InputError(f"mode '{loading.name}' has the stresses {', '.join(loading.stresses)}: no number {channel}.")
     for solution in solutions:
-        if problem := solution.model.material.why_not(asked.channels[channel].moved(points[:1], 0.0)):
+        if problem := solution.model.material.why_not(loading.paths[channel].moved(points[:1], 0.0)):
             raise ModelError(problem)
     for solution in solutions if discrepancy else ():
-        _check_mode(solution, asked)
-    return asked, points
+        _check_mode(solution, loading)
+    return loading, points
 
 
 def speaks_of(model: StatisticalModel, mode: LoadingMode) -> bool:
@@ -177,22 +180,31 @@ def stress_ratio(stress_type: str, mode: str | LoadingMode, channel: int) -> Cal
         raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
     if stress_type == "engineering":
         return lambda points: np.ones(len(points))
-    return loading_mode(mode).channels[channel].cauchy_ratio
+    return loading_mode(mode).paths[channel].cauchy_ratio
 
 
 def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
     """Return the share of the measurements inside the predictive band at their own stretches."""
-    inside = []
-    for test, channel, stress in solution.model.experiment.curves:
-        options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": test.mode, "channel": channel}
-        band = predict_band(solution, test.stretch, **options)
-        inside.append((band.low <= stress) & (stress <= band.high))
+    options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob}
+    inside = [inside_band(solution, curve, **options) for curve in solution.model.experiment.curves]
     return float(np.mean(np.concatenate(inside)))
+
+
+def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: float = 0.95) -> NDArray[np.bool_]:
+    """Return which measurements (n,) of a curve are inside the predictive band at their own stretches.
+
+    The ends of the band at condensed measurements are interpolated between the points of these.
+    """
+    model = solution.model
+    options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": curve.mode, "channel": curve.channel}
+    band = predict_band(solution, curve.points if model.condensed is None else model.condensed.points, **options)
+    low, high = model.at_measurements(np.column_stack([band.low, band.high])).T
+    return np.asarray((low <= curve.stress) & (curve.stress <= high))
 
 
 def _moments(
     model: StatisticalModel,
-    components: Components,
+    components: GaussianMixture,
     points: FloatArray,
     mode: LoadingMode,
     channel: int,
@@ -203,14 +215,14 @@ def _moments(
     """Return mean and variance (M, g) of a stress at points of a mode; those of a new test with its own errors."""
 
     def at(points: FloatArray, noise: bool) -> tuple[FloatArray, FloatArray]:
-        path, rows = model.experiment.along(mode, points, channel)
-        return stress_moments(model, components, rows, discrepancy=discrepancy, noise=noise, mode=path)
+        states = model.experiment.states_at(points, mode, channel)
+        return stress_moments(model, components, states, discrepancy=discrepancy, noise=noise)
 
     mean, variance = at(points, noise)
     variance = variance + (model.common_error * mean) ** 2
     if noise and model.tolerances:
         slope = (at(points + STEP, False)[0] - mean) / STEP if model.tolerances.need_slope else 0.0
-        variance = variance + model.tolerances.variance(mode, points, mean, slope)
+        variance = variance + model.tolerances.variance(ErrorPoints(mode, points, mean, slope))
     return mean, variance
 
 
@@ -221,12 +233,12 @@ def _only_mode(experiment: Experiment) -> LoadingMode:
     return experiment.modes[0]
 
 
-def _check_mode(solution: Solution, asked: LoadingMode) -> None:
+def _check_mode(solution: Solution, loading: LoadingMode) -> None:
     model = solution.model
-    if not speaks_of(model, asked):
+    if not speaks_of(model, loading):
         names = ", ".join(mode.name for mode in model.experiment.modes)
         raise InputError(
             f"discrepancy '{model.discrepancy.name}' is an error of the {names} "
-            f"stress and says nothing about the {asked.name} one: predict without it, or fit with one that is an "
+            f"stress and says nothing about the {loading.name} one: predict without it, or fit with one that is an "
             "energy, such as 'auto'."
         )

@@ -8,11 +8,13 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.discrepancy import side_by_side
-from tissuq.inference.solution import Components, Solution
-from tissuq.model import StatisticalModel
-from tissuq.prediction.moments import basis_of, coefficients, correlated_parts, mean_stress
-from tissuq.prediction.replicates import MOST_VALUES, draws_by_symbol, stride
+from tissuq.inference.algebra import integrated
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.solution import Solution
+from tissuq.model.discrepancy import side_by_side
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.prediction.moments import basis_of, coefficients, correlated_groups, mean_stress, stress_moments
+from tissuq.prediction.replicates import MAX_VALUES_AT_ONCE, draws_by_symbol, stride
 
 __all__ = ["LeaveOneOut", "joint_log_likelihood", "leave_one_out", "left_out_log_density"]
 
@@ -20,13 +22,15 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 4_000_000
 """Values in an array over components, measurements and parameters at once: what bounds the memory."""
-FEWEST = 5
-"""Components, at least, that stand for the posterior of very many measurements."""
-EFFECTIVE, MOST_KHAT = 0.2, 0.7
+MIN_COMPONENTS = 5
+"""Number of components to which the posterior of very many measurements is thinned at the most."""
+MIN_EFFECTIVE_SHARE, MAX_KHAT = 0.2, 0.7
 """Effective number of components that are left without a measurement, as a share of those with it, below which its
 density is rough; and the Pareto shape from which it is (Vehtari, Gelman & Gabry 2017)."""
-LEAST = 1e-12
-"""Share of a measurement's precision that the others must leave to it; with less they say nothing about it."""
+ARRAYS_PER_CONDENSED = 4
+"""Arrays over components and condensed measurements that take part in a density."""
+MIN_PRECISION_SHARE = 1e-12
+"""Smallest share of the precision of a measurement that counts as given by the others, against rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,29 +54,29 @@ def leave_one_out(solution: Solution) -> LeaveOneOut:
     Gelfand, Dey & Chang (1992), Bayesian Statistics 4, 147-167; Vehtari, Gelman & Gabry (2017), Statistics and
     Computing 27, 1413-1432 (PSIS).
     """
-    components = solution.wide_components
-    size = len(solution.model.experiment) * max(1, components.root.shape[2])
-    if len(components.weights) * size > MOST_VALUES:
-        components = components.thinned(max(FEWEST, MOST_VALUES // size))
+    components, is_condensed = solution.wide_mixture, solution.model.condensed is not None
+    size = solution.model.experiment.size * (ARRAYS_PER_CONDENSED if is_condensed else max(1, components.root.shape[2]))
+    if len(components.weights) * size > MAX_VALUES_AT_ONCE:
+        components = components.thinned(max(MIN_COMPONENTS, MAX_VALUES_AT_ONCE // size))
     density = left_out_log_density(solution.model, components)
     with np.errstate(divide="ignore"):  # a component may have no weight
         log_weights = np.log(components.weights)[:, None] - density
     is_unsure = np.zeros(density.shape[1], dtype=bool)
-    if solution.diagnostics is not None and len(components.weights) > FEWEST:
+    if solution.diagnostics is not None and len(components.weights) > MIN_COMPONENTS:
         from arviz_stats.base import array_stats
 
         varies = np.ptp(density, axis=0) > 0  # a material has no stress at rest, whatever its parameters
         smoothed, khat = array_stats.psislw(density[:, varies], axis=0)
-        log_weights[:, varies], is_unsure[varies] = smoothed.T, khat > MOST_KHAT
+        log_weights[:, varies], is_unsure[varies] = smoothed.T, khat > MAX_KHAT
     log_weights = log_weights - log_weights.max(axis=0)
     weights = np.exp(log_weights) / np.exp(log_weights).sum(axis=0)
     effective = (components.weights**2).sum() / (weights**2).sum(axis=0)
     top = density.max(axis=0)
-    found = top + np.log((weights * np.exp(density - top)).sum(axis=0))
-    return LeaveOneOut(found, is_unsure | (effective < EFFECTIVE))
+    log_density = top + np.log((weights * np.exp(density - top)).sum(axis=0))
+    return LeaveOneOut(log_density, is_unsure | (effective < MIN_EFFECTIVE_SHARE))
 
 
-def left_out_log_density(model: StatisticalModel, components: Components) -> FloatArray:
+def left_out_log_density(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
     """Return log p(y_i | all other y, h), (M, n), for every component of a posterior.
 
     Given h all is Gaussian: y ~ N(X b0, P^-1) with P = V^-1 - V^-1 X S X' V^-1, V the covariance of errors and
@@ -85,43 +89,58 @@ def left_out_log_density(model: StatisticalModel, components: Components) -> Flo
     Sundararajan & Keerthi (2001), Neural Computation 13, 1103-1118; Vehtari, Mononen, Tolvanen, Sivula & Winther
     (2016), JMLR 17(103), 1-38.
     """
-    count, size = len(components.weights), len(model.experiment) * max(1, components.root.shape[2])
+    if model.condensed is not None:
+        return _left_out_of_condensed(model, components)
+    count, size = len(components.weights), model.experiment.size * max(1, components.root.shape[2])
     blocks = np.array_split(np.arange(count), min(count, 1 + count * size // BLOCK))
     return np.concatenate([_left_out(model, components[block]) for block in blocks])
 
 
-def _left_out(model: StatisticalModel, components: Components) -> FloatArray:
+def _left_out_of_condensed(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
+    """Return the same from the means and variances of the stress at the points to which measurements are condensed."""
+    independent = model.discrepancy.independent_variance(
+        {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
+    )
+    mean, variance = stress_moments(model, components, model.states, discrepancy=True, noise=False)
+    white = _white_variance(model, components.settings)[:, :1]
+    residual = model.experiment.stress - model.at_measurements(mean.T).T
+    leverage = model.at_measurements((variance - independent).T).T / white
+    loo = white / np.maximum(1 - leverage, MIN_PRECISION_SHARE)  # the variance of a measurement given the others
+    return np.asarray(-0.5 * ((residual * loo / white) ** 2 / loo + np.log(loo) + log(2 * pi)))
+
+
+def _left_out(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
     mean_b, root_b = coefficients(model, components)
     if model.bent_symbols:
-        bases = basis_of(model, model.experiment.stretch, components.settings)
-        basis = np.array([model.white(each) for each in bases])
+        bases = basis_of(model, model.experiment.states, components.settings)
+        basis = np.array([model.white(columns) for columns in bases])
     else:
         basis = model.design
     residual = model.stress - (basis @ mean_b[:, :, None])[:, :, 0]
     root = basis @ root_b
     if components.member is not None:
-        for place in np.unique(components.member):
-            own = np.flatnonzero(components.member == place)
-            features = side_by_side(model.energy_features(place), len(model.experiment))
+        for number in np.unique(components.member):
+            rows = np.flatnonzero(components.member == number)
+            features = side_by_side(model.energy_features(number), model.experiment.size)
             weights = slice(len(model.linear), len(model.linear) + features.shape[1])
-            residual[own] -= components.mean[own, weights] @ features.T
-            root[own] += features @ components.root[own, weights]
+            residual[rows] -= components.mean[rows, weights] @ features.T
+            root[rows] += features @ components.root[rows, weights]
     precision = np.empty_like(residual)
     if model.is_correlated:
-        for part in correlated_parts(model, components.settings):
-            own = part.chosen
-            solved = part.solved(np.concatenate([residual[own, :, None], root[own]], axis=2))
-            residual[own], root[own] = solved[..., 0], solved[..., 1:]
-            precision[own] = part.precision
+        for group in correlated_groups(model, components.settings):
+            rows = group.components
+            solved = group.covariance.solved(np.concatenate([residual[rows, :, None], root[rows]], axis=2))
+            residual[rows], root[rows] = solved[..., 0], solved[..., 1:]
+            precision[rows] = group.covariance.precision
     else:
         precision[:] = 1 / _white_variance(model, components.settings)
         residual *= precision
         root *= precision[:, :, None]
     if model.whitening is not None:
         residual, precision = model.whitening.transposed(residual.T).T, model.whitening.precisions(precision)
-        root = np.array([model.whitening.transposed(each) for each in root])
-    left = np.maximum(precision - (root**2).sum(axis=2), LEAST * precision)
-    return np.asarray(-0.5 * (residual**2 / left - np.log(left) + log(2 * pi)))
+        root = np.array([model.whitening.transposed(columns) for columns in root])
+    loo = np.maximum(precision - (root**2).sum(axis=2), MIN_PRECISION_SHARE * precision)
+    return np.asarray(-0.5 * (residual**2 / loo - np.log(loo) + log(2 * pi)))
 
 
 def joint_log_likelihood(solution: Solution) -> FloatArray:
@@ -130,63 +149,64 @@ def joint_log_likelihood(solution: Solution) -> FloatArray:
     The likelihood of linear and nonlinear parameters together: whatever the discrepancy is, its random part counts
     among the errors, and the amplitudes that set its size are parameters.
     """
-    model, step = solution.model, stride(solution)
-    values = draws_by_symbol(solution)
+    model = solution.model
+    step = stride(solution) if model.condensed is None else 1
+    values = draws_by_symbol(solution, step)
     count = len(next(iter(values.values())))
     columns, settings = (
         np.array([values[symbol] for symbol in symbols]).reshape(len(symbols), count).T
         for symbols in (model.column_symbols, model.nonlinear)
     )
-    chosen = solution.component_of_draw[:, ::step]
-    member = None if solution.components.member is None else solution.components.member[chosen].ravel()
-    blocks = np.array_split(np.arange(count), min(count, 1 + count * len(model.experiment) // BLOCK))
-    found = [
+    component_index = solution.component_of_draw[:, ::step]
+    member = None if solution.mixture.member is None else solution.mixture.member[component_index].ravel()
+    blocks = np.array_split(np.arange(count), min(count, 1 + count * len(model.stress) // BLOCK))
+    densities = [
         _joint(model, columns[block], settings[block], None if member is None else member[block]) for block in blocks
     ]
-    return np.concatenate(found).reshape(chosen.shape)
+    return np.concatenate(densities).reshape(component_index.shape)
 
 
 def _joint(
     model: StatisticalModel, columns: FloatArray, settings: FloatArray, member: NDArray[np.intp] | None
 ) -> FloatArray:
-    residual = model.stress - mean_stress(model, columns, settings)
+    mean = mean_stress(model, columns, settings)
+    residual = model.stress - (mean if model.condensed is None else model.condensed(mean.T).T)
     exponent = np.empty(len(residual))  # the squared residual plus the log determinant
     if model.is_correlated:
-        for part in correlated_parts(model, settings):
-            own = residual[part.chosen]
-            solved = part.solved(own[:, :, None])[..., 0]
-            exponent[part.chosen] = (own * solved).sum(axis=1) + part.log_determinant
+        for group in correlated_groups(model, settings):
+            correlated = residual[group.components]
+            solved = group.covariance.solved(correlated[:, :, None])[..., 0]
+            exponent[group.components] = (correlated * solved).sum(axis=1) + group.covariance.log_determinant
     else:
         white = _white_variance(model, settings)
-        exponent = (residual**2 / white + np.log(white)).sum(axis=1)
+        exponent = (residual**2 / white).sum(axis=1) + model.experiment.size * np.log(white).mean(axis=1)
         if member is not None:
-            for place in np.unique(member):
-                mine = np.flatnonzero(member == place)
-                exponent[mine] += _with_energies(model, int(place), residual[mine], settings[mine], white[mine])
-    return np.asarray(model.log_whitening - 0.5 * (exponent + residual.shape[1] * log(2 * pi)))
+            for number in np.unique(member):
+                rows = np.flatnonzero(member == number)
+                exponent[rows] += _with_energies(model, int(number), residual[rows], settings[rows], white[rows])
+    return np.asarray(model.log_whitening - 0.5 * (exponent + model.experiment.size * log(2 * pi)))
 
 
 def _with_energies(
-    model: StatisticalModel, place: int, residual: FloatArray, settings: FloatArray, white: FloatArray
+    model: StatisticalModel, number: int, residual: FloatArray, settings: FloatArray, white: FloatArray
 ) -> FloatArray:
-    """Return what an energy discrepancy adds to the squared residual and the log determinant (Woodbury)."""
-    blocks = model.energy_features(place)
-    features = side_by_side(blocks, len(model.experiment))
-    symbols = [model.energy_symbols[k] for k in model.energy_members[place].places]
+    """Return what an energy discrepancy, its weights integrated, adds to squared residual and log determinant."""
+    blocks = model.energy_features(number)
+    features = side_by_side(blocks, len(model.stress))
+    symbols = [model.energy_symbols[k] for k in model.energy_members[number].amplitude_indices]
     amplitudes = settings[:, [model.nonlinear.index(symbol) for symbol in symbols]]
-    scale = np.repeat(amplitudes, [each.shape[1] for each in blocks], axis=1)
+    scale = np.repeat(amplitudes, [block.shape[1] for block in blocks], axis=1)
     if model.noise.depends_on_level:
-        products = np.stack([features.T @ (features / own[:, None]) for own in white])
+        products = np.stack([features.T @ (features / variances[:, None]) for variances in white])
     else:
         products = (features.T @ features) / white[:, :1, None]
-    triangle = np.linalg.cholesky(np.eye(features.shape[1]) + scale[:, :, None] * products * scale[:, None, :])
-    along = scale * ((residual / white) @ features)
-    whitened = np.linalg.solve(triangle, along[:, :, None])[:, :, 0]
-    return np.asarray(2 * np.log(np.einsum("mii->mi", triangle)).sum(axis=1) - (whitened**2).sum(axis=1))
+    precision = np.eye(features.shape[1]) + scale[:, :, None] * products * scale[:, None, :]
+    result = integrated(precision, (scale * ((residual / white) @ features))[:, :, None], np.zeros((len(scale), 1)))
+    return np.asarray(result.misfit[:, 0] - 2 * result.log_volume)
 
 
 def _white_variance(model: StatisticalModel, settings: FloatArray) -> FloatArray:
     """Return the variances (M, n) of what is independent from measurement to measurement."""
     values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, settings.T, strict=True)}
     levels = model.levels if model.noise.depends_on_level else 0.0
-    return np.broadcast_to(model.white_variance(values, levels), (len(settings), len(model.experiment)))
+    return np.broadcast_to(model.white_variance(values, levels), (len(settings), len(model.stress)))

@@ -13,9 +13,9 @@ __all__ = ["Mixtures"]
 
 FloatArray = NDArray[np.float64]
 
-PAIRS, FEWEST = 5_000_000, 200
-"""Pairs of Gaussians over all places that a score takes the time for; Gaussians that stand for a mixture at least."""
-FAR = 30.0
+MAX_PAIRS, MIN_COMPONENTS = 5_000_000, 200
+"""Number of pairs of Gaussians, over all points, of a score; number to which a mixture is thinned at the most."""
+MAX_STANDARD_SCORE = 30.0
 """Standard scores beyond which the tail of a Gaussian is nothing."""
 
 
@@ -58,7 +58,9 @@ class Mixtures:
             low, high = np.where(excess < 0, value, low), np.where(excess < 0, high, value)
             density = self.weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
             step = value - excess / np.maximum(density, 1e-300)
-            value = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+            value = np.where(
+                (step >= low) & (step <= high), step, 0.5 * (low + high)
+            )  # at an end where it has converged
         return np.where(spread > 0, value, centre)
 
     def crps(self, values: FloatArray) -> FloatArray:
@@ -74,20 +76,20 @@ class Mixtures:
         Grimit, Gneiting, Berrocal & Johnson (2006), Quarterly Journal of the Royal Meteorological Society 132,
         2925-2942 (mixtures); Gneiting & Raftery (2007), Journal of the American Statistical Association 102, 359-378.
         """
-        some = self._thinned(max(FEWEST, int(np.sqrt(2 * PAIRS / len(values)))))
-        first, second = np.triu_indices(len(some.weights), 1)
-        pairs, own = some.weights[first] * some.weights[second], some.weights**2
-        found = some.weights @ _mean_distance(some.means - values, some.variances)
-        for place, (mean, variance) in enumerate(zip(some.means.T, some.variances.T, strict=True)):
-            apart = pairs @ _mean_distance(mean[first] - mean[second], variance[first] + variance[second])
-            found[place] -= apart + own @ np.sqrt(variance / np.pi)  # E|X - X'| of one Gaussian is 2 s / sqrt(pi)
-        return np.asarray(found)
+        thinned = self._thinned(max(MIN_COMPONENTS, int(np.sqrt(2 * MAX_PAIRS / len(values)))))
+        i, j = np.triu_indices(len(thinned.weights), 1)
+        pairs, squares = thinned.weights[i] * thinned.weights[j], thinned.weights**2
+        scores = thinned.weights @ _mean_distance(thinned.means - values, thinned.variances)
+        for index, (mean, variance) in enumerate(zip(thinned.means.T, thinned.variances.T, strict=True)):
+            distance = pairs @ _mean_distance(mean[i] - mean[j], variance[i] + variance[j])
+            scores[index] -= distance + squares @ np.sqrt(variance / np.pi)  # one Gaussian: E|X - X'| = 2 s / sqrt(pi)
+        return np.asarray(scores)
 
     def _thinned(self, count: int) -> Mixtures:
         if len(self.weights) <= count:
             return self
-        chosen = systematic(self.weights[None], count)[0]
-        return Mixtures(np.full(count, 1 / count), self.means[chosen], self.variances[chosen])
+        selected = systematic(self.weights[None], count)[0]
+        return Mixtures(np.full(count, 1 / count), self.means[selected], self.variances[selected])
 
 
 def _mean_distance(mean: FloatArray, variance: FloatArray) -> FloatArray:
@@ -95,5 +97,5 @@ def _mean_distance(mean: FloatArray, variance: FloatArray) -> FloatArray:
     from scipy.special import erf
 
     sd = np.maximum(np.sqrt(variance), 1e-300)
-    scores = np.clip(mean / sd / np.sqrt(2), -FAR, FAR)
+    scores = np.clip(mean / sd / np.sqrt(2), -MAX_STANDARD_SCORE, MAX_STANDARD_SCORE)
     return np.asarray(mean * erf(scores) + sd * np.sqrt(2 / np.pi) * np.exp(-(scores**2)))

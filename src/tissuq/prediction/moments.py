@@ -8,21 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.discrepancy import side_by_side
 from tissuq.errors import ModelError
-from tissuq.experiments.modes import Path
-from tissuq.inference.lowrank import Spectrum, correlation_spectrum, scaled_spectrum
-from tissuq.inference.solution import Components, Solution
-from tissuq.model import StatisticalModel
+from tissuq.experiments.modes import States
+from tissuq.inference.algebra import SpectralCovariance
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.lowrank import correlation_spectrum, scaled_spectrum
+from tissuq.inference.solution import Solution
+from tissuq.model.discrepancy import side_by_side
+from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = [
-    "CorrelatedPart",
+    "CorrelatedGroup",
     "basis_of",
     "borne",
     "coefficients",
     "conditioned",
     "conditioned_jointly",
-    "correlated_parts",
+    "correlated_groups",
     "drawn_curves",
     "level_of_errors",
     "mean_curve",
@@ -33,58 +35,25 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-NEXT_TO_NOTHING = 1e-6
+MAX_LOCKED_PROBABILITY = 1e-6
 """Probability that the material locks before a stretch, below which a stress there is predicted."""
-BLOCK = 1_000_000
-"""Values of the stress at once: what bounds the memory."""
+MAX_STRESSES_AT_ONCE = 1_000_000
+"""Number of stresses computed at once: what bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
-class CorrelatedPart:
-    """The components that share one structure, and what it takes to solve with their covariance of the data.
+class CorrelatedGroup:
+    """Components of a posterior that share one structure, by their indices, and the covariances of their data."""
 
-    The covariance of the data is diag(scale) (white I + U diag(kernel) U') diag(scale); arrays of N have one row for
-    each chosen component.
-    """
-
-    chosen: NDArray[np.intp]
-    correlation: Spectrum
+    components: NDArray[np.intp]
     shape: dict[str, float]
     design: FloatArray
-    scale: FloatArray
-    amplitude: FloatArray
-    white: FloatArray
-
-    @property
-    def kernel(self) -> FloatArray:
-        """Variances (N, r) of the correlated discrepancy along the eigenvectors."""
-        return self.amplitude[:, None] * self.correlation.values
-
-    def solved(self, columns: FloatArray) -> FloatArray:
-        """Return the inverse of the covariance times columns (N, n, q)."""
-        vectors, scale = self.correlation.vectors, self.scale[:, None]
-        own, white = columns / scale, self.white[:, None, None]
-        inside = vectors.T @ own
-        return np.asarray(
-            (vectors @ (inside / (self.kernel[..., None] + white) - inside / white) + own / white) / scale
-        )
-
-    @property
-    def precision(self) -> FloatArray:
-        """The diagonal (N, n) of the inverse of the covariance."""
-        squares, white = self.correlation.vectors**2, self.white[:, None]
-        rest = np.maximum(1 - squares.sum(axis=1), 0.0)
-        return np.asarray(((1 / (self.kernel + white)) @ squares.T + rest / white) / self.scale**2)
-
-    @property
-    def log_determinant(self) -> FloatArray:
-        """Log determinants (N,) of the covariance."""
-        n, r = self.correlation.vectors.shape
-        inside = np.log(self.kernel + self.white[:, None]).sum(axis=1)
-        return np.asarray(inside + (n - r) * np.log(self.white) + 2 * np.log(self.scale).sum())
+    covariance: SpectralCovariance
 
 
-def values_of(model: StatisticalModel, components: Components, symbols: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+def values_of(
+    model: StatisticalModel, components: GaussianMixture, symbols: Sequence[str]
+) -> tuple[FloatArray, FloatArray]:
     """Return means (M, k) and roots (M, k, p) of parameters in every component of a posterior."""
     mean = np.empty((len(components.weights), len(symbols)))
     root = np.zeros((*mean.shape, components.root.shape[2]))
@@ -97,21 +66,19 @@ def values_of(model: StatisticalModel, components: Components, symbols: Sequence
     return mean, root
 
 
-def coefficients(model: StatisticalModel, components: Components) -> tuple[FloatArray, FloatArray]:
+def coefficients(model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
     """Return means (M, k) and roots (M, k, p) of the parameters in which the mean stress is linear."""
     return values_of(model, components, model.column_symbols)
 
 
-def basis_of(
-    model: StatisticalModel, stretch: FloatArray, settings: FloatArray, mode: Path | None = None
-) -> FloatArray:
+def basis_of(model: StatisticalModel, states: States, settings: FloatArray) -> FloatArray:
     """Return the mean stresses of unit coefficients: (g, k), or (M, g, k) where they depend on settings (M, d)."""
     if not model.bent_symbols:
-        return model.basis(stretch, mode=mode)
-    return model.basis(stretch, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]], mode)
+        return model.basis(states)
+    return model.basis(states, settings[:, [model.nonlinear.index(symbol) for symbol in model.bent_symbols]])
 
 
-def borne(model: StatisticalModel, at: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
+def borne(model: StatisticalModel, stretch: FloatArray, basis: FloatArray, weights: FloatArray) -> FloatArray:
     """Return a basis without the components, of next to no weight, in which the material has locked.
 
     Raises
@@ -122,92 +89,92 @@ def borne(model: StatisticalModel, at: FloatArray, basis: FloatArray, weights: F
     is_borne = np.asarray(np.isfinite(basis).all(axis=-1))
     if is_borne.all():
         return basis
-    locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(at)))
-    if locked.max() > NEXT_TO_NOTHING:
-        beyond = at[locked > NEXT_TO_NOTHING]
+    locked = 1 - weights @ np.broadcast_to(is_borne, (len(weights), len(stretch)))
+    if locked.max() > MAX_LOCKED_PROBABILITY:
+        locked_stretch = stretch[locked > MAX_LOCKED_PROBABILITY]
         bent = ", ".join(model.bent_symbols)
         why = f"its {bent} may be such that it locks before" if bent else "it is too large for a number"
+        nearest = locked_stretch[np.abs(locked_stretch - 1).argmin()]
         raise ModelError(
-            f"material '{model.material.name}' has no stress at a stretch of {beyond[np.abs(beyond - 1).argmin()]:g}: "
+            f"material '{model.material.name}' has no stress at a stretch of {nearest:g}: "
             f"{why} (up to a probability of {locked.max():.2g}). Predict at stretches nearer to those of the data."
         )
     return np.where(is_borne[..., None], basis, 0.0)
 
 
 def mean_stress(model: StatisticalModel, coefficients: FloatArray, settings: FloatArray) -> FloatArray:
-    """Return the mean stress (M, n) at the measurements, whitened, for coefficients (M, k) and settings (M, d)."""
+    """Return the mean stress (M, m) at the model's `states`, whitened, for coefficients (M, k) and settings (M, d)."""
+    states = model.states
     if not model.bent_symbols:
-        return np.asarray(coefficients @ model.design.T)
-    stretch = model.experiment.stretch
-    blocks = np.array_split(np.arange(len(settings)), max(1, settings.shape[0] * len(stretch) // BLOCK))
-    curves = [basis_of(model, stretch, settings[block]) @ coefficients[block][:, :, None] for block in blocks]
+        design = model.design if model.condensed is None else model.basis(states)
+        return np.asarray(coefficients @ design.T)
+    blocks = np.array_split(np.arange(len(settings)), max(1, settings.shape[0] * len(states) // MAX_STRESSES_AT_ONCE))
+    curves = [basis_of(model, states, settings[block]) @ coefficients[block][:, :, None] for block in blocks]
     return np.asarray(model.white(np.concatenate(curves)[:, :, 0].T).T)
 
 
-def correlated_parts(model: StatisticalModel, settings: FloatArray) -> Iterator[CorrelatedPart]:
+def correlated_groups(model: StatisticalModel, settings: FloatArray) -> Iterator[CorrelatedGroup]:
     """Group settings (M, d) of the nonlinear parameters by the structure they imply."""
     values = dict(zip(model.nonlinear, settings.T, strict=True))
     amplitude = np.broadcast_to(model.correlated_variance(values), len(settings))
     shared = model.nonlinear if model.noise.depends_on_level else model.structure
     keys = np.column_stack([np.zeros(len(settings)), *(values[symbol] for symbol in shared)])
     distinct, group = np.unique(keys, axis=0, return_inverse=True)
-    one = np.ones(len(model.experiment))
+    unit_size = np.ones(model.experiment.size)
     for index, row in enumerate(distinct):
-        own = dict(zip(shared, map(float, row[1:]), strict=True))
-        chosen = np.flatnonzero(group.ravel() == index)
-        shape = {symbol: own[symbol] for symbol in model.discrepancy.shape_symbols}
-        bent = np.array([own[symbol] for symbol in model.bent_symbols])
+        shared_values = dict(zip(shared, map(float, row[1:]), strict=True))
+        members = np.flatnonzero(group.ravel() == index)
+        shape = {symbol: shared_values[symbol] for symbol in model.discrepancy.shape_symbols}
+        bent = np.array([shared_values[symbol] for symbol in model.bent_symbols])
         design = model.design_at(bent) if len(bent) else model.design
         if model.noise.depends_on_level:
-            scale = np.sqrt(model.white_variance(own, model.levels))
-            spectrum, white = scaled_spectrum(model, shape, scale), np.ones(len(chosen))
+            scale = np.sqrt(model.white_variance(shared_values, model.levels))
+            spectrum, white = scaled_spectrum(model, shape, scale), np.ones(len(members))
         else:
-            scale, spectrum = one, correlation_spectrum(model, tuple(shape.values()))
-            own_values = {symbol: column[chosen] for symbol, column in values.items()}
-            white = np.broadcast_to(model.white_variance(own_values), len(chosen)).astype(float)
-        yield CorrelatedPart(chosen, spectrum, shape, design, scale, amplitude[chosen], white)
+            scale, spectrum = unit_size, correlation_spectrum(model, tuple(shape.values()))
+            member_values = {symbol: column[members] for symbol, column in values.items()}
+            white = np.broadcast_to(model.white_variance(member_values), len(members)).astype(float)
+        yield CorrelatedGroup(members, shape, design, SpectralCovariance(spectrum, scale, amplitude[members], white))
 
 
 def stress_moments(
     model: StatisticalModel,
-    components: Components,
-    stretch: FloatArray,
+    components: GaussianMixture,
+    states: States,
     *,
     discrepancy: bool,
     noise: bool,
-    mode: Path | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean (M, g) and variance (M, g) of the stress at stretches (g,), for every component.
+    """Return mean (M, g) and variance (M, g) of the stress at states (g,), for every component.
 
     Without the discrepancy it is the model alone (eq. 28); with it, a correlated discrepancy is conditioned on
-    the data (eq. 27; differs from the source, whose GP is drawn from its prior). In another loading mode than that
-    of the data only a discrepancy that is an energy has a meaning.
+    the data (eq. 27; differs from the source, whose GP is drawn from its prior). At states of no measured curve only
+    a discrepancy that is an energy has a meaning.
     """
     values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
     mean_b, root_b = coefficients(model, components)
-    at = (mode or model.experiment.mode).abscissa(stretch)
-    basis = borne(model, at, basis_of(model, stretch, components.settings, mode), components.weights)
+    basis = borne(model, states.abscissa, basis_of(model, states, components.settings), components.weights)
     if not discrepancy:
         basis = basis * np.isin(model.column_symbols, model.material_symbols)
     mean = (basis @ mean_b[:, :, None])[:, :, 0]
     root = basis @ root_b
     extra = np.zeros_like(mean)
     if discrepancy and model.is_correlated:
-        for part in correlated_parts(model, components.settings):
-            shift, pull, variance = conditioned(model, part, stretch, mean_b[part.chosen])
-            mean[part.chosen] += shift
-            root[part.chosen] -= np.einsum("mgk,mkp->mgp", pull, root_b[part.chosen])
-            extra[part.chosen] += variance
+        for group in correlated_groups(model, components.settings):
+            shift, pull, variance = conditioned(model, group, states, mean_b[group.components])
+            mean[group.components] += shift
+            root[group.components] -= np.einsum("mgk,mkp->mgp", pull, root_b[group.components])
+            extra[group.components] += variance
     if discrepancy and components.member is not None:
-        for shift, spread, variance, own in _energies(model, components, stretch, mode):
-            mean[own] += shift
-            root[own] += spread
-            extra[own] += variance
+        for shift, spread, variance, rows in _energies(model, components, states):
+            mean[rows] += shift
+            root[rows] += spread
+            extra[rows] += variance
     level = np.abs(mean)
-    if discrepancy and not model.is_repeated:
-        extra += model.discrepancy.independent_variance(values)
+    if discrepancy:
+        extra += model.independent_variance(values)
     if noise:
-        extra += model.noise_variance(values, level) * model.relative_noise(stretch) ** 2
+        extra += model.noise_variance(values, level) * model.relative_noise(states) ** 2
     return mean, extra + (root**2).sum(axis=2)
 
 
@@ -217,108 +184,103 @@ def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
     With a number, from so many components that stand for all.
     """
     model = solution.model
-    components = solution.components if thinned is None else solution.components.thinned(thinned)
-    mean, _ = stress_moments(model, components, model.experiment.stretch, discrepancy=True, noise=False)
-    return np.asarray(components.weights @ mean)
+    components = solution.mixture if thinned is None else solution.mixture.thinned(thinned)
+    mean, _ = stress_moments(model, components, model.states, discrepancy=True, noise=False)
+    return model.at_measurements(components.weights @ mean)
 
 
 def level_of_errors(solution: Solution) -> float:
     """Return the root of the posterior mean variance of all independent errors, whitened, MPa."""
-    model, components = solution.model, solution.components
+    model, components = solution.model, solution.mixture
     values = dict(zip(model.nonlinear, components.settings.T, strict=True))
     variance = np.broadcast_to(model.white_variance(values), len(components.weights))
     return float(np.sqrt(components.weights @ variance))
 
 
 def drawn_curves(
-    model: StatisticalModel,
-    components: Components,
-    stretch: FloatArray,
-    seed: int = 0,
-    mode: Path | None = None,
+    model: StatisticalModel, components: GaussianMixture, states: States, seed: int = 0
 ) -> tuple[FloatArray, FloatArray]:
     """Return stresses (M, g) of the material alone and of the discrepancy, one joint draw for every component.
 
-    Scatter that is independent from point to point is no curve, and left out. Where a loading mode is given, so is a
+    Scatter that is independent from point to point is no curve, and left out. At states of no measured curve, so is a
     discrepancy that is no energy.
     """
     generator, settings = np.random.default_rng([seed, 11]), components.settings
     score = generator.standard_normal(components.mean.shape)
     linear = components.mean + np.einsum("mpq,mq->mp", components.root, score)
     drawn, _ = coefficients(model, replace(components, mean=linear))
-    terms = basis_of(model, stretch, settings, mode) * drawn[:, None, :]
-    own = np.isin(model.column_symbols, model.material_symbols)
-    alone, other = terms[..., own].sum(axis=2), terms[..., ~own].sum(axis=2)
-    if mode is not None and not model.discrepancy.is_energy:
-        return alone, np.zeros_like(alone)
+    terms = basis_of(model, states, settings) * drawn[:, None, :]
+    is_material = np.isin(model.column_symbols, model.material_symbols)
+    material_stress, discrepancy_stress = terms[..., is_material].sum(axis=2), terms[..., ~is_material].sum(axis=2)
     if components.member is not None:
-        for shift, _, _, chosen in _energies(model, replace(components, mean=linear), stretch, mode):
-            other[chosen] += shift
-    if model.is_correlated:
-        for part in correlated_parts(model, settings):
-            shift, covariance = conditioned_jointly(model, part, stretch, drawn[part.chosen])
+        for shift, _, _, rows in _energies(model, replace(components, mean=linear), states):
+            discrepancy_stress[rows] += shift
+    if model.is_correlated and states.is_measured:
+        for group in correlated_groups(model, settings):
+            shift, covariance = conditioned_jointly(model, group, states, drawn[group.components])
             values, vectors = np.linalg.eigh(covariance)
             score = generator.standard_normal(shift.shape)
-            other[part.chosen] += shift + np.einsum(
+            discrepancy_stress[group.components] += shift + np.einsum(
                 "ngk,nk->ng", vectors * np.sqrt(np.maximum(values, 0))[:, None], score
             )
-    return alone, other
+    return material_stress, discrepancy_stress
 
 
 def conditioned_jointly(
-    model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray, b: FloatArray
+    model: StatisticalModel, group: CorrelatedGroup, states: States, b: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return means (N, g) and covariances (N, g, g) of the correlated discrepancy given the data and coefficients b."""
-    shift, _, _ = conditioned(model, part, stretch, b)
-    inside = _with_data(model, part, stretch) @ part.correlation.vectors
-    gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
+    shift, _, _ = conditioned(model, group, states, b)
+    inside = _with_data(model, group, states) @ group.covariance.spectrum.vectors
+    gain = group.covariance.amplitude[:, None] / (group.covariance.white[:, None] + group.covariance.correlated)
     explained = np.einsum("gr,nr,hr->ngh", inside, gain, inside)
-    return shift, part.amplitude[:, None, None] * (model.correlation(stretch, stretch, part.shape) - explained)
+    prior_covariance = model.correlation(states, states, group.shape)
+    return shift, group.covariance.amplitude[:, None, None] * (prior_covariance - explained)
 
 
 def _energies(
-    model: StatisticalModel, components: Components, stretch: FloatArray, mode: Path | None = None
+    model: StatisticalModel, components: GaussianMixture, states: States
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
     """Yield means (N, g), roots (N, g, p) and further variances (N, g) of energy discrepancies, and whose they are.
 
     What the terms that serve the data leave of the discrepancy elsewhere is independent of the data.
     """
-    mode, start = mode or model.experiment.mode, len(model.linear)
+    start = len(model.linear)
     assert components.member is not None  # noqa: S101 (the caller has looked)
-    for place in np.unique(components.member):
-        member, own = model.energy_members[place], np.flatnonzero(components.member == place)
-        features = member.stress_features(mode, stretch)
-        left = [
-            np.maximum(whole - (each**2).sum(axis=1), 0.0)
-            for whole, each in zip(member.stress_variances(mode, stretch), features, strict=True)
+    for index in np.unique(components.member):
+        member, rows = model.energy_members[index], np.flatnonzero(components.member == index)
+        features = member.stress_features(states)
+        unexplained = [
+            np.maximum(total - (terms**2).sum(axis=1), 0.0)
+            for total, terms in zip(member.stress_variances(states), features, strict=True)
         ]
-        symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.places]
-        every = side_by_side(features, len(stretch))
-        chosen = slice(start, start + every.shape[1])
-        variance = components.settings[own][:, symbols] ** 2 @ np.reshape(left, (-1, len(stretch)))
-        yield components.mean[own, chosen] @ every.T, every @ components.root[own, chosen], variance, own
+        symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.amplitude_indices]
+        all_terms = side_by_side(features, len(states))
+        weights = slice(start, start + all_terms.shape[1])
+        variance = components.settings[rows][:, symbols] ** 2 @ np.reshape(unexplained, (-1, len(states)))
+        yield components.mean[rows, weights] @ all_terms.T, all_terms @ components.root[rows, weights], variance, rows
 
 
-def _with_data(model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray) -> FloatArray:
-    """Return the correlation (g, n) of the discrepancy at stretches with that at the measurements, whitened."""
-    cross = model.white(model.correlation(model.experiment.stretch, stretch, part.shape)).T
-    return np.asarray(cross / part.scale)
+def _with_data(model: StatisticalModel, group: CorrelatedGroup, states: States) -> FloatArray:
+    """Return the correlation (g, n) of the discrepancy at states with that at the measurements, whitened."""
+    cross = model.white(model.correlation(model.experiment.states, states, group.shape)).T
+    return np.asarray(cross / group.covariance.size)
 
 
 def conditioned(
-    model: StatisticalModel, part: CorrelatedPart, stretch: FloatArray, mean_b: FloatArray
+    model: StatisticalModel, group: CorrelatedGroup, states: States, mean_b: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Condition the correlated discrepancy at new stretches on the data, given coefficients b (N, k).
+    """Condition the correlated discrepancy at new states on the data, given coefficients b (N, k).
 
     Returns its mean (N, g), the sensitivity (N, g, k) of minus that mean to b, and its variance (N, g) given b.
     """
-    vectors = part.correlation.vectors
-    inside = _with_data(model, part, stretch) @ vectors
-    gain = part.amplitude[:, None] / (part.white[:, None] + part.kernel)
-    columns = np.column_stack([part.design, model.stress]) / part.scale[:, None]
+    vectors = group.covariance.spectrum.vectors
+    inside = _with_data(model, group, states) @ vectors
+    gain = group.covariance.amplitude[:, None] / (group.covariance.white[:, None] + group.covariance.correlated)
+    columns = np.column_stack([group.design, model.stress]) / group.covariance.size[:, None]
     smoothed = np.einsum("gr,nr,rk->ngk", inside, gain, vectors.T @ columns)
     pull, of_data = smoothed[:, :, :-1], smoothed[:, :, -1]
     explained = gain @ (inside**2).T
-    before = model.relative_variance(stretch, part.shape)
-    variance = np.maximum(part.amplitude[:, None] * (before - explained), 0.0)
+    prior_variance = model.relative_variance(states, group.shape)
+    variance = np.maximum(group.covariance.amplitude[:, None] * (prior_variance - explained), 0.0)
     return of_data - np.einsum("ngk,nk->ng", pull, mean_b), pull, variance

@@ -8,20 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.solution import Solution
-from tissuq.prediction.moments import correlated_parts, mean_stress
+from tissuq.prediction.moments import correlated_groups, mean_stress
 
-__all__ = ["MOST_VALUES", "draws_by_symbol", "pointwise_log_likelihood", "replicate_data", "stride"]
+__all__ = ["MAX_VALUES_AT_ONCE", "draws_by_symbol", "pointwise_log_likelihood", "replicate_data", "stride"]
 
 FloatArray = NDArray[np.float64]
 
-MOST_VALUES = 40_000_000
-"""Values at most in an array over draws and measurements (320 MB)."""
+MAX_VALUES_AT_ONCE, MAX_VALUES_CONDENSED = 40_000_000, 4_000_000
+"""Values at most in an array over draws and measurements (320 MB), and where the measurements are condensed."""
 
 
 def stride(solution: Solution) -> int:
     """Return the step between the draws that get values at every measurement: one, unless memory would not do."""
     chains, draws = solution.shape
-    return min(draws, 1 + chains * draws * len(solution.model.experiment) // MOST_VALUES)
+    max_values = MAX_VALUES_AT_ONCE if solution.model.condensed is None else MAX_VALUES_CONDENSED
+    return min(draws, 1 + chains * draws * solution.model.experiment.size // max_values)
 
 
 def replicate_data(solution: Solution, seed: int) -> FloatArray:
@@ -35,12 +36,12 @@ def replicate_data(solution: Solution, seed: int) -> FloatArray:
     replicate = mean + np.sqrt(white) * generator.standard_normal(mean.shape)
     if solution.model.is_correlated:
         residual = solution.model.stress - mean
-        for part in correlated_parts(solution.model, settings):
-            share = part.kernel / (part.kernel + part.white[:, None])
+        for group in correlated_groups(solution.model, settings):
+            share = group.covariance.correlated / (group.covariance.correlated + group.covariance.white[:, None])
             score = generator.standard_normal(share.shape)
-            along = share * ((residual[part.chosen] / part.scale) @ part.correlation.vectors)
-            along += np.sqrt(share * part.white[:, None]) * score
-            replicate[part.chosen] += (along @ part.correlation.vectors.T) * part.scale
+            along = share * ((residual[group.components] / group.covariance.size) @ group.covariance.spectrum.vectors)
+            along += np.sqrt(share * group.covariance.white[:, None]) * score
+            replicate[group.components] += (along @ group.covariance.spectrum.vectors.T) * group.covariance.size
     if solution.model.whitening is not None:
         replicate = solution.model.whitening.undone(replicate.T).T
     return replicate.reshape(solution.shape[0], -1, mean.shape[1])
@@ -55,12 +56,13 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
     mean, settings, white = _given_draws(solution)
     whitening = solution.model.whitening
     precision = 1 / np.broadcast_to(white, mean.shape)
-    solved = (solution.model.stress - mean) * precision
+    stress = solution.model.stress if solution.model.condensed is None else solution.model.experiment.stress
+    solved = (stress - mean) * precision
     if solution.model.is_correlated:
         residual = solution.model.stress - mean
-        for part in correlated_parts(solution.model, settings):
-            solved[part.chosen] = part.solved(residual[part.chosen][:, :, None])[..., 0]
-            precision[part.chosen] = part.precision
+        for group in correlated_groups(solution.model, settings):
+            solved[group.components] = group.covariance.solved(residual[group.components][:, :, None])[..., 0]
+            precision[group.components] = group.covariance.precision
     if whitening is not None:
         solved, precision = whitening.transposed(solved.T).T, whitening.precisions(precision)
     residual, variance = solved / precision, 1 / precision
@@ -68,9 +70,8 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
     return density.reshape(solution.shape[0], -1, mean.shape[1])
 
 
-def draws_by_symbol(solution: Solution) -> dict[str, FloatArray]:
-    """Return every `stride`-th draw (D,) of every parameter, the chains one after another."""
-    step = stride(solution)
+def draws_by_symbol(solution: Solution, step: int) -> dict[str, FloatArray]:
+    """Return every so many-th draw (D,) of every parameter, the chains one after another."""
     return {symbol: drawn[:, ::step].ravel() for symbol, drawn in solution.draws.items()}
 
 
@@ -80,7 +81,7 @@ def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray
     D draws in all; the stress is whitened.
     """
     model, step = solution.model, stride(solution)
-    values = draws_by_symbol(solution)
+    values = draws_by_symbol(solution, step)
     count = len(next(iter(values.values())))
     columns = np.column_stack([values[symbol] for symbol in model.column_symbols])
     settings = np.array([values[symbol] for symbol in model.nonlinear]).reshape(-1, count).T
@@ -90,4 +91,5 @@ def _given_draws(solution: Solution) -> tuple[FloatArray, FloatArray, FloatArray
     mean = mean_stress(model, columns, settings)
     if solution.drawn_discrepancy is not None:
         mean = mean + solution.drawn_discrepancy[:, ::step].reshape(mean.shape)
+    mean = model.at_measurements(mean.T).T
     return mean, settings, np.broadcast_to(white, (count, white.shape[1]))

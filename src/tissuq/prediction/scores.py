@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.experiment import Curve
 from tissuq.inference.solution import Solution
 from tissuq.prediction.bands import asked_for, predictive_mixtures
 
@@ -62,10 +62,10 @@ class Judged:
         names = ("measured", "mean", "low", "high", "crps")
         return replace(self, **{name: getattr(self, name) * ratio for name in names})
 
-    def where(self, chosen: NDArray[np.bool_]) -> Judged:
+    def where(self, selected: NDArray[np.bool_]) -> Judged:
         """Return some of them."""
-        every = {name: value[chosen] for name, value in vars(self).items() if name != "prob"}
-        return Judged(**every, prob=self.prob)
+        columns = {name: value[selected] for name, value in vars(self).items() if name != "prob"}
+        return Judged(**columns, prob=self.prob)
 
     def summary(self) -> dict[str, float]:
         """Return the scores of all together; nan where there are no measurements.
@@ -86,10 +86,8 @@ class Judged:
         }
 
 
-def judged(
-    solution: Solution, test: Experiment, channel: int, *, discrepancy: bool = True, prob: float = 0.95
-) -> Judged:
-    """Return the measurements of a stress of a test beside the predictions of a new test with noise.
+def judged(solution: Solution, curve: Curve, *, discrepancy: bool = True, prob: float = 0.95) -> Judged:
+    """Return the measurements of a curve beside the predictions of a new test with noise.
 
     Measurements without stress are left out: at rest it is zero by definition.
 
@@ -98,19 +96,18 @@ def judged(
     InputError, ModelError
         When the posterior cannot predict the test's mode, or nothing is left.
     """
-    stress = test.stress.reshape(len(test), -1)[:, channel]
-    points, measured = test.stretch[stress != 0], stress[stress != 0]
+    points, measured = curve.points[curve.stress != 0], curve.stress[curve.stress != 0]
     if not len(measured):
-        raise InputError(f"experiment '{test.name}' has no stress other than zero, and nothing to compare with.")
+        raise InputError(f"experiment '{curve.name}' has no stress other than zero, and nothing to compare with.")
     options: dict[str, Any] = {"discrepancy": discrepancy}
-    mode, _ = asked_for([solution], points, **options, prob=prob, mode=test.mode, channel=channel)
-    found, start = [], 0
-    for each in predictive_mixtures([(1.0, solution)], points, mode, channel, **options, noise=True):
-        own = measured[start : start + each.means.shape[1]]
-        start += len(own)
-        ends = (each.quantile(0.5 * (1 - prob)), each.quantile(0.5 * (1 + prob)))
-        found.append([each.mean, *ends, each.crps(own)])
-    mean, low, high, crps = np.concatenate(found, axis=1)
+    mode, _ = asked_for([solution], points, **options, prob=prob, mode=curve.mode, channel=curve.channel)
+    rows, start = [], 0
+    for mixture in predictive_mixtures([(1.0, solution)], points, mode, curve.channel, **options, noise=True):
+        block = measured[start : start + mixture.means.shape[1]]
+        start += len(block)
+        ends = (mixture.quantile(0.5 * (1 - prob)), mixture.quantile(0.5 * (1 + prob)))
+        rows.append([mixture.mean, *ends, mixture.crps(block)])
+    mean, low, high, crps = np.concatenate(rows, axis=1)
     return Judged(points, measured, mean, low, high, crps, prob)
 
 

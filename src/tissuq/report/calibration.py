@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import shutil
+from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
-from tissuq.report.calibration_figures import band_figure, check_figure, marginals_figure
-from tissuq.report.common import write_figures, write_recipe
-from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import interval, significant
-from tissuq.report.run_folder import INPUT, RECIPE
-from tissuq.report.tables import Row, write_csv, write_json
-from tissuq.studies.calibration import CalibrationStudy
+from tissuq.report.figures import BAND, BASE, INK, STYLE
+from tissuq.report.run_folder import INPUT, RECIPE, embedded_figure, render, write_figures, write_recipe
+from tissuq.report.tables import Row, interval, significant, write_csv, write_json
+from tissuq.studies.calibration import CalibrationStudy, Measured
 
-__all__ = ["HEADERS", "readable_calibration", "write_calibration_run"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "HEADERS",
+    "band_figure",
+    "check_figure",
+    "marginals_figure",
+    "readable_calibration",
+    "write_calibration_run",
+]
 
 HEADERS = ["parameter", "mean", "sd", "95 % HPD", "ESS", "by emulator"]
 """Of `readable_calibration`."""
@@ -27,7 +36,7 @@ HEADERS = ["parameter", "mean", "sd", "95 % HPD", "ESS", "by emulator"]
 def write_calibration_run(
     study: CalibrationStudy, folder: Path, beside: Path = Path(), *, figures: bool = True
 ) -> None:
-    """Write everything that a calibration leaves behind into an empty folder.
+    """Write the results of a calibration into an empty folder.
 
     Parameters
     ----------
@@ -41,10 +50,10 @@ def write_calibration_run(
     """
     calibration = study.calibration
     (folder / INPUT).mkdir()
-    kept = _copied(study, folder, beside)
-    named = f" --forward {kept['forward']}" if "forward" in kept else ""
+    relocated = _copied(study, folder, beside)
+    named = f" --forward {relocated['forward']}" if "forward" in relocated else f" --umbridge {study.settings.umbridge}"
     command = f"calibrate{'' if figures else ' --no-figures'}{named}"
-    write_recipe(folder, command, study.settings.model_copy(update=kept))
+    write_recipe(folder, command, study.settings.model_copy(update=relocated))
     _write_tables(study, folder)
     calibration.save(folder / "calibration.nc")
     if figures:
@@ -59,17 +68,17 @@ def write_calibration_run(
 
 
 def _copied(study: CalibrationStudy, folder: Path, beside: Path) -> dict[str, Any]:
-    """Copy the user's files, so that the run can be repeated, and return what names them there."""
+    """Copy the user's files, so that the run can be repeated, and return the settings that name the copies."""
     source = beside / study.settings.file
     shutil.copyfile(source, folder / INPUT / source.name)
-    kept: dict[str, Any] = {"file": f"{INPUT}/{source.name}"}
+    relocated: dict[str, Any] = {"file": f"{INPUT}/{source.name}"}
     if study.settings.forward is None:
-        return kept
+        return relocated
     match, file = LAW.fullmatch(study.settings.forward), FileForward(study.settings.forward).file
     if match and file:
         shutil.copyfile(file, folder / INPUT / file.name)
-        return kept | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
-    return kept | {"forward": study.settings.forward}
+        return relocated | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
+    return relocated | {"forward": study.settings.forward}
 
 
 def _write_tables(study: CalibrationStudy, folder: Path) -> None:
@@ -77,28 +86,28 @@ def _write_tables(study: CalibrationStudy, folder: Path) -> None:
     summary = calibration.summary()
     rows: list[Row] = [
         {"parameter": str(symbol), "prior": str(calibration.problem.priors[str(symbol)])}
-        | {str(name): None if np.isnan(value) else float(value) for name, value in own.items()}
-        for symbol, own in summary.iterrows()
+        | {str(name): None if np.isnan(value) else float(value) for name, value in estimates.items()}
+        for symbol, estimates in summary.iterrows()
     ]
     write_csv(folder / "summary.csv", rows)
     write_json(folder / "summary.json", rows)
-    bands = {name: calibration.predict(discrepancy=own) for name, own in (("", True), ("_model_alone", False))}
+    bands = {name: calibration.predict(discrepancy=kind) for name, kind in (("", True), ("_model_alone", False))}
     table: dict[str, Any] = {"control": data.control, "measured": data.measured}
     for suffix, band in bands.items():
         table |= {f"{name}{suffix}": band[name].to_numpy() for name in ("mean", "low", "high")}
     write_csv(folder / "prediction.csv", _rows(table))
     runs = calibration.runs
-    own = dict(zip(runs.symbols, runs.points.T, strict=True))
-    outputs = {f"output_{place + 1}": column for place, column in enumerate(runs.outputs.T)}
+    parameters = dict(zip(runs.symbols, runs.points.T, strict=True))
+    outputs = {f"output_{number}": column for number, column in enumerate(runs.outputs.T, 1)}
     write_csv(folder / "forward_runs.csv", [
         {**row, "error": error}
-        for row, error in zip(_rows(own | {"seconds": runs.seconds} | outputs), runs.errors, strict=True)
+        for row, error in zip(_rows(parameters | {"seconds": runs.seconds} | outputs), runs.errors, strict=True)
     ])  # fmt: skip
 
 
 def _rows(columns: dict[str, Any]) -> list[Row]:
     """Return columns as rows; nothing for nan."""
-    lists = [[None if np.isnan(each) else float(each) for each in column] for column in columns.values()]
+    lists = [[None if np.isnan(value) else float(value) for value in column] for column in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
@@ -143,7 +152,7 @@ def _context(study: CalibrationStudy, folder: Path) -> dict[str, Any]:
         "logarithms": emulator.logarithms,
         "ratio": f"{calibration.error_ratio:.2g}",
         "failures": failures,
-        "told_failures": runs.told_failures,
+        "failure_summary": runs.failure_summary,
         "symbols": list(runs.symbols),
         "priors": [[symbol, str(prior)] for symbol, prior in calibration.problem.priors.items()],
         "verdict": calibration.posterior.verdict,
@@ -157,14 +166,111 @@ def _context(study: CalibrationStudy, folder: Path) -> dict[str, Any]:
 def _lead(study: CalibrationStudy) -> str:
     """Return the finding in two sentences."""
     calibration = study.calibration
-    told = []
+    findings = []
     for symbol in calibration.problem.forward_symbols:
         marginal = calibration.marginals[symbol]
         low, high = interval(*marginal.hdi(), marginal.sd)
-        told.append(f"{symbol} is {low} to {high}")
+        findings.append(f"{symbol} is {low} to {high}")
     share = max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols)
-    size = "less than 1 %" if share < 0.01 else f"{100 * share:.0f} % at most"
+    size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
     return (
-        f"With a probability of 95 % each, {', and '.join(told)}, in the forward model's units. That an emulator "
-        f"stands for the model makes {size} of their variance."
+        f"With a probability of 95 % each, {', and '.join(findings)}, in the units of the forward model. The error of "
+        f"the emulator contributes {size} to their variance."
     )
+
+
+EXACT = "#D55E00"
+MAX_COLUMNS = 3
+"""Panels in a row of the figure of marginals."""
+
+
+def band_figure(calibration: Calibration, data: Measured) -> Figure:
+    """Return the 95 % predictive band over the measurements: with the discrepancy, and of the forward model alone."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    titles = {True: "with the discrepancy", False: "forward model alone"}
+    if not calibration.problem.discrepancy.is_correlated:
+        titles = {True: "forward model"}
+    with rc_context(STYLE):
+        figure = Figure(figsize=(4.6 * len(titles) + 0.8, 3.9))
+        panels = figure.subplots(1, len(titles), squeeze=False, sharey=True)[0]
+        order = np.argsort(data.control, kind="stable")
+        for axis, (with_discrepancy, title) in zip(panels, titles.items(), strict=True):
+            band = calibration.predict(discrepancy=with_discrepancy).iloc[order]
+            axis.fill_between(band["control"], band["low"], band["high"], color=BAND, alpha=0.22, lw=0,
+                              label="95 % predictive band")  # fmt: skip
+            axis.plot(band["control"], band["mean"], color=BAND, lw=1.6, label="predicted mean")
+            axis.plot(data.control, data.measured, "o", color=INK, ms=3.2, label="measured")
+            axis.set_title(f"{title}:  {calibration.predictive_coverage(discrepancy=with_discrepancy):.0%} inside")
+            axis.set_xlabel(data.control_label)
+        panels[0].set_ylabel(data.measured_label)
+        panels[0].legend(fontsize=9)
+    return figure
+
+
+def check_figure(calibration: Calibration) -> Figure:
+    """Return the validation of the emulator: every run predicted from the others, and new runs."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    trials = [(calibration.check, BAND, "o", "left out")]
+    trials += [(trial, EXACT, "s", "" if index else "in the posterior, before refinement")
+               for index, trial in enumerate(calibration.held_out)]  # fmt: skip
+    with rc_context(STYLE):
+        figure = Figure(figsize=(10.0, 3.9))
+        error_axis, standardised_axis = figure.subplots(1, 2)
+        for check, color, mark, label in trials:
+            computed, error = check.computed.ravel(), (check.predicted - check.computed).ravel()
+            size = np.abs(check.computed).max()
+            bars: dict[str, Any] = {"yerr": 1.96 * check.sd.ravel() / size, "ecolor": color, "elinewidth": 0.5}
+            error_axis.errorbar(computed, error / size, fmt=mark, ms=2.6, color=color, alpha=0.6, label=label, **bars)
+            standardised_axis.plot(computed, check.standardised.ravel(), mark, ms=2.6, color=color, alpha=0.6)
+        error_axis.axhline(0, color=INK, lw=0.8)
+        error_axis.set_title("Emulator minus model, over the largest output")
+        for end in (-1.96, 1.96):
+            standardised_axis.axhline(end, color=BASE, lw=1, ls="--")
+        standardised_axis.set_title("The same in standard deviations (dashed: 95 %)")
+        for axis in (error_axis, standardised_axis):
+            axis.set_xlabel("output of the model")
+        error_axis.legend(fontsize=9)
+    return figure
+
+
+def marginals_figure(calibration: Calibration) -> Figure:
+    """Return the marginal posterior of every parameter with its prior, and as if the emulator were exact."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    symbols = calibration.problem.symbols
+    columns = min(MAX_COLUMNS, len(symbols))
+    rows = ceil(len(symbols) / columns)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(3.6 * columns + 0.6, 2.7 * rows + 0.7))
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axis, symbol in zip(panels, symbols, strict=False):
+            _draw_marginal(axis, calibration, symbol)
+        for spare in panels[len(symbols) :]:
+            spare.set_visible(False)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9)
+    return figure
+
+
+def _draw_marginal(axis: Axes, calibration: Calibration, symbol: str) -> None:
+    posterior, exact = calibration.marginals[symbol], calibration.without_emulator_error.marginals[symbol]
+    ends = np.array([marginal.quantile([0.001, 0.999]) for marginal in (posterior, exact)])
+    values = np.linspace(ends[:, 0].min(), ends[:, 1].max(), 500)
+    axis.fill_between(values, posterior.pdf(values), color=BAND, alpha=0.3, lw=0, label="posterior")
+    axis.plot(values, exact.pdf(values), color=EXACT, lw=1.2, ls="--", label="as if the emulator were exact")
+    low, high = calibration.problem.priors[symbol].support
+    inside = (values > low) & (values < high)
+    prior = np.exp(calibration.problem.priors[symbol].log_density(values[inside]))
+    axis.plot(values[inside], prior, ":", color=BASE, lw=1.4, label="prior")
+    axis.plot(posterior.hdi(), [0, 0], color=BAND, lw=4, solid_capstyle="butt")
+    top = max(posterior.density.max(), float(exact.pdf(values).max()))
+    axis.set_ylim(-0.02 * top, min(1.08 * top, 4 * float(posterior.density.max())))
+    axis.set_title(symbol)
+    axis.set_yticks([])
+    axis.spines["left"].set_visible(False)
+    axis.locator_params(axis="x", nbins=5)

@@ -6,8 +6,8 @@ import csv
 from pathlib import Path
 from typing import Any
 
-from tissuq.ensemble import Ensemble
 from tissuq.export import Cards, CardSettings, card_format
+from tissuq.posterior.ensemble import Ensemble
 from tissuq.report.run_folder import run_folder
 
 __all__ = ["INDEX", "write_cards"]
@@ -40,7 +40,7 @@ def write_cards(
     Returns
     -------
     Cards
-        Texts, rows of the index, and notes to be read.
+        Texts, rows of the index, and warnings.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def write_cards(
     >>> draws = tq.fit(data, material="yeoh", discrepancy="none", noise_sd=0.02).ensemble(4)
     >>> with tempfile.TemporaryDirectory() as place:
     ...     cards = tq.write_cards(draws, f"{place}/cards", "calculix", unit="kPa")
-    >>> cards.notes[0]
+    >>> cards.warnings[0]
     "The cards are the draws' own law, exactly: YEOH."
     >>> print(cards.files["draw-1.inp"].splitlines()[-2])
     *HYPERELASTIC, YEOH

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.experiments.units import StressUnit
+from tissuq.experiments.reading.units import StressUnit
 from tissuq.report.figures import BAND, BASE, INK, STYLE, save_figure
-from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import interval
+from tissuq.report.run_folder import embedded_figure, render
+from tissuq.report.tables import interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "EXPLANATIONS",
     "HEADERS",
-    "NOTES",
-    "ROUGH",
     "comparison_figure",
+    "comparison_warnings",
     "parameter_header",
     "readable_comparison",
     "write_comparison",
@@ -38,19 +38,18 @@ HEADERS = [
     "stacking",
 ]
 """Of `readable_comparison`; the last is the parameter."""
-NOTES = (
-    "Log Bayes factor: of the evidence, against the best fit. With other priors: its range with the prior scales of "
-    "the discrepancies' random parts a quarter or fourfold, and the uniform boxes of linear parameters four times as "
+EXPLANATIONS = (
+    "Log Bayes factor: log evidence relative to the best fit. With other priors: its range when the prior scales of "
+    "the discrepancies are divided or multiplied by four and the uniform priors of linear parameters are four times as "
     "wide, in all fits at once.",
-    "Probability: were all fits as probable before the data. It compares descriptions of these data, not values of a "
-    "parameter; no fit is dropped for it.",
-    "Elpd difference: by how much the expected log density of a measurement that was left out, summed over all, falls "
-    "short of the best fit's, with its standard error. Good predictions say nothing of parameters.",
-    "Stacking: weights for an average of predictions, and for predictions only; they say nothing of parameters.",
+    "Probability: posterior probability of each fit if all were equally probable before the data. It compares "
+    "descriptions of these data, not values of a parameter; no fit is discarded because of it.",
+    "Elpd difference: sum of the leave-one-out log predictive densities, less that of the best fit, with its standard "
+    "error. Good predictions do not validate parameters.",
+    "Stacking: weights for averaging predictions; they do not apply to parameters.",
 )
-ROUGH = "Rough: single measurements weigh so much that importance weights cannot leave them out."
-FAR = 25.0
-"""Differences of a log density beyond which a point is drawn at the edge, with its number."""
+MAX_DRAWN_DIFFERENCE = 25.0
+"""Difference of a log density beyond which a point is drawn at the edge, with its number."""
 
 
 def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]]:
@@ -73,6 +72,12 @@ def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]
     return rows
 
 
+def comparison_warnings(table: pd.DataFrame) -> list[str]:
+    """Return the warnings about a comparison."""
+    text = "Numbers marked rough are not reliable: a few influential measurements dominate the importance weights."
+    return [text] * bool(table["is_rough"].any())
+
+
 def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
     """Return evidence, leave-one-out prediction and the headline parameter of every fit, side by side.
 
@@ -89,23 +94,25 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(11.5, 1.9 + 0.42 * len(table)))
         evidence, prediction, parameter = figure.subplots(1, 3, sharey=True, width_ratios=(1, 1.15, 1))
-        places = np.arange(len(table))[::-1]
+        levels = np.arange(len(table))[::-1]
         low, high = (table[f"log_bayes_factor_{end}"] for end in ("low", "high"))
-        _differences(evidence, places, table["log_bayes_factor"], low, high)
+        _differences(evidence, levels, table["log_bayes_factor"], low, high)
         evidence.set_title("Evidence")
         evidence.set_xlabel("log Bayes factor against the best\n(line: with other widths of the priors)")
         difference, error = -table["elpd_difference"], table["elpd_difference_error"]
-        _differences(prediction, places, difference, difference - error, difference + error)
+        _differences(prediction, levels, difference, difference - error, difference + error)
         prediction.set_title("Prediction")
         prediction.set_xlabel("elpd less that of the best\n(line: ± standard error)")
         prediction.text(1.02, 1.0, "stacking,\nfor predictions only", transform=prediction.transAxes, fontsize=8.5,
                         ha="left", va="bottom", color="#5a6472")  # fmt: skip
         marks = np.where(table["is_rough"], " (rough)", "")
-        for place, weight, mark in zip(places, table["stacking"], marks, strict=True):
-            prediction.text(1.02, place, f"{weight:.2f}{mark}", transform=prediction.get_yaxis_transform(), va="center",
-                            fontsize=9, color="#5a6472")  # fmt: skip
-        _intervals(parameter, places, table, unit)
-        evidence.set_yticks(places, [str(name) for name in table.index])
+        for level, weight, mark in zip(levels, table["stacking"], marks, strict=True):
+            prediction.text(
+                1.02, level, f"{weight:.2f}{mark}", transform=prediction.get_yaxis_transform(), va="center",
+                fontsize=9, color="#5a6472",
+            )  # fmt: skip
+        _intervals(parameter, levels, table, unit)
+        evidence.set_yticks(levels, [str(name) for name in table.index])
         evidence.set_ylim(-0.6, len(table) - 0.4)
         for axis in (evidence, prediction, parameter):
             axis.tick_params(axis="y", length=0)
@@ -135,7 +142,8 @@ def write_comparison(table: pd.DataFrame, runs: list[str], unit: StressUnit, fol
         "comparison.html",
         headers=[*HEADERS, parameter_header(table, unit)],
         rows=readable_comparison(table, unit),
-        notes=[*NOTES, *[ROUGH] * bool(table["is_rough"].any())],
+        explanations=EXPLANATIONS,
+        warnings=comparison_warnings(table),
         command=" ".join(["tissuq compare", *runs]),
         figure=embedded_figure(folder / "figures" / "comparison.svg"),
     )
@@ -158,35 +166,35 @@ def _interval(row: pd.Series[Any], unit: StressUnit) -> str:
     return " to ".join(interval(low, high, (high - low) / 4))
 
 
-def _differences(axis: Axes, places: Any, middle: pd.Series[float], low: Any, high: Any) -> None:
+def _differences(axis: Axes, levels: Any, middle: pd.Series[float], low: Any, high: Any) -> None:
     """Draw differences to the best as points with ranges, those far below at the edge."""
-    edge = -FAR if (middle < -FAR).any() else float(np.nanmin([*low, *middle, -1.0]))
+    edge = -MAX_DRAWN_DIFFERENCE if (middle < -MAX_DRAWN_DIFFERENCE).any() else float(np.nanmin([*low, *middle, -1.0]))
     margin = 0.06 * abs(edge)
     axis.axvline(0, color=BASE, linewidth=1, zorder=1)
-    for place, value, start, end in zip(places, middle, low, high, strict=True):
+    for level, value, start, end in zip(levels, middle, low, high, strict=True):
         if isnan(value):
-            axis.text(0.5, place, "not known", transform=axis.get_yaxis_transform(), ha="center", va="center",
+            axis.text(0.5, level, "not known", transform=axis.get_yaxis_transform(), ha="center", va="center",
                       fontsize=9, color="#5a6472")  # fmt: skip
         elif value < edge:
-            axis.plot(edge, place, "<", color=BAND, ms=6)
-            axis.text(edge + margin, place, f"{value:,.0f}", va="center", fontsize=9, color=INK)
+            axis.plot(edge, level, "<", color=BAND, ms=6)
+            axis.text(edge + margin, level, f"{value:,.0f}", va="center", fontsize=9, color=INK)
         else:
             if end > start:
-                axis.plot([max(start, edge), end], [place, place], color=BAND, lw=2, alpha=0.55, solid_capstyle="butt")
-            axis.plot(value, place, "o", color=BAND, ms=5)
+                axis.plot([max(start, edge), end], [level, level], color=BAND, lw=2, alpha=0.55, solid_capstyle="butt")
+            axis.plot(value, level, "o", color=BAND, ms=5)
     axis.set_xlim(edge - margin, max(2 * margin, float(np.nanmax([*high, 0.0])) + margin))
 
 
-def _intervals(axis: Axes, places: Any, table: pd.DataFrame, unit: StressUnit) -> None:
+def _intervals(axis: Axes, levels: Any, table: pd.DataFrame, unit: StressUnit) -> None:
     """Draw the 95 % interval and the median of the headline parameter of every fit."""
     names = table["parameter"].dropna().unique()
     axis.set_title("Parameter" if len(names) != 1 else str(names[0]))
     axis.set_xlabel(f"{' or '.join(names)} [{unit.name}]\n(95 % HPD and median)")
-    for place, (_, row) in zip(places, table.iterrows(), strict=True):
+    for level, (_, row) in zip(levels, table.iterrows(), strict=True):
         low, median, high = (float(row[name]) / unit.to_mpa for name in ("hdi_low", "median", "hdi_high"))
-        axis.plot([low, high], [place, place], color=BAND, lw=4, alpha=0.55, solid_capstyle="butt")
-        axis.plot(median, place, "o", color="white", mec=INK, ms=5)
+        axis.plot([low, high], [level, level], color=BAND, lw=4, alpha=0.55, solid_capstyle="butt")
+        axis.plot(median, level, "o", color="white", mec=INK, ms=5)
         if len(names) > 1:
             axis.annotate(
-                str(row["parameter"]), (high, place), (5, 0), textcoords="offset points", va="center", fontsize=9
+                str(row["parameter"]), (high, level), (5, 0), textcoords="offset points", va="center", fontsize=9
             )

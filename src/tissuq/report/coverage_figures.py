@@ -19,9 +19,10 @@ __all__ = ["campaign_figures"]
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "osD^vP*"
 CELL = ["design", "strength", "noise"]
-ERRORS = 1.96
-"""Monte Carlo standard errors of a bar."""
-MOST_COLUMNS = 3
+BAR_HALF_WIDTH = 1.96
+"""Half width of an error bar in Monte Carlo standard errors (95 %)."""
+WIDE_ROW = 3
+"""Panels in a row from which the figure keeps its width."""
 
 
 def campaign_figures(tables: Mapping[str, pd.DataFrame], prob: float) -> dict[str, Figure]:
@@ -55,10 +56,10 @@ def _overview(summary: pd.DataFrame, prob: float) -> Figure:
     tall = max(len(labels) for _, labels, _ in panels)
     figure, axes = _grid(len(panels), len(measures), 0.75 + 0.24 * tall)
     for row, (title, labels, table) in zip(axes, panels, strict=True):
-        places = list(range(len(labels)))[::-1]
+        heights = list(range(len(labels)))[::-1]
         for axis, measure in zip(row, measures, strict=True):
-            _dots(axis, table, measure, places, prob)
-            axis.set_yticks(places, labels if axis is row[0] else [""] * len(labels))
+            _dots(axis, table, measure, heights, prob)
+            axis.set_yticks(heights, labels if axis is row[0] else [""] * len(labels))
             axis.set_ylim(-0.7, len(labels) - 0.3)
         row[0].set_title(title)
     texts = {
@@ -71,18 +72,19 @@ def _overview(summary: pd.DataFrame, prob: float) -> Figure:
     return figure
 
 
-def _dots(axis: Axes, table: pd.DataFrame, measure: str, places: list[int], prob: float) -> None:
+def _dots(axis: Axes, table: pd.DataFrame, measure: str, heights: list[int], prob: float) -> None:
     factor = 1.0 if measure == "price" else 100.0
     axis.axvline(1.0 if measure == "price" else 100 * prob, color=BASE, linewidth=1)
-    error: Any = ERRORS * factor * table[f"{measure}_error"]
+    error: Any = BAR_HALF_WIDTH * factor * table[f"{measure}_error"]
     if measure == "price":
-        axis.plot(table["width"], places, "o", markersize=5, markerfacecolor="white", color=BAND)
+        axis.plot(table["width"], heights, "o", markersize=5, markerfacecolor="white", color=BAND)
         axis.set_xscale("log")
         axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.xaxis.set_minor_formatter("")
         error = np.minimum(error, 0.9 * table["price"])
     else:
         axis.set_xlim(-2, 102)
-    axis.errorbar(factor * table[measure], places, xerr=error, fmt="o", markersize=4, color=BAND)
+    axis.errorbar(factor * table[measure], heights, xerr=error, fmt="o", markersize=4, color=BAND)
 
 
 def _by_family(families: pd.DataFrame, prob: float) -> Figure:
@@ -134,17 +136,18 @@ def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
     panels = list(summary.groupby(["design", "noise"], sort=False))
     figure, axes = _grid(len(panels), 2, 2.6)
     for row, ((design, noise), table) in zip(axes, panels, strict=True):
-        for place, (name, line) in enumerate(table.groupby("formulation", sort=False)):
-            style: dict[str, Any] = {"color": COLORS[place % len(COLORS)], "marker": MARKERS[place % len(MARKERS)]}
+        for index, (name, line) in enumerate(table.groupby("formulation", sort=False)):
+            style: dict[str, Any] = {"color": COLORS[index % len(COLORS)], "marker": MARKERS[index % len(MARKERS)]}
             style |= {"markersize": 4, "label": name}
-            error = 100 * ERRORS * line["coverage_error"]
+            error = 100 * BAR_HALF_WIDTH * line["coverage_error"]
             row[0].errorbar(line["strength"], 100 * line["coverage"], yerr=error, **style)
-            row[1].errorbar(line["strength"], line["price"], yerr=ERRORS * line["price_error"], **style)
+            row[1].errorbar(line["strength"], line["price"], yerr=BAR_HALF_WIDTH * line["price_error"], **style)
         row[0].axhline(100 * prob, color=BASE, linewidth=1, zorder=0)
         row[0].set_ylabel("intervals that hold C10 [%]")
         row[1].set_ylabel("mean score / oracle's width")
         row[1].set_yscale("log")
         row[1].yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        row[1].yaxis.set_minor_formatter("")
         row[0].set_title(str(design) if summary["noise"].nunique() == 1 else f"{design}, {noise} noise")
     for axis in axes[-1]:
         axis.set_xlabel("strength of the error of the model")
@@ -159,14 +162,14 @@ def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
     names, modes = list(dict.fromkeys(unseen["formulation"])), list(dict.fromkeys(unseen["mode"]))
     figure, axes = _grid(len(panels), 2, 0.75 + 0.3 * len(names))
     for row, (_, table) in zip(axes, panels, strict=True):
-        for which, mode in enumerate(modes):
-            own = table[table["mode"] == mode]
-            places = [len(names) - 1 - names.index(name) + 0.2 * (0.5 * (len(modes) - 1) - which)
-                      for name in own["formulation"]]  # fmt: skip
+        for index, mode in enumerate(modes):
+            rows = table[table["mode"] == mode]
+            heights = [len(names) - 1 - names.index(name) + 0.2 * (0.5 * (len(modes) - 1) - index)
+                      for name in rows["formulation"]]  # fmt: skip
             for axis, measure in zip(row, ("coverage", "error"), strict=True):
-                bars = ERRORS * 100 * own[f"{measure}_error"]
-                style: dict[str, Any] = {"fmt": MARKERS[which], "markersize": 4, "color": COLORS[which], "label": mode}
-                axis.errorbar(100 * own[measure], places, xerr=bars, **style)
+                bars = BAR_HALF_WIDTH * 100 * rows[f"{measure}_error"]
+                style: dict[str, Any] = {"fmt": MARKERS[index], "markersize": 4, "color": COLORS[index], "label": mode}
+                axis.errorbar(100 * rows[measure], heights, xerr=bars, **style)
         row[0].axvline(100 * prob, color=BASE, linewidth=1, zorder=0)
         row[0].set_xlim(-2, 102)
         for axis in row:
@@ -185,7 +188,7 @@ def _grid(down: int, across: int, height: float) -> tuple[Figure, list[list[Axes
     """Return a figure with rows of panels that share their horizontal axes."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.9 * across if across < MOST_COLUMNS else 11.5, down * height + 0.5))
+    figure = Figure(figsize=(4.9 * across if across < WIDE_ROW else 11.5, down * height + 0.5))
     axes = figure.subplots(down, across, squeeze=False, sharex="col")
     return figure, axes.tolist()
 

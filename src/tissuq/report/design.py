@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.assessment.targets import Target
-from tissuq.report.common import write_figures, write_recipe
+from tissuq.next_test.targets import Target
 from tissuq.report.figures import BAND, BASE, INK, STYLE
-from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import significant
-from tissuq.report.run_folder import RECIPE
-from tissuq.report.tables import Row, write_csv, write_json
+from tissuq.report.run_folder import RECIPE, embedded_figure, render, write_figures, write_recipe
+from tissuq.report.tables import Row, significant, write_csv, write_json
 from tissuq.studies.design import DesignSettings, DesignStudy
 
 if TYPE_CHECKING:
@@ -26,8 +23,8 @@ __all__ = ["HEADERS", "design_figure", "heading", "readable_design", "write_desi
 
 HEADERS = ["test", "expected sd", "reduction", "note"]
 """Of `readable_design`."""
-MOST_BARS = 16
-"""Tests in a panel of the figure."""
+MAX_ROWS = 16
+"""Number of tests in a panel of the figure, besides repeats of the tests of the data."""
 BEYOND = "#E69F00"
 
 
@@ -35,13 +32,13 @@ def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
     """Return the rows of one target as text, under `HEADERS`, in the unit of the data; best first, the others last."""
     factor, _ = _unit(study, target)
     rows = []
-    for _, row in _own(study, target).iterrows():
-        known = not isnan(row["reduction"])
+    for _, row in _rows_of(study, target).iterrows():
+        is_ranked = not isnan(row["reduction"])
         rows.append(
             [
                 str(row["candidate"]),
-                f"{row['sd_after'] / factor:#.3g}" if known else "",
-                f"{row['reduction']:.1%}" + (f" ± {row['error']:.1%}" if row["error"] else "") if known else "",
+                f"{row['sd_after'] / factor:#.3g}" if is_ranked else "",
+                f"{row['reduction']:.1%}" + (f" ± {row['error']:.1%}" if row["error"] else "") if is_ranked else "",
                 str(row["note"]),
             ]
         )
@@ -51,8 +48,8 @@ def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
 def heading(study: DesignStudy, target: Target) -> str:
     """Return what a target is, and how uncertain it is now."""
     factor, unit = _unit(study, target)
-    now = significant(float(_own(study, target)["sd_now"].iloc[0]) / factor)
-    return f"{target.title(study.posterior.model)}: sd {now}{' ' * bool(unit)}{unit} now"
+    sd_now = significant(float(_rows_of(study, target)["sd_now"].iloc[0]) / factor)
+    return f"{target.title(study.posterior.model)}: sd {sd_now}{' ' * bool(unit)}{unit} now"
 
 
 def design_figure(study: DesignStudy) -> Figure:
@@ -61,14 +58,14 @@ def design_figure(study: DesignStudy) -> Figure:
     from matplotlib.figure import Figure
 
     with rc_context(STYLE):
-        shown = [_shown(_own(study, target)) for target in study.targets]
+        shown = [_shown(_rows_of(study, target)) for target in study.targets]
         height = 1.5 + 0.3 * max(map(len, shown))
         figure = Figure(figsize=(9.5, 0.4 + height * len(shown)))
         axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
         for axis, target, table in zip(axes, study.targets, shown, strict=True):
             _panel(axis, study, target, table)
         marks: list[Any] = [axes[0].plot([], [], "o", color=color)[0] for color in (BAND, BEYOND, BASE)]
-        words = ["within the I1 and I2 of the data", "beyond", "tests of the data again"]
+        words = ["within the measured I1 and I2", "beyond", "repeats of the tests of the data"]
         figure.legend(marks, words, loc="outside lower right", ncols=3, fontsize=9)
     return figure
 
@@ -104,7 +101,8 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
              readable_design(study, target))
             for target in study.targets
         ],
-        notes=study.notes,
+        explanations=study.explanations,
+        warnings=study.warnings,
         command="design",
         recipe=(folder / RECIPE).read_text(encoding="utf-8"),
         figure=embedded_figure(folder / "figures" / "design.svg") if figures else "",
@@ -112,7 +110,7 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
-def _own(study: DesignStudy, target: Target) -> pd.DataFrame:
+def _rows_of(study: DesignStudy, target: Target) -> pd.DataFrame:
     return study.table[study.table["target"] == target.name]
 
 
@@ -128,10 +126,10 @@ def _in(study: DesignStudy, target: Target) -> str:
 
 
 def _lead(study: DesignStudy) -> list[str]:
-    """Return the best test for each target in a sentence, with what as many measurements of the data again give."""
-    found = []
+    """Return the best test for each target in a sentence, compared with repeating the tests of the data."""
+    sentences = []
     for target in study.targets:
-        table = _own(study, target).dropna(subset=["reduction"])
+        table = _rows_of(study, target).dropna(subset=["reduction"])
         best, again = table[~table["is_repeat"]], table[table["is_repeat"]]
         if not len(best):
             continue
@@ -139,33 +137,33 @@ def _lead(study: DesignStudy) -> list[str]:
         title = target.title(study.posterior.model)
         words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}"
         if len(again):
-            usual = again.iloc[-1]
-            words += f"; {usual['candidate']}, by {usual['reduction']:.0%}"
-        found.append(words + ".")
-    return found
+            repeat = again.iloc[-1]
+            words += f"; {repeat['candidate']}, by {repeat['reduction']:.0%}"
+        sentences.append(words + ".")
+    return sentences
 
 
 def _shown(table: pd.DataFrame) -> pd.DataFrame:
     """Return the best tests with numbers, and the tests of the data again."""
-    known = table.dropna(subset=["reduction"])
-    places = np.arange(len(known))
-    return known[known["is_repeat"].to_numpy() | (places < MOST_BARS)]
+    ranked = table.dropna(subset=["reduction"])
+    ranks = np.arange(len(ranked))
+    return ranked[ranked["is_repeat"].to_numpy() | (ranks < MAX_ROWS)]
 
 
 def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) -> None:
     """Draw the tests of one target."""
     factor, unit = _unit(study, target)
-    now, places = float(table["sd_now"].iloc[0]) / factor, np.arange(len(table))[::-1]
-    for place, (_, row) in zip(places, table.iterrows(), strict=True):
-        after, error = row["sd_after"] / factor, 2 * row["error"] * now
+    sd_now, heights = float(table["sd_now"].iloc[0]) / factor, np.arange(len(table))[::-1]
+    for height, (_, row) in zip(heights, table.iterrows(), strict=True):
+        sd_after, error = row["sd_after"] / factor, 2 * row["error"] * sd_now
         color = BASE if row["is_repeat"] else BEYOND if row["beyond"] > 0 else BAND
-        axis.plot([after, now], [place, place], color=color, lw=2, alpha=0.4, solid_capstyle="butt")
-        axis.plot([after - error, after + error], [place, place], color=INK, lw=1.2)
-        axis.plot(after, place, "o", color="white" if row["is_rough"] else color, mec=color, ms=6)
-    axis.axvline(now, color=INK, lw=1)
-    axis.set_yticks(places, [str(name) for name in table["candidate"]])
+        axis.plot([sd_after, sd_now], [height, height], color=color, lw=2, alpha=0.4, solid_capstyle="butt")
+        axis.plot([sd_after - error, sd_after + error], [height, height], color=INK, lw=1.2)
+        axis.plot(sd_after, height, "o", color="white" if row["is_rough"] else color, mec=color, ms=6)
+    axis.axvline(sd_now, color=INK, lw=1)
+    axis.set_yticks(heights, [str(name) for name in table["candidate"]])
     axis.set_ylim(-0.7, len(table) - 0.3)
-    axis.set_xlim(0, 1.04 * now)
+    axis.set_xlim(0, 1.04 * sd_now)
     axis.set_title(target.title(study.posterior.model))
     axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}; line: now")
     axis.tick_params(axis="y", length=0)

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
-from tissuq.assessment.stability import LOST
-from tissuq.experiments.experiment import Experiment
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
+from tissuq.experiments.experiment import Curve
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit
-from tissuq.posterior import Posterior
-from tissuq.prediction.bands import Band, predict_band
+from tissuq.experiments.reading.units import StressUnit
+from tissuq.posterior.posterior import Posterior
+from tissuq.prediction.bands import Band, inside_band, predict_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,8 @@ __all__ = ["BAND", "BASE", "INK", "STYLE", "marginal_figure", "predictive_figure
 FloatArray = NDArray[np.float64]
 
 INK, BAND, BASE, TRUTH, UNSTABLE = "#222222", "#0072B2", "#8a8a8a", "#D55E00", "#E69F00"
+MAX_POINTS, BINS = 5000, 120
+"""Measurements that are drawn one by one, and bins in which more of them are summed up."""
 STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.spines.top": False,
@@ -35,6 +37,7 @@ STYLE: dict[Any, Any] = {
     "axes.titlesize": 10.5,
     "axes.titlelocation": "left",
     "legend.frameon": False,
+    "text.parse_math": False,  # a dollar sign in the name of a file is one
     "svg.fonttype": "path",
     "svg.hashsalt": "tissuq",
     "figure.constrained_layout.use": True,
@@ -70,55 +73,62 @@ def predictive_figure(
 
     with rc_context(STYLE):
         curves = next(iter(posteriors.values())).model.experiment.curves
-        panels = [(name, *curve) for name in posteriors for curve in curves]
+        panels = [(name, curve) for name in posteriors for curve in curves]
         figure, axes = _panels(len(panels), is_shared=len(curves) == 1)
-        bands = [_band_over(posteriors[name], test, channel, discrepancy) for name, test, channel, _ in panels]
+        bands = [_band_over(posteriors[name], curve, discrepancy) for name, curve in panels]
         base = bands[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
-        for place, (axis, (name, test, channel, stress)) in enumerate(zip(axes, panels, strict=False)):
-            posterior, band = posteriors[name], bands[place]
-            at = test.mode.channels[channel].abscissa(test.stretch)
-            inside = _inside(posterior, test, channel, stress, discrepancy)
-            which = [name] * (len(posteriors) > 1) + [_name_of(test, channel)] * (len(curves) > 1) or [name]
-            axis.set_title(f"{', '.join(which)}:  {inside} of {len(stress)} inside")
+        for index, (axis, (name, curve)) in enumerate(zip(axes, panels, strict=False)):
+            posterior, band = posteriors[name], bands[index]
+            inside = inside_band(posterior.solution, curve, discrepancy=discrepancy).sum()
+            labels = [name] * (len(posteriors) > 1) + [_name_of(curve)] * (len(curves) > 1) or [name]
+            axis.set_title(f"{', '.join(labels)}:  {inside} of {len(curve)} inside")
             _draw_band(axis, band, unit)
-            if test.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
-                _shade_instability(axis, posterior, test.mode.name, band.stretch)
+            if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
+                _shade_instability(axis, posterior, curve.mode.name, band.stretch)
             if name != "none" and base:
-                own = base[place % len(curves)]
-                axis.plot(own.stretch, own.mean / unit.to_mpa, ":", color=BASE, lw=1.4, label="mean of the fit 'none'")
+                none = base[index % len(curves)]
+                mean = none.mean / unit.to_mpa
+                axis.plot(none.stretch, mean, ":", color=BASE, lw=1.4, label="mean of the fit 'none'")
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
-            axis.plot(at, stress / unit.to_mpa, "o", color=INK, ms=3, label="measured")
+            _draw_measured(axis, curve.abscissa, curve.stress / unit.to_mpa)
             if len(curves) > 1:
                 axis.locator_params(axis="x", nbins=6)
-                axis.set_xlabel(test.mode.controls[0].name, fontsize=9)
+                axis.set_xlabel(curve.mode.controls[0].name, fontsize=9)
         if len(curves) == 1:
-            limits = _common_limits(curves[0][2], bands, unit)
+            limits = _common_limits(curves[0].stress, bands, unit)
             for axis in axes[: len(panels)]:
                 axis.set_ylim(limits)
-        _label(figure, axes, len(panels), [test.mode for test, _, _ in curves], unit)
+        _label(figure, axes, len(panels), [curve.mode for curve in curves], unit)
     return figure
 
 
-def _name_of(test: Experiment, channel: int) -> str:
-    return f"{test.name}, {test.mode.stresses[channel]}" if len(test.mode.stresses) > 1 else test.name
+def _name_of(curve: Curve) -> str:
+    return f"{curve.name}, {curve.quantity}" if len(curve.mode.stresses) > 1 else curve.name
 
 
-def _band_over(posterior: Posterior, test: Experiment, channel: int, discrepancy: bool) -> Band:
-    """Return the band of a stress over the range of a test, or at its points where it has several controls."""
-    points = test.stretch
+def _band_over(posterior: Posterior, curve: Curve, discrepancy: bool) -> Band:
+    """Return the band of a stress over the range of its curve, or at its points where the test has several controls."""
+    points = curve.points
     if points.ndim > 1:
-        points = points[np.argsort(test.mode.channels[channel].abscissa(points), kind="stable")]
+        points = points[np.argsort(curve.abscissa, kind="stable")]
     else:
         points = np.linspace(points.min(), points.max(), 161)
-    return predict_band(posterior.solution, points, discrepancy=discrepancy, mode=test.mode, channel=channel)
+    return predict_band(posterior.solution, points, discrepancy=discrepancy, mode=curve.mode, channel=curve.channel)
 
 
-def _inside(posterior: Posterior, test: Experiment, channel: int, stress: FloatArray, discrepancy: bool) -> int:
-    """Return how many measurements are inside the band at their own places."""
-    options: dict[str, Any] = {"mode": test.mode, "channel": channel, "discrepancy": discrepancy}
-    band = predict_band(posterior.solution, test.stretch, **options)
-    return int(((band.low <= stress) & (stress <= band.high)).sum())
+def _draw_measured(axis: Axes, abscissa: FloatArray, stress: FloatArray) -> None:
+    """Draw measurements as points, or, if there are many, the mean and central 95 % of bins."""
+    if len(abscissa) <= MAX_POINTS:
+        axis.plot(abscissa, stress, "o", color=INK, ms=3, label="measured")
+        return
+    edges = np.linspace(abscissa.min(), abscissa.max(), BINS + 1)
+    order = np.argsort(abscissa)
+    bins = [rows for rows in np.split(order, np.searchsorted(abscissa[order], edges[1:-1])) if len(rows)]
+    centre, mean = (np.array([values[rows].mean() for rows in bins]) for values in (abscissa, stress))
+    low, high = np.array([np.quantile(stress[rows], [0.025, 0.975]) for rows in bins]).T
+    axis.vlines(centre, low, high, color=INK, lw=0.8)
+    axis.plot(centre, mean, "o", color=INK, ms=2.5, label=f"measured ({len(stress)}): mean and central 95 % of bins")
 
 
 def marginal_figure(
@@ -153,6 +163,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
 
     with rc_context(STYLE):
         figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+        figure.set_layout_engine("none")  # the layout of the first file is that of the second
         figure.savefig(folder / f"{name}.png", dpi=150, metadata={"Software": None})
 
 
@@ -178,11 +189,11 @@ def _draw_band(axis: Axes, band: Band, unit: StressUnit) -> None:
 
 
 def _shade_instability(axis: Axes, posterior: Posterior, mode: str, stretch: FloatArray) -> None:
-    found = posterior.stable_ranges.get(mode)
-    if found is None:
+    stable_range = posterior.stable_ranges.get(mode)
+    if stable_range is None:
         return
-    label = f"stability lost (probability > {100 * LOST:.0f} %)"
-    for sure, end in ((found.surely_low, found.low), (found.surely_high, found.high)):
+    label = f"stability lost (probability > {100 * MIN_LOSS_PROBABILITY:.0f} %)"
+    for sure, end in ((stable_range.surely_low, stable_range.low), (stable_range.surely_high, stable_range.high)):
         sure, end = np.clip([sure, end], stretch[0], stretch[-1])
         if sure != end:
             axis.axvspan(sure, end, facecolor=UNSTABLE, alpha=0.16, lw=0, zorder=0, label=label)
@@ -212,9 +223,9 @@ def _common_limits(stress: FloatArray, bands: Sequence[Band], unit: StressUnit) 
 
 
 def _label(figure: Figure, axes: list[Axes], count: int, modes: Sequence[LoadingMode], unit: StressUnit) -> None:
-    for spare, above in zip(axes[count:], axes[count - _columns(count) :], strict=False):
+    for spare, visible in zip(axes[count:], axes[count - _columns(count) :], strict=False):
         spare.set_visible(False)
-        above.tick_params(labelbottom=True)
+        visible.tick_params(labelbottom=True)
     if len(modes) == 1:
         figure.supxlabel(modes[0].controls[0].name, fontsize=10.5)
     measured = {stress for mode in modes for stress in mode.stresses}

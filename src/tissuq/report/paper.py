@@ -6,16 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.units import StressUnit
+from tissuq.experiments.reading.units import StressUnit
 from tissuq.mechanics import Yeoh, engineering_stress
-from tissuq.report.common import write_data, write_figures, write_posteriors, write_recipe, write_tables
-from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import readable_parameters, readable_summary
-from tissuq.report.run_folder import RECIPE
-from tissuq.report.tables import Row, summary_row, write_csv
-from tissuq.studies.paper.sensitivity import AMPLITUDE_BOUNDS
-from tissuq.studies.paper.settings import FORMULATIONS
-from tissuq.studies.paper.study import Fitted, PaperStudy
+from tissuq.report.run_folder import (
+    RECIPE,
+    embedded_figure,
+    render,
+    write_data,
+    write_figures,
+    write_posteriors,
+    write_recipe,
+    write_tables,
+)
+from tissuq.report.tables import Row, readable_parameters, readable_summary, summary_row, write_csv
+from tissuq.validation.paper.settings import FORMULATIONS
+from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, Fitted, PaperStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +37,7 @@ GROUPS = {
 
 
 def write_paper_run(study: PaperStudy, folder: Path, *, figures: bool = True) -> None:
-    """Write everything that a run leaves behind into an empty folder.
+    """Write the results of a run into an empty folder.
 
     Parameters
     ----------
@@ -40,7 +45,7 @@ def write_paper_run(study: PaperStudy, folder: Path, *, figures: bool = True) ->
     folder : Path
         Exists and is empty.
     figures : bool
-        Without them the run is a matter of seconds.
+        Draw them.
     """
     command = "paper" if figures else "paper --no-figures"
     write_recipe(folder, command, study.settings)
@@ -69,28 +74,28 @@ def paper_figures(study: PaperStudy) -> dict[str, Figure]:
     truth = [study.settings.truth[p.symbol] for p in Yeoh.parameters]
     curve = (stretch, engineering_stress(Yeoh(), Uniaxial(), stretch, truth))
     figures = {}
-    for first, names in GROUPS.items():
-        chosen = {name: posteriors[name] for name in names}
-        for number, discrepancy in ((first, True), (first + 1, False)):
-            figures[f"figure{number}"] = predictive_figure(chosen, discrepancy=discrepancy, unit=MPA, true_curve=curve)
+    for figure_number, names in GROUPS.items():
+        shown = {name: posteriors[name] for name in names}
+        for number, discrepancy in ((figure_number, True), (figure_number + 1, False)):
+            figures[f"figure{number}"] = predictive_figure(shown, discrepancy=discrepancy, unit=MPA, true_curve=curve)
     figures["figure7"] = marginal_figure(posteriors, "C10", MPA, study.settings.truth["C10"])
     return figures
 
 
 def _posteriors(fitted: dict[str, Fitted]) -> dict[str, Any]:
-    return {name: each.posterior for name, each in fitted.items()}
+    return {name: fit.posterior for name, fit in fitted.items()}
 
 
 def _summary(study: PaperStudy, fitted: dict[str, Fitted]) -> list[Row]:
     truth = study.settings.truth["C10"]
-    return [summary_row(name, each.posterior, each.seconds, truth) for name, each in fitted.items()]
+    return [summary_row(name, fit.posterior, fit.seconds, truth) for name, fit in fitted.items()]
 
 
 def _agreement(study: PaperStudy) -> list[Row]:
     rows = []
     for name, sampled in study.sampled.items():
-        exact, nuts = (each.posterior.solution.marginals["C10"] for each in (study.main[name], sampled))
-        found = sampled.posterior.solution.diagnostics
+        exact, nuts = (fit.posterior.solution.marginals["C10"] for fit in (study.main[name], sampled))
+        diagnostics = sampled.posterior.solution.diagnostics
         ends = [(b - a) / exact.sd for a, b in zip(exact.hdi(), nuts.hdi(), strict=True)]
         rows.append(
             {
@@ -99,9 +104,9 @@ def _agreement(study: PaperStudy) -> list[Row]:
                 "sd_ratio": nuts.sd / exact.sd,
                 "hdi_low_shift_in_sd": ends[0],
                 "hdi_high_shift_in_sd": ends[1],
-                "rhat": found.rhat["C10"] if found else None,
-                "ess": min(found.ess_bulk["C10"], found.ess_tail["C10"]) if found else None,
-                "converged": found.converged if found else None,
+                "rhat": diagnostics.rhat["C10"] if diagnostics else None,
+                "ess": min(diagnostics.ess_bulk["C10"], diagnostics.ess_tail["C10"]) if diagnostics else None,
+                "converged": diagnostics.converged if diagnostics else None,
             }
         )
     return rows
@@ -114,7 +119,7 @@ def _claims(study: PaperStudy) -> list[Row]:
             "this_data_set": verdict.word,
             "times": verdict.times,
             "decided": verdict.decided,
-            "found": verdict.found,
+            "found": verdict.observed,
         }
         for verdict in study.verdicts
     ]
@@ -128,7 +133,7 @@ def _context(study: PaperStudy, summary: list[Row], folder: Path) -> dict[str, A
         "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
         "summary": readable_summary(summary, MPA),
         "held": [row["formulation"] for row in summary if row["contains_truth"]],
-        "passed": [name for name, each in study.main.items() if each.finding.passes],
+        "passed": [name for name, fit in study.main.items() if fit.finding.passes],
         "is_sampled": study.settings.sampler == "nuts",
         "warnings": study.warnings,
         "verdicts": study.verdicts,
@@ -143,7 +148,7 @@ def _cells(study: PaperStudy) -> dict[str, Any]:
     """Return the sensitivity table: a row a range, a column a formulation."""
     columns: list[tuple[str, float | None]] = [(name, None) for name in FORMULATIONS if name != "gp"]
     columns += [("gp", bound) for bound in AMPLITUDE_BOUNDS]
-    found = {(c.stretch_low, c.stretch_high, c.formulation, c.amplitude_bound): c for c in study.cells}
+    cells = {(c.stretch_low, c.stretch_high, c.formulation, c.amplitude_bound): c for c in study.cells}
     ranges = list(dict.fromkeys((cell.stretch_low, cell.stretch_high) for cell in study.cells))
 
     def word(held: int) -> str:
@@ -155,7 +160,7 @@ def _cells(study: PaperStudy) -> dict[str, Any]:
             *(name if b is None else f"{name}, c up to {b:g} MPa" for name, b in columns),
         ],
         "rows": [
-            [f"{low:g} to {high:g}", *(word(found[low, high, *column].held) for column in columns)]
+            [f"{low:g} to {high:g}", *(word(cells[low, high, *column].held) for column in columns)]
             for low, high in ranges
         ],
     }

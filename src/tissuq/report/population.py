@@ -11,13 +11,19 @@ import numpy as np
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit
-from tissuq.report.common import copied_laws, write_figures, write_recipe
-from tissuq.report.page import embedded_figure, render
+from tissuq.experiments.reading.units import StressUnit
 from tissuq.report.population_figures import Bands, numbers_of, patient_figure, specimens_figure
-from tissuq.report.rows import interval, significant
-from tissuq.report.run_folder import INPUT, RECIPE
-from tissuq.report.tables import Row, write_csv
+from tissuq.report.run_folder import (
+    INPUT,
+    RECIPE,
+    copied_laws,
+    embedded_figure,
+    render,
+    write_figures,
+    write_posteriors,
+    write_recipe,
+)
+from tissuq.report.tables import Row, interval, significant, write_csv
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -25,6 +31,8 @@ if TYPE_CHECKING:
 
 __all__ = ["HEADERS", "readable_population", "write_population_run"]
 
+PATIENT = "new-patient"
+"""Name of the file with the posterior of a new patient, from which other commands start."""
 POINTS = 81
 """Of the stress of a new patient."""
 HEADERS = ["parameter", "unit", "quantity", "median", "95 % HPD"]
@@ -52,10 +60,10 @@ def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Pa
     """
     population, unit = study.population, study.unit
     (folder / INPUT).mkdir()
-    kept = {"files": _copied(study, folder, beside), "material": copied_laws(study.settings.material, folder)}
-    named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
+    relocated = {"files": _copied(study, folder, beside), "material": copied_laws(study.settings.material, folder)}
+    named = f" --material {relocated['material']}" if relocated["material"] != study.settings.material else ""
     command = f"population{'' if figures else ' --no-figures'}{named}"
-    write_recipe(folder, command, study.settings.model_copy(update=kept))
+    write_recipe(folder, command, study.settings.model_copy(update=relocated))
     several = len(study.modes) > 1
     write_csv(folder / "data.csv", _data_rows(study, several))
     tables = {"population": population.summary(), "specimens": population.specimen_summary()}
@@ -67,6 +75,7 @@ def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Pa
     for name, table in tables.items():
         table.to_csv(folder / f"{name}.csv")
     population.save(folder / "population.nc")
+    write_posteriors(folder, {PATIENT: population.patient})
     if figures:
         write_figures(folder, drawn | {"specimens": specimens_figure(population, unit)})
     page = render("population.html", **_context(study, folder), command=command, not_predicted=not_predicted)
@@ -78,26 +87,29 @@ def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
     rows: list[Row] = []
     for name, tests in study.tests.items():
         for test in tests:
-            own: Row = {"specimen": name} | ({"mode": test.mode.name} if several else {})
+            labels: Row = {"specimen": name} | ({"mode": test.mode.name} if several else {})
             pairs = zip(test.stretch, test.stress, strict=True)
-            rows += [own | {"stretch": float(stretch), "stress": float(stress)} for stretch, stress in pairs]
+            rows += [labels | {"stretch": float(stretch), "stress": float(stress)} for stretch, stress in pairs]
     return rows
 
 
 def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]:
     """Return the stress of a new patient in every mode, with the model error and without; and why in some not."""
-    found, not_predicted = {}, []
+    bands, not_predicted = {}, []
     for mode in study.modes:
-        own = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
-        reach = np.concatenate(own)
+        ranges = [test.stretch for tests in study.tests.values() for test in tests if test.mode == mode]
+        reach = np.concatenate(ranges)
         stretch = np.linspace(reach.min(), reach.max(), POINTS)
         try:
-            band, alone = (study.population.new_patient(stretch, mode=mode, discrepancy=each) for each in (True, False))
+            band, material_alone = (
+                study.population.new_patient(stretch, mode=mode, discrepancy=with_discrepancy)
+                for with_discrepancy in (True, False)
+            )
         except ModelError as error:  # some of the population's materials lock before the largest stretch
             not_predicted.append(f"{mode.name}: {error}")
         else:
-            found[mode] = (band, alone)
-    return found, not_predicted
+            bands[mode] = (band, material_alone)
+    return bands, not_predicted
 
 
 def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFrame:
@@ -105,8 +117,8 @@ def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFra
     import pandas as pd
 
     tables = {
-        mode.name: band.merge(alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
-        for mode, (band, alone) in bands.items()
+        mode.name: band.merge(material_alone, on="stretch", suffixes=("", "_material_alone")).set_index("stretch")
+        for mode, (band, material_alone) in bands.items()
     }
     return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
 
@@ -115,10 +127,10 @@ def _copied(study: PopulationStudy, folder: Path, beside: Path) -> tuple[str, ..
     """Copy the user's files, so that the run can be repeated, and return what names them there."""
     for name, files in study.settings.sources(beside).items():
         is_folder = len(files) > 1 or files[0].stem != name
-        place = folder / INPUT / name if is_folder else folder / INPUT
-        place.mkdir(exist_ok=True)
+        target = folder / INPUT / name if is_folder else folder / INPUT
+        target.mkdir(exist_ok=True)
         for file in files:
-            shutil.copyfile(file, place / file.name)
+            shutil.copyfile(file, target / file.name)
     return (INPUT,) if study.settings.specimen is None else (f"{INPUT}/{Path(study.settings.files[0]).name}",)
 
 
@@ -130,8 +142,8 @@ def readable_population(study: PopulationStudy) -> list[list[str]]:
         factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
             is_ratio = quantity == "spread" and is_log
-            own = _text(table[symbol, quantity], 1.0 if is_ratio else factor)
-            rows.append([symbol, "sd of the log" if is_ratio else unit, words, *own])
+            cells = _text(table[symbol, quantity], 1.0 if is_ratio else factor)
+            rows.append([symbol, "sd of the log" if is_ratio else unit, words, *cells])
     return rows
 
 
@@ -160,7 +172,7 @@ def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -
 
 
 def _context(study: PopulationStudy, folder: Path) -> dict[str, Any]:
-    population, found = study.population, study.population.diagnostics
+    population, diagnostics = study.population, study.population.diagnostics
     logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
     pairs = numbers_of(population.correlations())
     return {
@@ -177,11 +189,11 @@ def _context(study: PopulationStudy, folder: Path) -> dict[str, Any]:
         "summary": readable_population(study),
         "correlations": [[name, *_text(numbers)] for name, numbers in pairs.items()],
         "specimens": _readable_specimens(study),
-        "verdict": found.verdict,
+        "verdict": diagnostics.verdict,
         "effective": f"{population.hierarchy.effective:.1%}",
         "seconds": f"{study.seconds:.0f}",
         "logs": logs,
-        "others": [symbol for symbol in population.symbols if symbol not in logs],
+        "linear_symbols": [symbol for symbol in population.symbols if symbol not in logs],
         "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
 

@@ -19,11 +19,11 @@ __all__ = ["prediction_figure"]
 
 FloatArray = NDArray[np.float64]
 
-ROOM = 0.5
-"""Of the height of what is known, above and below it: beyond, bands run out of the panel."""
+MARGIN = 0.5
+"""Margin above and below the calibrated or measured stresses, over their range; beyond it bands leave the panel."""
 
 
-def prediction_figure(found: Prediction) -> Figure:
+def prediction_figure(prediction: Prediction) -> Figure:
     """Return a row of panels for each stress: with the discrepancy, where it is known, and the material alone.
 
     The stretches at which an invariant is larger than in the measurements of the run are hatched.
@@ -31,18 +31,18 @@ def prediction_figure(found: Prediction) -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    count, kinds = len(found.stresses), found.kinds
+    count, kinds = len(prediction.stresses), prediction.kinds
     with rc_context(STYLE):
         figure = Figure(figsize=(4.9 * len(kinds) + (1.6 if len(kinds) == 1 else 0.4), 3.7 * count + 0.7))
-        panels = figure.subplots(count, len(kinds), squeeze=False, sharey="row", sharex=found.points.ndim == 1)
+        panels = figure.subplots(count, len(kinds), squeeze=False, sharey="row", sharex=prediction.points.ndim == 1)
         for channel, row in enumerate(panels):
             for axis, kind in zip(row, kinds, strict=True):
-                _draw(axis, found, channel, kind)
-                axis.set_title(_title(found, channel, kind))
-                if found.points.ndim > 1 or channel == count - 1:
-                    axis.set_xlabel(_label(found, _abscissa(found)[0]))
-            row[0].set_ylim(*_limits(found, channel))
-            row[0].set_ylabel(f"{found.stresses[channel]} [{found.unit.name}]")
+                _draw(axis, prediction, channel, kind)
+                axis.set_title(_title(prediction, channel, kind))
+                if prediction.points.ndim > 1 or channel == count - 1:
+                    axis.set_xlabel(_label(prediction, _abscissa(prediction)[0]))
+            row[0].set_ylim(*_limits(prediction, channel))
+            row[0].set_ylabel(f"{prediction.stresses[channel]} [{prediction.unit.name}]")
         handles: dict[str, Any] = {}
         for axis in panels.ravel():
             for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
@@ -52,73 +52,77 @@ def prediction_figure(found: Prediction) -> Figure:
     return figure
 
 
-def _draw(axis: Axes, found: Prediction, channel: int, kind: bool) -> None:
+def _draw(axis: Axes, prediction: Prediction, channel: int, kind: bool) -> None:
     """Draw bands, measurements and where nothing was measured."""
-    _, at = _abscissa(found)
-    stress, noisy = (_drawn(found, channel, kind, noise) for noise in (False, True))
-    order, share = np.argsort(at, kind="stable"), f"{100 * found.prob:.4g} %"
+    _, abscissa = _abscissa(prediction)
+    stress, noisy = (_drawn(prediction, channel, kind, noise) for noise in (False, True))
+    order, share = np.argsort(abscissa, kind="stable"), f"{100 * prediction.prob:.4g} %"
     looks = ((noisy, 0.18, f"{share} of measurements"), (stress, 0.38, f"{share} of the stress"))
-    is_path = found.points.ndim == 1 or found.data is None
+    is_path = prediction.points.ndim == 1 or prediction.data is None
     for band, strength, label in looks:
         low, high = (band[end].to_numpy()[order] for end in ("low", "high"))
         if is_path:
-            axis.fill_between(at[order], low, high, color=BAND, alpha=strength, lw=0, label=label)
+            axis.fill_between(abscissa[order], low, high, color=BAND, alpha=strength, lw=0, label=label)
         else:
-            axis.vlines(at[order], low, high, color=BAND, alpha=strength, lw=5, label=label)
+            axis.vlines(abscissa[order], low, high, color=BAND, alpha=strength, lw=5, label=label)
     style: dict[str, Any] = {"ls": "-", "lw": 1.6} if is_path else {"ls": "", "marker": "_", "ms": 7}
-    axis.plot(at[order], stress["mean"].to_numpy()[order], color=BAND, label="predicted mean", **style)
-    axis.set_xlim(*_padded(at.min(), at.max()))
+    axis.plot(abscissa[order], stress["mean"].to_numpy()[order], color=BAND, label="predicted mean", **style)
+    axis.set_xlim(*_padded(abscissa.min(), abscissa.max()))
     axis.locator_params(axis="x", nbins=6)
-    _shade(axis, found)
-    if found.data is not None:
-        points = found.data.stretch if found.points.ndim == 1 else at
-        for chosen, face, label in (
-            (found.is_data_calibrated, INK, "measured"),
-            (~found.is_data_calibrated, "white", "measured beyond"),
+    _shade(axis, prediction)
+    if prediction.data is not None:
+        points = prediction.data.stretch if prediction.points.ndim == 1 else abscissa
+        for is_shown, face, label in (
+            (prediction.is_data_calibrated, INK, "measured"),
+            (~prediction.is_data_calibrated, "white", "measured beyond"),
         ):
-            if chosen.any():
-                values = found.measured(channel)[chosen] / found.unit.to_mpa
-                axis.plot(points[chosen], values, "o", mec=INK, mfc=face, ms=3.6, mew=0.9, label=label, zorder=4)
+            if is_shown.any():
+                values = prediction.measured(channel)[is_shown] / prediction.unit.to_mpa
+                axis.plot(points[is_shown], values, "o", mec=INK, mfc=face, ms=3.6, mew=0.9, label=label, zorder=4)
 
 
-def _drawn(found: Prediction, channel: int, kind: bool, noise: bool) -> pd.DataFrame:
+def _drawn(prediction: Prediction, channel: int, kind: bool, noise: bool) -> pd.DataFrame:
     """Return a band in the unit of the run, cut where it has long left the panel: no renderer takes any number."""
-    low, high = _limits(found, channel)
-    band = found.bands[channel, kind, noise] / found.unit.to_mpa
+    low, high = _limits(prediction, channel)
+    band = prediction.bands[channel, kind, noise] / prediction.unit.to_mpa
     return band.clip(lower=low - 5 * (high - low), upper=high + 5 * (high - low))
 
 
-def _abscissa(found: Prediction) -> tuple[int, FloatArray]:
+def _abscissa(prediction: Prediction) -> tuple[int, FloatArray]:
     """Return the first control that changes, its number and its values."""
-    columns = list(found.controls.values())
-    which = next((place for place, each in enumerate(columns) if np.ptp(each) > 0), 0)
-    return which, columns[which]
+    columns = list(prediction.controls.values())
+    number = next((index for index, column in enumerate(columns) if np.ptp(column) > 0), 0)
+    return number, columns[number]
 
 
-def _label(found: Prediction, which: int) -> str:
+def _label(prediction: Prediction, number: int) -> str:
     """Return the name of the control along the axis, and where the others are held."""
-    pairs = enumerate(zip(found.mode.controls, found.controls.values(), strict=True))
-    held = [f"{own.name} {at[0]:.4g}" for place, (own, at) in pairs if place != which and np.ptp(at) == 0]
-    return found.mode.controls[which].name + (f" ({', '.join(held)})" if held else "")
+    pairs = enumerate(zip(prediction.mode.controls, prediction.controls.values(), strict=True))
+    held = [
+        f"{control.name} {values[0]:.4g}"
+        for index, (control, values) in pairs
+        if index != number and np.ptp(values) == 0
+    ]
+    return prediction.mode.controls[number].name + (f" ({', '.join(held)})" if held else "")
 
 
-def _shade(axis: Axes, found: Prediction) -> None:
+def _shade(axis: Axes, prediction: Prediction) -> None:
     """Hatch where an invariant is larger than any that was measured."""
-    if found.points.ndim > 1:
-        if not found.is_calibrated.all():
-            at = _abscissa(found)[1][~found.is_calibrated]
-            axis.plot(at, np.zeros_like(at), "|", color=BASE, ms=8, transform=axis.get_xaxis_transform(),
+    if prediction.points.ndim > 1:
+        if not prediction.is_calibrated.all():
+            abscissa = _abscissa(prediction)[1][~prediction.is_calibrated]
+            axis.plot(abscissa, np.zeros_like(abscissa), "|", color=BASE, ms=8, transform=axis.get_xaxis_transform(),
                       label="not calibrated", clip_on=False)  # fmt: skip
         return
-    ends = found.calibrated_range
+    ends = prediction.calibrated_range
     assert ends is not None  # noqa: S101 (one control)
-    left, right = axis.get_xlim()
-    for start, end in ((left, min(ends[0], right)), (max(ends[1], left), right)):
-        margin = 0.011 * (right - left)  # that of the axis beyond the last stretch is no place of its own
+    start_limit, end_limit = axis.get_xlim()
+    for start, end in ((start_limit, min(ends[0], end_limit)), (max(ends[1], start_limit), end_limit)):
+        margin = 0.011 * (end_limit - start_limit)  # that of the axis beyond the last stretch is no place of its own
         if end - start > 3 * margin:
             axis.axvspan(start, end, facecolor="none", edgecolor=BASE, alpha=0.5, hatch="////", lw=0, zorder=3,
                          label="not calibrated")  # fmt: skip
-            edge = end if start == left else start
+            edge = end if start == start_limit else start
             axis.axvline(edge, color=BASE, lw=1.1, ls="--", zorder=0.5)
 
 
@@ -127,28 +131,30 @@ def _padded(low: float, high: float) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _title(found: Prediction, channel: int, kind: bool) -> str:
-    model = found.posterior.model
+def _title(prediction: Prediction, channel: int, kind: bool) -> str:
+    model = prediction.posterior.model
     name = f"with the discrepancy {model.discrepancy.name}" if kind else f"{model.material.name} alone"
-    if found.scores is None:
+    if prediction.scores is None:
         return name
-    rows = found.scores[
-        (found.scores["discrepancy"] == ("with" if kind else "without")) & (found.scores["range"] == "all")
+    rows = prediction.scores[
+        (prediction.scores["discrepancy"] == ("with" if kind else "without")) & (prediction.scores["range"] == "all")
     ]
     row = rows.iloc[channel]
     return f"{name}:  {round(row['inside'] * row['count'])} of {row['count']} inside"
 
 
-def _limits(found: Prediction, channel: int) -> tuple[float, float]:
-    """Return the ends of the stress axis: all that is calibrated or measured, and some room for what is beyond."""
-    scale = found.unit.to_mpa
-    known = found.is_calibrated if found.is_calibrated.any() else np.ones(len(found.points), dtype=bool)
-    bands = [found.bands[channel, kind, True] for kind in found.kinds]
-    core = [band[end].to_numpy()[known] for band in bands for end in ("low", "high")]
-    core += [] if found.data is None else [found.measured(channel)]
-    low, high = min(float(each.min()) for each in core), max(float(each.max()) for each in core)
-    room = ROOM * (high - low)
-    beyond = np.concatenate([band[end].to_numpy() for band in bands for end in ("low", "high")])
-    ends = np.clip([beyond.min(), beyond.max()], low - room, high + room)
+def _limits(prediction: Prediction, channel: int) -> tuple[float, float]:
+    """Return the ends of the stress axis: all that is calibrated or measured, and some margin for what is beyond."""
+    scale = prediction.unit.to_mpa
+    calibrated = (
+        prediction.is_calibrated if prediction.is_calibrated.any() else np.ones(len(prediction.points), dtype=bool)
+    )
+    bands = [prediction.bands[channel, kind, True] for kind in prediction.kinds]
+    core = [band[end].to_numpy()[calibrated] for band in bands for end in ("low", "high")]
+    core += [] if prediction.data is None else [prediction.measured(channel)]
+    low, high = min(float(values.min()) for values in core), max(float(values.max()) for values in core)
+    margin = MARGIN * (high - low)
+    all_ends = np.concatenate([band[end].to_numpy() for band in bands for end in ("low", "high")])
+    ends = np.clip([all_ends.min(), all_ends.max()], low - margin, high + margin)
     low, high = _padded(min(low, float(ends[0])), max(high, float(ends[1])))
     return low / scale, high / scale

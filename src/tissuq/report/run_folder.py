@@ -1,27 +1,59 @@
-"""Run folders: complete or not there at all, and never overwritten unasked."""
+"""Run folders: written completely or not at all; their tables, posteriors, figures, recipe and page."""
 
 from __future__ import annotations
 
+import csv
 import os
+import platform
 import shutil
-from collections.abc import Iterator
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib.metadata import version
+from itertools import repeat
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
+from tissuq.report.tables import Row, parameter_rows, write_csv, write_json
 from tissuq.studies.settings import RECIPE
 
-__all__ = ["ASSESSMENT", "CONTENTS", "HELD_OUT_TESTS", "INPUT", "RECIPE", "check_apart", "check_target", "run_folder"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pydantic import BaseModel
+
+    from tissuq.experiments.experiment import Experiment
+    from tissuq.posterior.posterior import Posterior
+
+__all__ = [
+    "ASSESSMENT",
+    "CONTENTS",
+    "HELD_OUT_TESTS",
+    "INPUT",
+    "RECIPE",
+    "check_apart",
+    "check_target",
+    "copied_laws",
+    "embedded_figure",
+    "render",
+    "run_folder",
+    "versions",
+    "write_data",
+    "write_figures",
+    "write_posteriors",
+    "write_recipe",
+    "write_tables",
+]
 
 INPUT = "input"
 """The folder of a run that holds copies of the user's files, so that the run can be repeated."""
 
 ASSESSMENT = "assessment.json"
-"""The file that says what each discrepancy does."""
+"""The file with the assessment of each discrepancy."""
 
 HELD_OUT_TESTS = "held_out.json"
-"""The file that says how each of several tests is predicted from the others."""
+"""The file with the prediction of each of several tests from the others."""
 
 CONTENTS = "contents.txt"
 """The list of a run's own files; a folder without it is not a run, and files that it does not list are foreign."""
@@ -33,8 +65,8 @@ def check_target(target: Path, *, force: bool) -> None:
     Raises
     ------
     InputError
-        When the folder exists and ``force`` is not set, when it holds something other than a run, or when it cannot
-        be made.
+        When the folder exists and ``force`` is not set, when it contains something other than a run, or when it cannot
+        be created.
     """
     try:
         _check(target, force)
@@ -43,18 +75,18 @@ def check_target(target: Path, *, force: bool) -> None:
 
 
 def check_apart(target: Path, run: Path) -> None:
-    """Refuse to write what is made of a run into its own folder, or over it.
+    """Refuse to write results made from a run into its own folder, or over it.
 
     Raises
     ------
     InputError
         When the folder holds the run, is the run, or lies in it.
     """
-    place, source = Path(os.path.realpath(target)), Path(os.path.realpath(run))
-    if source.is_relative_to(place):
-        raise InputError(f"'{target}' is the run itself, or holds it; choose another folder with --out.")
-    if place.is_relative_to(source):
-        raise InputError(f"'{target}' lies in the run '{run}'; choose a folder outside of it with --out.")
+    target_path, source = Path(os.path.realpath(target)), Path(os.path.realpath(run))
+    if source.is_relative_to(target_path):
+        raise InputError(f"'{target}' is the run itself or contains it; choose another folder with --out.")
+    if target_path.is_relative_to(source):
+        raise InputError(f"'{target}' lies inside the run '{run}'; choose a folder outside it with --out.")
 
 
 @contextmanager
@@ -67,17 +99,17 @@ def run_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
         When the target must not be overwritten, or the disk refuses to be written.
     """
     check_target(target, force=force)
-    place = Path(os.path.realpath(target))
-    missing = [folder for folder in place.parents if not folder.exists()]
+    target_path = Path(os.path.realpath(target))
+    missing = [folder for folder in target_path.parents if not folder.exists()]
     scratch: Path | None = None
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        scratch = Path(mkdtemp(prefix=f".{place.name}-", dir=place.parent))
+        target_path.parent.mkdir(parents=True, exist_ok=True)
+        scratch = Path(mkdtemp(prefix=f".{target_path.name}-", dir=target_path.parent))
         scratch.chmod(0o755)
         yield scratch
         (scratch / CONTENTS).write_text("".join(f"{name}\n" for name in _files(scratch)), encoding="utf-8")
         _check(target, force)
-        _put(scratch, place)
+        _put(scratch, target_path)
     except OSError as error:
         raise _not_written(target, error) from error
     finally:
@@ -95,48 +127,52 @@ def _check(target: Path, force: bool) -> None:
     if not target.is_dir():
         raise InputError(f"'{target}' is a file; choose another folder for the run with --out.")
     if Path.cwd().is_relative_to(target.resolve()):
-        raise InputError(f"'{target}' is the folder you are in; give the run a folder of its own with --out.")
+        raise InputError(f"'{target}' is the current folder; choose a new folder for the run with --out.")
     if not any(target.iterdir()):
         return
     listing = target / CONTENTS
     if not listing.exists():
-        raise InputError(f"folder '{target}' holds files that are not a run; choose another with --out.")
+        raise InputError(f"folder '{target}' contains files that are not a run; choose another folder with --out.")
     if not force:
-        raise InputError(f"run folder '{target}' exists; choose another with --out, or replace it with --force.")
-    foreign = set(_files(target)) - {CONTENTS, *listing.read_text(encoding="utf-8").splitlines()}
+        raise InputError(
+            f"run folder '{target}' already exists; choose another folder with --out, or replace it with --force."
+        )
+    foreign = set(_files(target)) - {CONTENTS, *listing.read_text(encoding="utf-8", errors="replace").splitlines()}
     if foreign:
         raise InputError(
-            f"run folder '{target}' also holds files that are not of the run ({', '.join(sorted(foreign)[:3])}); "
-            "move them elsewhere, or choose another folder with --out."
+            f"run folder '{target}' also contains files that do not belong to the run "
+            f"({', '.join(sorted(foreign)[:3])}); move them elsewhere, or choose another folder with --out."
         )
 
 
 def _check_parent(target: Path) -> None:
-    """Refuse, before any work is done, a folder that can be seen not to be makeable."""
-    there = next(folder for folder in target.absolute().parents if folder.exists())
-    if not there.is_dir():
-        raise InputError(f"'{target}' cannot be made: '{there}' is a file; choose another folder with --out.")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"'{target}' cannot be made: '{there}' must not be written; choose another with --out.")
+    """Refuse, before any work is done, a folder that cannot be created."""
+    existing = next(folder for folder in target.absolute().parents if folder.exists())
+    if not existing.is_dir():
+        raise InputError(f"'{target}' cannot be created: '{existing}' is a file; choose another folder with --out.")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(
+            f"'{target}' cannot be created: no permission to write to '{existing}'; choose another folder with --out."
+        )
 
 
 def _files(folder: Path) -> list[str]:
     """Return everything in a folder that is not itself a folder, by relative path."""
-    found = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
-    return sorted(path.relative_to(folder).as_posix() for path in found)
+    paths = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
+    return sorted(path.relative_to(folder).as_posix() for path in paths)
 
 
-def _put(scratch: Path, place: Path) -> None:
+def _put(scratch: Path, target: Path) -> None:
     """Rename the finished folder into place; an earlier run goes only when the new one stands."""
-    if not place.exists():
-        scratch.rename(place)
+    if not target.exists():
+        scratch.rename(target)
         return
-    earlier = place.with_name(f"{scratch.name}-earlier")
-    place.rename(earlier)
+    earlier = target.with_name(f"{scratch.name}-earlier")
+    target.rename(earlier)
     try:
-        scratch.rename(place)
+        scratch.rename(target)
     except OSError:
-        earlier.rename(place)
+        earlier.rename(target)
         raise
     shutil.rmtree(earlier, ignore_errors=True)
 
@@ -147,3 +183,86 @@ def _not_written(target: Path, error: OSError) -> InputError:
         f"the run could not be written to '{target}': {reason}. Check the folder's permissions and the space "
         "on the disk, or choose another folder with --out."
     )
+
+
+LIBRARIES = ("tissuq", "numpy", "scipy", "jax", "blackjax", "arviz-stats", "xarray", "matplotlib")
+
+
+def render(template: str, **context: Any) -> str:
+    """Return a page from a template of this package; every value is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template(template).render(versions=versions(), **context)
+
+
+def embedded_figure(path: Path) -> str:
+    """Return an SVG file as a data address for an image in a page."""
+    return "data:image/svg+xml;base64," + b64encode(path.read_bytes()).decode("ascii")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries on which numbers depend."""
+    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+
+
+def write_data(folder: Path, experiment: Experiment) -> None:
+    """Write the measurements as fitted: stretch and engineering stress in MPa, in full precision.
+
+    Of several tests with the name of each and its mode.
+    """
+    headers = ["test", "mode", "measured"] if len(experiment.curves) > 1 else []
+    with (folder / "data.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*headers, "stretch", "stress"])
+        for curve in experiment.curves:
+            label_columns = map(repeat, (curve.name, curve.mode.name, curve.quantity)[: len(headers)])
+            writer.writerows(zip(*label_columns, curve.abscissa.tolist(), curve.stress.tolist(), strict=False))
+
+
+def write_tables(folder: Path, summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
+    """Write summary.csv, summary.json and parameters.csv."""
+    write_csv(folder / f"summary{suffix}.csv", summary)
+    write_json(folder / f"summary{suffix}.json", summary)
+    write_csv(folder / f"parameters{suffix}.csv", parameter_rows(posteriors))
+
+
+def write_posteriors(folder: Path, posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
+    """Write one NetCDF file a formulation."""
+    (folder / "posterior").mkdir(exist_ok=True)
+    for name, posterior in posteriors.items():
+        posterior.save(folder / "posterior" / f"{name}{suffix}.nc")
+
+
+def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
+    """Write every figure as SVG and PNG."""
+    from tissuq.report.figures import save_figure
+
+    (folder / "figures").mkdir()
+    for name, figure in figures.items():
+        save_figure(figure, folder / "figures", name)
+
+
+def write_recipe(folder: Path, command: str, settings: BaseModel, without: frozenset[str] = frozenset()) -> None:
+    """Write run.toml, from which ``tissuq COMMAND --config`` repeats the run; ``without`` settings of no meaning."""
+    import tomli_w
+
+    plain: dict[str, Any] = settings.model_dump(mode="json", exclude_none=True, exclude=set(without))
+    header = f"# Repeat this run: tissuq {command} --config {RECIPE} --out ANOTHER_FOLDER\n"
+    (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")
+
+
+def copied_laws(material: str, folder: Path) -> str:
+    """Return the name of a material with the laws in the user's files, of which copies go with the run."""
+    from tissuq.mechanics.user_law import LAW
+
+    terms = material.split("+")
+    for index, match in enumerate(map(LAW.fullmatch, terms)):
+        if match:
+            law = Path(match["path"].strip())
+            shutil.copyfile(law, folder / INPUT / law.name)
+            terms[index] = f"{INPUT}/{law.name}:{match['name']}"
+    return "+".join(terms)

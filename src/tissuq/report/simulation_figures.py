@@ -1,15 +1,18 @@
-"""Figures of a simulation: the band of the force, what its variance is due to, and the deformed body."""
+"""Figures of a simulation (force, sources of its variance, deformed body), and its fields as files for ParaView."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.finite_elements.case import AXIAL, RADIAL
-from tissuq.finite_elements.simulation import ALONE, WITHOUT, Simulation
-from tissuq.finite_elements.spread import held_probability
+from tissuq.finite_elements.case import AXIAL, RADIAL, Mesh
+from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
+from tissuq.finite_elements.spread import band_probability
 from tissuq.report.figures import BAND, BASE, INK, STYLE, TRUTH
 
 if TYPE_CHECKING:
@@ -17,14 +20,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["force_unit", "simulation_figures"]
+__all__ = ["force_unit", "simulation_figures", "write_collection", "write_vtu"]
 
 FloatArray = NDArray[np.float64]
 
 UNITS = (("N", 1.0), ("mN", 1e3), ("µN", 1e6))
 SHARES = {"parameters": BAND, "discrepancy": TRUTH, "noise": BASE}
-STRAINED, MARGIN = 0.04, 0.5
-"""What is shown of the body: cells with this share of the largest strain, and this much of their extent around them."""
+MIN_STRAIN, MARGIN = 0.04, 0.5
+"""Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
 
 
 def force_unit(table: pd.DataFrame) -> tuple[str, float]:
@@ -33,7 +36,7 @@ def force_unit(table: pd.DataFrame) -> tuple[str, float]:
     return next((pair for pair in UNITS if largest * pair[1] >= 1), UNITS[-1])
 
 
-def simulation_figures(found: Simulation, table: pd.DataFrame) -> dict[str, Figure]:
+def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str, Figure]:
     """Return the figures by name; that of the shares where there is a discrepancy, that of fields where any draw ended.
 
     Parameters
@@ -44,52 +47,52 @@ def simulation_figures(found: Simulation, table: pd.DataFrame) -> dict[str, Figu
     """
     from matplotlib import rc_context
 
-    known = table[table["draws"] > 1]
+    table_of_bands = table[table["draws"] > 1]
     with rc_context(STYLE):
-        figures = {"forces": _forces(found, known)}
-        if ALONE in found.forces:
-            figures["shares"] = _shares(found, known)
-        if len(found.fields.get("largest", ())) > 1:
-            figures["fields"] = _fields(found)
+        figures = {"forces": _forces(simulation, table_of_bands)}
+        if MATERIAL_ONLY in simulation.forces:
+            figures["shares"] = _shares(simulation, table_of_bands)
+        if len(simulation.fields.get("largest", ())) > 1:
+            figures["fields"] = _fields(simulation)
     return figures
 
 
-def _forces(found: Simulation, table: pd.DataFrame) -> Figure:
+def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
     """Draw the bands of the force, and beside them what of the body is strained beyond the measurements."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 3.9))
-    axis, beyond = figure.subplots(1, 2, width_ratios=(1.75, 1))
+    axis, share_axis = figure.subplots(1, 2, width_ratios=(1.75, 1))
     unit, factor = force_unit(table)
-    at = _from_zero(table[f"{found.case.travel_name}_mm"])
-    percent = f"{100 * held_probability(int(table['draws'].max())):.0f} %"
-    bands = [("", "with discrepancy" if ALONE in found.forces else "posterior", BAND, "-", 0.25)]
-    if WITHOUT in found.forces:
+    travel = _from_zero(table[f"{simulation.case.travel_name}_mm"])
+    percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
+    bands = [("", "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)]
+    if WITHOUT in simulation.forces:
         bands.append(("without_", "fitted without discrepancy", TRUTH, "--", 0.15))
     for prefix, label, color, line, alpha in bands:
         low, mean, high = (_from_zero(table[f"{prefix}{name}"]) * factor for name in ("low", "mean", "high"))
-        axis.fill_between(at, low, high, color=color, alpha=alpha, lw=0, label=f"{label}, {percent}")
-        axis.plot(at, mean, line, color=color, lw=1.7, label="mean")
-    axis.set_xlabel(f"{found.case.travel_name} [mm]")
+        axis.fill_between(travel, low, high, color=color, alpha=alpha, lw=0, label=f"{label}, {percent}")
+        axis.plot(travel, mean, line, color=color, lw=1.7, label="mean")
+    axis.set_xlabel(f"{simulation.case.travel_name} [mm]")
     axis.set_ylabel(f"force [{unit}]")
-    axis.set_xlim(0, found.case.travel)
+    axis.set_xlim(0, simulation.case.travel)
     axis.legend(fontsize=9)
     for rows, label, color in (
-        (found.energy_beyond, "of the strain energy", INK), (found.beyond, "of the volume", BASE),
+        (simulation.energy_beyond, "of the strain energy", INK), (simulation.volume_beyond, "of the volume", BASE),
     ):  # fmt: skip
         shown = np.isfinite(rows).any(axis=0)
-        beyond.plot(
-            _from_zero(found.travel[shown]),
+        share_axis.plot(
+            _from_zero(simulation.travel[shown]),
             100 * _from_zero(np.nanmean(rows[:, shown], axis=0)),
             color=color,
             label=label,
         )
-    beyond.set_title("Strained beyond what was measured")
-    beyond.set_ylabel("mean share [%]")
-    beyond.set_xlabel(f"{found.case.travel_name} [mm]")
-    beyond.set_xlim(0, found.case.travel)
-    beyond.set_ylim(0, 103)
-    beyond.legend(fontsize=9)
+    share_axis.set_title("Strained beyond the measured range")
+    share_axis.set_ylabel("mean share [%]")
+    share_axis.set_xlabel(f"{simulation.case.travel_name} [mm]")
+    share_axis.set_xlim(0, simulation.case.travel)
+    share_axis.set_ylim(0, 103)
+    share_axis.legend(fontsize=9)
     return figure
 
 
@@ -97,43 +100,43 @@ def _from_zero(values: Any) -> FloatArray:
     return np.concatenate([[0.0], np.asarray(values, dtype=np.float64)])
 
 
-def _shares(found: Simulation, table: pd.DataFrame) -> Figure:
+def _shares(simulation: Simulation, table: pd.DataFrame) -> Figure:
     """Draw the shares of the variance, and the standard deviations of the parts that they are made of."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 3.9))
-    axis, parts = figure.subplots(1, 2)
-    at = table[f"{found.case.travel_name}_mm"].to_numpy()
+    axis, sd_axis = figure.subplots(1, 2)
+    travel = table[f"{simulation.case.travel_name}_mm"].to_numpy()
     axis.axhline(0, color=INK, lw=0.8)
     for name, color in SHARES.items():
         share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
-        axis.fill_between(at, share - error, share + error, color=color, alpha=0.2, lw=0)
-        axis.plot(at, share, "o-", color=color, lw=1.6, ms=3.5, label=name)
+        axis.fill_between(travel, share - error, share + error, color=color, alpha=0.2, lw=0)
+        axis.plot(travel, share, "o-", color=color, lw=1.6, ms=3.5, label=name)
     axis.set_title("Share of the variance [%]")
     unit, factor = force_unit(table)
     sizes = {
         "force of a draw": (table["sd"], INK, "-"),
         "of its parameters alone": (table["alone_sd"], BAND, "--"),
         "what the discrepancy adds": (table["discrepancy_sd"], TRUTH, "--"),
-        "noise": (np.full(len(at), found.noise_sd), BASE, "--"),
+        "noise": (np.full(len(travel), simulation.noise_sd), BASE, "--"),
     }
     for label, (sd, color, line) in sizes.items():
-        parts.plot(at, factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
-    parts.set_title(f"Standard deviation between draws [{unit}]")
-    parts.set_ylim(0)
-    for panel in (axis, parts):
-        panel.set_xlim(0, found.case.travel * 1.02)
-        panel.set_xlabel(f"{found.case.travel_name} [mm]")
+        sd_axis.plot(travel, factor * np.asarray(sd), line, color=color, lw=1.7, label=label)
+    sd_axis.set_title(f"Standard deviation between draws [{unit}]")
+    sd_axis.set_ylim(0)
+    for panel in (axis, sd_axis):
+        panel.set_xlim(0, simulation.case.travel * 1.02)
+        panel.set_xlabel(f"{simulation.case.travel_name} [mm]")
         panel.legend(fontsize=9)
     return figure
 
 
-def _fields(found: Simulation) -> Figure:
+def _fields(simulation: Simulation) -> Figure:
     """Draw mean and sd of the largest stretch on the mean deformed section."""
     from matplotlib.figure import Figure
 
-    mesh, largest = found.case.mesh(), found.fields["largest"]
-    deformed = mesh.points + found.fields["displacement"].mean(axis=0)
+    mesh, largest = simulation.case.mesh(), simulation.fields["largest"]
+    deformed = mesh.points + simulation.fields["displacement"].mean(axis=0)
     corners = deformed[mesh.cells]
     limits = _limits(corners, largest.mean(axis=0) - 1)
     height = 3.8 * min(1.1, max(0.3, limits[3] - limits[2]) / (limits[1] - limits[0])) + 1.3
@@ -155,7 +158,7 @@ def _fields(found: Simulation) -> Figure:
 def _limits(corners: FloatArray, strain: FloatArray) -> tuple[float, float, float, float]:
     """Return the part of the section that is shown: where it is strained, with some of the rest."""
     body = corners.reshape(-1, 2)
-    shown = corners[strain > STRAINED * strain.max()].reshape(-1, 2)
+    shown = corners[strain > MIN_STRAIN * strain.max()].reshape(-1, 2)
     low, high = shown.min(axis=0), shown.max(axis=0)
     margin = MARGIN * (high - low)[AXIAL], MARGIN * high[RADIAL]
     right = min(high[RADIAL] + margin[1], body[:, RADIAL].max())
@@ -169,10 +172,64 @@ def _draw_section(axis: Axes, corners: FloatArray, values: FloatArray, colors: s
     from matplotlib.collections import PolyCollection
 
     half = corners[:, :, [RADIAL, AXIAL]]
-    whole = np.concatenate([half, half * [-1, 1]])
+    section = np.concatenate([half, half * [-1, 1]])
     drawn = PolyCollection(
-        list(whole), array=np.tile(values, 2), cmap=colors, edgecolors=(0, 0, 0, 0.25), linewidths=0.3
+        list(section), array=np.tile(values, 2), cmap=colors, edgecolors=(0, 0, 0, 0.25), linewidths=0.3
     )
     axis.add_collection(drawn)
     axis.set_aspect("equal")
     figure.colorbar(drawn, ax=axis, shrink=0.85)
+
+
+QUADRILATERAL = 9
+"""VTK's number for it."""
+
+
+def write_vtu(
+    path: Path, mesh: Mesh, points: Mapping[str, NDArray[np.float64]], cells: Mapping[str, NDArray[np.float64]]
+) -> None:
+    """Write a mesh with fields of its points and its cells; x is the distance from the axis, y is along it.
+
+    Fields of points with two columns are displacements (along the axis, from it), and become vectors.
+    """
+    file = Element("VTKFile", type="UnstructuredGrid", version="0.1", byte_order="LittleEndian")
+    piece = SubElement(
+        SubElement(file, "UnstructuredGrid"),
+        "Piece", NumberOfPoints=str(len(mesh.points)), NumberOfCells=str(len(mesh.cells)),
+    )  # fmt: skip
+    _array(SubElement(piece, "Points"), "Points", _vectors(mesh.points))
+    topology = SubElement(piece, "Cells")
+    _array(topology, "connectivity", mesh.cells.astype(np.int64))
+    _array(topology, "offsets", 4 * np.arange(1, len(mesh.cells) + 1))
+    _array(topology, "types", np.full(len(mesh.cells), QUADRILATERAL, dtype=np.uint8))
+    for kind, fields in (("PointData", points), ("CellData", cells)):
+        parent = SubElement(piece, kind)
+        for name, values in fields.items():
+            _array(parent, name, _vectors(values) if values.ndim > 1 else values)
+    _write(file, path)
+
+
+def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:
+    """Write what ParaView opens as one series: times, and files relative to this one."""
+    file = Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = SubElement(file, "Collection")
+    for time, name in files:
+        SubElement(collection, "DataSet", timestep=f"{time:.12g}", part="0", file=name)
+    _write(file, path)
+
+
+def _vectors(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([values[:, RADIAL], values[:, AXIAL], np.zeros(len(values))], axis=-1)
+
+
+def _array(parent: Any, name: str, values: NDArray[Any]) -> None:
+    options = {"NumberOfComponents": str(values.shape[1])} if values.ndim > 1 and name != "connectivity" else {}
+    kind = {"f": "Float64", "i": "Int64", "u": "UInt8"}[values.dtype.kind]
+    array = SubElement(parent, "DataArray", {"type": kind, "Name": name, "format": "ascii"} | options)
+    rows = values.reshape(len(values), -1).tolist()
+    array.text = "\n" + "\n".join(" ".join(f"{value:.9g}" for value in row) for row in rows) + "\n"
+
+
+def _write(file: Element, path: Path) -> None:
+    indent(file)
+    ElementTree(file).write(path, encoding="utf-8", xml_declaration=True)

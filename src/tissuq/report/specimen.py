@@ -10,19 +10,35 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
 from tissuq.experiments.experiment import Experiment
-from tissuq.report.common import copied_laws, write_data, write_figures, write_posteriors, write_recipe, write_tables
-from tissuq.report.page import embedded_figure, render
-from tissuq.report.rows import (
+from tissuq.report.run_folder import (
+    ASSESSMENT,
+    HELD_OUT_TESTS,
+    INPUT,
+    RECIPE,
+    copied_laws,
+    embedded_figure,
+    render,
+    write_data,
+    write_figures,
+    write_posteriors,
+    write_recipe,
+    write_tables,
+)
+from tissuq.report.tables import (
+    Row,
     readable_held_out,
     readable_methods,
     readable_parameters,
     readable_stability,
     readable_summary,
     significant,
+    stability_cells,
+    stability_rows,
+    summary_row,
     tolerances_in_words,
+    write_csv,
+    write_json,
 )
-from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, INPUT, RECIPE
-from tissuq.report.tables import Row, stability_cells, stability_rows, summary_row, write_csv, write_json
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenStudy
 
@@ -33,7 +49,7 @@ __all__ = ["specimen_summary", "write_specimen_run"]
 
 
 def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
-    """Write everything that a fit leaves behind into an empty folder.
+    """Write the results of a fit into an empty folder.
 
     Parameters
     ----------
@@ -46,11 +62,11 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
         Draw them, too.
     """
     (folder / INPUT).mkdir()
-    kept = _with_files(study, sources, folder) | {"material": copied_laws(study.settings.material, folder)}
-    named = f" --material {kept['material']}" if kept["material"] != study.settings.material else ""
+    relocated = _with_files(study, sources, folder) | {"material": copied_laws(study.settings.material, folder)}
+    named = f" --material {relocated['material']}" if relocated["material"] != study.settings.material else ""
     command = f"fit{'' if figures else ' --no-figures'}{named}"
     of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
-    write_recipe(folder, command, study.settings.model_copy(update=kept), without=of_one_file)
+    write_recipe(folder, command, study.settings.model_copy(update=relocated), without=of_one_file)
     write_data(folder, study.experiment)
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
@@ -61,7 +77,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
         write_csv(folder / "held_out.csv", list(study.held_out))
         write_json(folder / HELD_OUT_TESTS, list(study.held_out))
     write_posteriors(folder, study.posteriors)
-    write_json(folder / ASSESSMENT, [_assessment_row(*each) for each in study.assessments.items()])
+    write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
     if figures:
         write_figures(folder, _figures(study))
     page = render("specimen.html", **_context(study, summary, folder), command=command)
@@ -72,14 +88,17 @@ def _with_files(study: SpecimenStudy, sources: Sequence[Path], folder: Path) -> 
     """Return the settings of what was measured with the names of the files' copies, which go with the run."""
     names = [source.name for source in sources]
     copies = [
-        f"{INPUT}/{place}-{name}" if names.count(name) > 1 else f"{INPUT}/{name}" for place, name in enumerate(names, 1)
+        f"{INPUT}/{number}-{name}" if names.count(name) > 1 else f"{INPUT}/{name}"
+        for number, name in enumerate(names, 1)
     ]
     for source, copy in zip(sources, copies, strict=True):
         shutil.copyfile(source, folder / copy)
     if not study.settings.tests:
         return {"file": copies[0]}
-    pairs = zip(study.settings.tests, study.experiment.parts, copies, strict=True)
-    return {"tests": tuple(test.model_copy(update={"file": copy, "name": part.name}) for test, part, copy in pairs)}
+    pairs = zip(study.settings.tests, study.experiment.tests, copies, strict=True)
+    return {
+        "tests": tuple(test.model_copy(update={"file": copy, "name": measured.name}) for test, measured, copy in pairs)
+    }
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:
@@ -108,12 +127,12 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
 
 def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
     noise = next(iter(study.posteriors.values())).model.noise
-    known = "" if noise.parameters else f"sd {_known_noise(study)} {study.unit.name}"
+    known_noise = "" if noise.parameters else f"sd {_known_noise(study)} {study.unit.name}"
     return {
         "headline": study.headline,
         "settings": study.settings,
         "experiment": study.experiment,
-        "tests": [_test_line(part) for part in study.experiment.parts],
+        "tests": [_test_line(test) for test in study.experiment.tests],
         "tolerances": tolerances_in_words(next(iter(study.posteriors.values())).model.tolerances, study.unit),
         "unit": study.unit.name,
         "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
@@ -121,32 +140,33 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         "summary": readable_summary(summary, study.unit),
         "is_sampled": any(row["rhat"] is not None for row in summary),
         "warnings": study.warnings,
-        "cautions": {
-            name: each.model.discrepancy.caution
-            for name, each in study.posteriors.items()
-            if each.model.discrepancy.caution
+        "discrepancy_warnings": {
+            name: posterior.model.discrepancy.caution
+            for name, posterior in study.posteriors.items()
+            if posterior.model.discrepancy.caution
         },
         "parameters": readable_parameters(study.posteriors, study.unit),
-        "assessments": {name: each.sentences for name, each in study.assessments.items()},
+        "assessments": {name: posterior.sentences for name, posterior in study.assessments.items()},
         "stability": readable_stability(stability_rows(study.posteriors)),
         "held_out": readable_held_out(study.held_out, study.headline, study.unit),
         "methods": readable_methods(study.posteriors),
-        "noise": known or noise.description,
+        "noise": known_noise or noise.description,
         "skipped": study.skipped,
         "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
 
 
 def _known_noise(study: SpecimenStudy) -> str:
-    every = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
-    return ", ".join(f"{each:g}" for each in every) or f"{study.settings.noise_sd:g}"
+    values = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
+    return ", ".join(f"{value:g}" for value in values) or f"{study.settings.noise_sd:g}"
 
 
 def _test_line(test: Experiment) -> str:
     """Return a test in a few words: its mode, measurements and range."""
-    control, first = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
-    of = f" of specimen {test.specimen}" if test.specimen else ""
-    return f"{test.mode.name} test{of}, {len(test)} measurements, {control} {first.min():.4g} to {first.max():.4g}"
+    control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
+    specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
+    ends = f"{values.min():.4g} to {values.max():.4g}"
+    return f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}"
 
 
 def _lead(summary: list[Row], study: SpecimenStudy) -> str:
@@ -174,5 +194,9 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
     return (
         f"With {len(summary)} ways to account for model uncertainty, the mean of {name} ranges from {significant(low)} "
         f"to {significant(high)} {unit}; {verdict}."
-        + (f" ({left_out} more left out here, because a bound of a prior decides part of them.)" if left_out else "")
+        + (
+            f" ({left_out} more left out here, because a prior bound determines part of the result.)"
+            if left_out
+            else ""
+        )
     )

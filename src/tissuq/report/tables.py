@@ -1,22 +1,34 @@
-"""The tables of a run: one row a formulation, and one row a parameter."""
+"""The tables of a run: its rows as numbers, and as text rounded in the unit of the data."""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import floor, isnan, log10
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tissuq.assessment.stability import LOST
-from tissuq.posterior import Posterior
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
+
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.units import StressUnit
+    from tissuq.model.measurement_errors import Tolerances
+    from tissuq.posterior.posterior import Posterior
 
 __all__ = [
     "headline_of",
     "parameter_rows",
+    "readable_held_out",
+    "readable_methods",
+    "readable_parameters",
+    "readable_stability",
+    "readable_summary",
+    "significant",
     "stability_cells",
     "stability_rows",
     "summary_row",
+    "tolerances_in_words",
     "write_csv",
     "write_json",
 ]
@@ -29,20 +41,20 @@ STABILITY = ("stable", "lost_at", "lost_at_low", "lost_at_high")
 def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: float | None = None) -> Row:
     """Return the row of one formulation, C10 (or the material's first parameter) in MPa; empty what it has not."""
     symbol = posterior.model.headline
-    found = posterior.summary().to_dict("index")[symbol]
-    low, high = float(found["hdi_low"]), float(found["hdi_high"])
+    numbers = posterior.summary().to_dict("index")[symbol]
+    low, high = float(numbers["hdi_low"]), float(numbers["hdi_high"])
     return {
         "formulation": formulation,
-        f"{symbol}_mean": float(found["mean"]),
-        f"{symbol}_sd": float(found["sd"]),
+        f"{symbol}_mean": float(numbers["mean"]),
+        f"{symbol}_sd": float(numbers["sd"]),
         f"{symbol}_hdi_low": low,
         f"{symbol}_hdi_high": high,
         "contains_truth": None if truth is None else low <= truth <= high,
         "log_evidence": posterior.log_evidence,
         "predictive_coverage": posterior.predictive_coverage(),
         "predictive_coverage_model_only": posterior.predictive_coverage(discrepancy=False),
-        "rhat": float(found["rhat"]) if "rhat" in found else None,
-        "ess": float(found["ess"]) if "ess" in found else None,
+        "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
+        "ess": float(numbers["ess"]) if "ess" in numbers else None,
         "seconds": seconds,
     }
 
@@ -80,10 +92,19 @@ def stability_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
     """Return how far every formulation is stable in every loading mode, where its energy tells."""
     rows = []
     for formulation, posterior in posteriors.items():
-        for mode, found in posterior.stable_ranges.items():
-            row: Row = {"formulation": formulation, "mode": mode, "stretch_low": found.low, "stretch_high": found.high}
-            row |= {"stable": found.probability, "surely_low": found.surely_low, "surely_high": found.surely_high}
-            for side, loss in (("below", found.below), ("above", found.above)):
+        for mode, stable_range in posterior.stable_ranges.items():
+            row: Row = {
+                "formulation": formulation,
+                "mode": mode,
+                "stretch_low": stable_range.low,
+                "stretch_high": stable_range.high,
+            }
+            row |= {
+                "stable": stable_range.probability,
+                "surely_low": stable_range.surely_low,
+                "surely_high": stable_range.surely_high,
+            }
+            for side, loss in (("below", stable_range.loss_below), ("above", stable_range.loss_above)):
                 row |= {f"lost_{side}_{name}": _known(value) for name, value in loss._asdict().items()}
             rows.append(row)
     return rows
@@ -95,12 +116,12 @@ def stability_cells(posterior: Posterior) -> Row:
     None where it is hardly ever lost.
     """
     modes = [mode.name for mode in posterior.model.experiment.modes]
-    every = [found for name, found in posterior.stable_ranges.items() if name in modes]
-    found = min(every, key=lambda found: found.probability, default=None)
-    if found is None:
+    ranges = [stable_range for name, stable_range in posterior.stable_ranges.items() if name in modes]
+    lowest = min(ranges, key=lambda stable_range: stable_range.probability, default=None)
+    if lowest is None:
         return dict.fromkeys(STABILITY)
-    places = found.loss[1:] if found.loss.probability > LOST else (None, None, None)
-    return dict(zip(STABILITY, (found.probability, *places), strict=True))
+    losses = lowest.loss[1:] if lowest.loss.probability > MIN_LOSS_PROBABILITY else (None, None, None)
+    return dict(zip(STABILITY, (lowest.probability, *losses), strict=True))
 
 
 def _known(number: float) -> float | None:
@@ -119,3 +140,139 @@ def write_json(path: Path, rows: list[Row]) -> None:
     """Write rows as JSON, which knows no nan: null stands for it."""
     plain = [{name: None if value != value else value for name, value in row.items()} for row in rows]
     path.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+HELD_OUT = ["formulation", "test", "measured", "inside", "beyond", "half width", "error"]
+"""What `readable_held_out` gives, before the headline parameter."""
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """Return a number for people: some significant digits, no exponent where none is needed."""
+    if value is None:
+        return ""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if "e+0" in text and abs(value) < 1e6 else text
+
+
+def interval(low: float, high: float, sd: float) -> tuple[str, str]:
+    """Return the ends of an interval with the decimals that its width supports."""
+    decimals = max(0, 1 - floor(log10(sd))) if sd > 0 else 3
+    if decimals > 8:
+        return f"{low:.3g}", f"{high:.3g}"
+    low, high = (round(end, decimals) + 0.0 for end in (low, high))  # no minus before a zero
+    return f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+
+
+def readable_summary(rows: list[Row], unit: StressUnit) -> list[Row]:
+    """Return the rows of a summary as text, C10 (or the material's first parameter) in the given unit."""
+    readable = []
+    for row in rows:
+        mean, sd, low, high = (
+            row[f"{headline_of(row)}_{key}"] / unit.to_mpa for key in ("mean", "sd", "hdi_low", "hdi_high")
+        )
+        ends = interval(low, high, sd)
+        readable.append(
+            {
+                "formulation": row["formulation"],
+                "mean": interval(mean, mean, sd)[0],
+                "sd": interval(sd, sd, sd)[0],
+                "low": ends[0],
+                "high": ends[1],
+                "contains_truth": row["contains_truth"],
+                "log_evidence": "" if row["log_evidence"] is None else f"{row['log_evidence']:.2f}",
+                "coverage": f"{row['predictive_coverage']:.0%}",
+                "coverage_model_only": f"{row['predictive_coverage_model_only']:.0%}",
+                "stable": _percent(row.get("stable")),
+                "lost_at": _place(*(row.get(name) for name in ("lost_at", "lost_at_low", "lost_at_high"))),
+                "rhat": "" if row["rhat"] is None else f"{row['rhat']:.3f}",
+                "ess": "" if row["ess"] is None else f"{row['ess']:.0f}",
+                "seconds": f"{row['seconds']:.2f}",
+            }
+        )
+    return readable
+
+
+def readable_stability(rows: list[Row]) -> list[list[str]]:
+    """Return the rows of stability as text; empty where it is hardly ever lost."""
+    return [
+        [
+            row["formulation"],
+            row["mode"],
+            f"{row['stretch_low']:.3g} to {row['stretch_high']:.3g}",
+            _percent(row["stable"]),
+            *(
+                _place(*(row[f"lost_{side}_{name}"] for name in ("median", "low", "high")))
+                if row[f"lost_{side}_probability"] > MIN_LOSS_PROBABILITY
+                else ""
+                for side in ("below", "above")
+            ),
+        ]
+        for row in rows
+    ]
+
+
+def _percent(probability: float | None) -> str:
+    return "" if probability is None else f"{probability:.0%}"
+
+
+def _place(median: float | None, low: float | None, high: float | None) -> str:
+    """Return a stretch with its interval."""
+    return "" if median is None else f"{median:.3g} [{low:.3g}, {high:.3g}]"
+
+
+def readable_methods(posteriors: Mapping[str, Posterior]) -> dict[str, str]:
+    """Return, for every formulation, by which method it was computed, how accurately, and whether it converged."""
+    texts = {}
+    for formulation, posterior in posteriors.items():
+        diagnostics, error = posterior.diagnostics, posterior.log_evidence_error
+        text = f"method {posterior.method}. {posterior.how}."
+        if error is not None:
+            text += f" Error of the log evidence: {error:.0e}."
+        texts[formulation] = text if diagnostics is None else f"{text} {diagnostics.verdict}"
+    return texts
+
+
+def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -> list[list[str]]:
+    """Return rows of formulation, parameter, unit, prior, median, mean, sd and interval as text."""
+    rows = []
+    for formulation, posterior in posteriors.items():
+        for symbol, numbers in posterior.summary().iterrows():
+            parameter = next(p for p in posterior.model.parameters if p.symbol == symbol)
+            is_stress = parameter.unit == "MPa"
+            factor = unit.to_mpa if is_stress else 1.0
+            mean, sd, median, low, high = (
+                float(numbers[key]) / factor for key in ("mean", "sd", "median", "hdi_low", "hdi_high")
+            )
+            spread = (high - low) / 4 if isnan(sd) else sd
+            ends = interval(low, high, spread)
+            moments = ["–", "–"] if isnan(sd) else [interval(mean, mean, sd)[0], interval(sd, sd, sd)[0]]
+            prior = str(posterior.model.priors[parameter.symbol].scaled(1 / factor))
+            name = unit.name if is_stress else ""
+            row = [formulation, parameter.symbol, name, prior, interval(median, median, spread)[0], *moments]
+            rows.append([*row, f"[{ends[0]}, {ends[1]}]"])
+    return rows
+
+
+def readable_held_out(rows: Sequence[Row], headline: str, unit: StressUnit) -> list[list[str]]:
+    """Return how every test is predicted from the others, as cells for people."""
+    cells = []
+    for row in rows:
+        median, low, high = (
+            significant(row[f"{headline}_{name}"] / unit.to_mpa) for name in ("median", "hdi_low", "hdi_high")
+        )
+        shares = [_share(row[name]) for name in ("inside", "beyond", "half_width", "error")]
+        cells.append([row["formulation"], row["test"], row["measured"], *shares, f"{median} [{low}, {high}]"])
+    return cells
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"{value:.0%}"
+
+
+def tolerances_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
+    """Return the standard deviations of the errors of whole tests in words; empty if there are none."""
+    texts = []
+    for error, size in tolerances:
+        value = f"{size / unit.to_mpa:.3g} {unit.name}" if error.is_stress else f"{size:.3g}"
+        texts.append(f"{value} {error.description}")
+    return ", ".join(texts)

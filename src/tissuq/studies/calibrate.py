@@ -1,28 +1,35 @@
-"""The call `tissuq.calibrate`: parameters of an expensive forward model, from its own outputs."""
+"""The call `tissuq.calibrate`: parameters of an expensive model, whose runs are on disk as soon as they are done."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+import json
+import pickle
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, fields
+from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.discrepancy.discrepancy import Discrepancy
-from tissuq.emulation.adaptive import Choices, calibrated
+from tissuq.emulation.adaptive import EmulationSettings, Runner, calibrated
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.forward import Forward, as_forward
-from tissuq.emulation.problem import pose
-from tissuq.emulation.runs import ForwardRuns
+from tissuq.emulation.problem import Problem, pose
+from tissuq.emulation.runs import ForwardRun, ForwardRuns, carry_out, gathered
 from tissuq.errors import InputError
-from tissuq.priors import Prior
-from tissuq.studies.forward_runs import runs_of
-from tissuq.studies.stream import Step, silent
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.parameters.priors import Prior
+from tissuq.studies.stream import RESULTS, Step, run_tasks, silent
+from tissuq.studies.workers import open_pool
 
-__all__ = ["calibrate"]
+__all__ = ["calibrate", "runs_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -55,7 +62,7 @@ def calibrate(
         What was measured there, such as forces.
     forward : callable or Forward
         ``forward(parameters)`` or ``forward(parameters, control)``, with a dictionary of parameters by name: returns n
-        outputs. Or an `tissuq.emulation.umbridge.UmbridgeForward`.
+        outputs. Or a `tissuq.UmbridgeForward`.
     priors : mapping of str to Prior
         Of every parameter of the model: together they say where it is run. And, to replace the usual ones, of the
         discrepancy's ``c`` and ``psi`` and of ``noise_sd``.
@@ -106,18 +113,147 @@ def calibrate(
     (True, True)
     """
     problem = pose(control, measured, priors, discrepancy, noise_sd, zero_load)
-    unknown = set(choices) - {each.name for each in fields(Choices)}
+    unknown = set(choices) - {field.name for field in fields(EmulationSettings)}
     if unknown:
-        known = ", ".join(each.name for each in fields(Choices))
-        raise InputError(f"tissuq.calibrate has no option '{sorted(unknown)[0]}'; further options are {known}.")
-    asked = Choices(**choices)
-    if emulator is not None and not asked.refine:
-        return calibrated(problem, _no_runs, asked, emulator)
+        names = ", ".join(field.name for field in fields(EmulationSettings))
+        raise InputError(f"tissuq.calibrate has no option '{sorted(unknown)[0]}'; further options are {names}.")
+    selected = EmulationSettings(**choices)
+    if emulator is not None and not selected.refine:
+        return calibrated(problem, _no_runs, selected, emulator)
     model = as_forward(forward)
     model.check(problem.forward_symbols)
     with runs_of(model, problem, folder, workers, step) as run:
-        return calibrated(problem, run, asked, emulator)
+        return calibrated(problem, run, selected, emulator)
 
 
 def _no_runs(points: FloatArray) -> ForwardRuns:
-    raise InputError(f"there is no model for {len(points)} runs.")
+    raise InputError(f"{len(points)} further runs were requested, but there is no forward model.")
+
+
+ABOUT = "about.json"
+"""The file that says of which model the runs in a folder are."""
+
+
+@contextmanager
+def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers: int, step: Step) -> Iterator[Runner]:
+    """Give what runs a model at parameters (N, d).
+
+    Parameters
+    ----------
+    model : Forward
+    problem : Problem
+    folder : str or Path, optional
+        Where the runs are kept, and found again; without one they are forgotten.
+    workers : int
+        Processes.
+    step : callable
+        Told of every run that is done.
+
+    Raises
+    ------
+    InputError
+        When the folder holds runs of another model or at other controls, or the model cannot travel to processes.
+    """
+    if workers < 1:
+        raise InputError(f"the number of workers must be at least 1, not {workers}.")
+    if workers > 1:
+        _check_travels(model)
+    with TemporaryDirectory() as scratch, open_pool(workers) as pool:
+        runs_folder = Path(scratch) if folder is None else Path(folder)
+        missing = [path for path in (runs_folder, *runs_folder.absolute().parents) if not path.exists()]
+        if folder is not None:
+            _open(runs_folder, model, problem)
+        try:
+            yield _Runs(model, problem, runs_folder, pool, step)
+        except BaseException:
+            _remove_if_fruitless(runs_folder, missing)
+            raise
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """Batches of runs, each in a folder of its own."""
+
+    model: Forward
+    problem: Problem
+    folder: Path
+    pool: Executor | None
+    step: Step
+    batches: Iterator[int] = field(default_factory=count)
+    numbers: Iterator[int] = field(default_factory=lambda: count(1))
+
+    def __call__(self, points: FloatArray) -> ForwardRuns:
+        """Run the model at parameters (N, d)."""
+        symbols, control = self.problem.forward_symbols, tuple(self.problem.control.tolist())
+        tasks = [
+            ForwardRun(self.model, tuple(zip(symbols, point.tolist(), strict=True)), control, next(self.numbers))
+            for point in points
+        ]
+        batch_folder = self.folder / f"batch-{next(self.batches)}"
+        batch_folder.mkdir(exist_ok=True)
+        _forget_failures(batch_folder / RESULTS)
+        results = run_tasks(tasks, carry_out, batch_folder, pool=self.pool, step=self.step)
+        return gathered(symbols, results, len(control))
+
+
+def _open(folder: Path, model: Forward, problem: Problem) -> None:
+    """Mark a folder as that of this model and these controls, or refuse it."""
+    about = {
+        "model": model.identity,
+        "parameters": list(problem.forward_symbols),
+        "control": problem.control.tolist(),
+    }
+    file = folder / ABOUT
+    if file.exists():
+        try:
+            recorded = json.loads(file.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise InputError(f"'{file}' is damaged: choose another folder for the runs.") from error
+        for name, value in about.items():
+            if recorded.get(name) != value:
+                raise InputError(
+                    f"folder '{folder}' holds runs of another forward model or data (its {name} differ): choose "
+                    "another one, or remove it."
+                )
+        return
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"'{folder}' is not a folder of forward runs; choose another one.")
+    folder.mkdir(parents=True, exist_ok=True)
+    scratch = file.with_suffix(".new")
+    scratch.write_text(json.dumps(about), encoding="utf-8")
+    scratch.replace(file)
+
+
+def _remove_if_fruitless(folder: Path, missing: Sequence[Path]) -> None:
+    """Remove a folder in which not one run has ended, and what was made to hold it."""
+    if any(path.stat().st_size for path in folder.glob(f"batch-*/{RESULTS}")):
+        return
+    shutil.rmtree(folder, ignore_errors=True)
+    for parent in missing[1:]:
+        with suppress(OSError):
+            parent.rmdir()
+
+
+def _forget_failures(results: Path) -> None:
+    """Take failed runs off the disk, so that they are tried again."""
+    if not results.exists():
+        return
+    successes = [line for line in results.read_bytes().splitlines(keepends=True) if not _has_failed(line)]
+    results.write_bytes(b"".join(successes))
+
+
+def _has_failed(line: bytes) -> bool:
+    try:
+        return bool(json.loads(line)["error"])
+    except (ValueError, KeyError, TypeError):  # cut short by a kill, or damaged
+        return True
+
+
+def _check_travels(model: Forward) -> None:
+    try:
+        pickle.dumps(model)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            f"the forward model cannot be sent to other processes ({error}): define it at the top of a file, or use "
+            "one worker."
+        ) from error

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.emulation import Calibration, FileForward, UmbridgeForward
-from tissuq.emulation.design import Design
 from tissuq.emulation.forward import Forward
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method
+from tissuq.emulation.run_plan import PointSet
 from tissuq.errors import InputError
-from tissuq.experiments.table import Table, read_table
-from tissuq.priors import Prior, prior_from
+from tissuq.experiments.reading.table import Table, read_table
+from tissuq.parameters.priors import Prior, prior_from
+from tissuq.parameters.seeds import MAX_SEED
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.stream import Step, silent
 
@@ -49,19 +50,21 @@ class CalibrationSettings(BaseModel):
     zero_load: float = 0.0
     runs: int = Field(40, ge=1)
     refine: int = Field(0, ge=0)
-    design: Design = "sobol"
+    design: PointSet = "sobol"
     kernel: Kernel = "squared-exponential"
     trend: Trend = "linear"
     method: Method = "auto"
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, le=MAX_SEED)
 
     @field_validator("noise_sd", mode="before")
     @classmethod
-    def _positive_or_unknown(cls, given: Any) -> Any:
-        is_number = isinstance(given, int | float) and not isinstance(given, bool)
-        if given != "unknown" and not (is_number and 0 < given < inf):
-            raise ValueError(f"must be a positive number in the unit of what was measured, or 'unknown', not {given!r}")
-        return given
+    def _positive_or_unknown(cls, value: Any) -> Any:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if value != "unknown" and not (is_number and 0 < value < inf):
+            raise ValueError(
+                f"must be a positive number in the unit of the measured values, or 'unknown', not {value!r}"
+            )
+        return value
 
     @model_validator(mode="after")
     def _one_model(self) -> Self:
@@ -75,9 +78,9 @@ class CalibrationSettings(BaseModel):
         return UmbridgeForward(self.umbridge, self.model) if self.umbridge else FileForward(str(self.forward))
 
     @property
-    def own_priors(self) -> dict[str, Prior]:
+    def parameter_priors(self) -> dict[str, Prior]:
         """Of the parameters, by name."""
-        return {symbol: prior_from(given) for symbol, given in self.priors.items()}
+        return {symbol: prior_from(prior) for symbol, prior in self.priors.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +95,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class CalibrationStudy:
-    """What was found."""
+    """Results of a calibration."""
 
     settings: CalibrationSettings
     data: Measured
@@ -101,7 +104,7 @@ class CalibrationStudy:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader must know."""
+        """Warnings about the calibration."""
         return list(self.calibration.warnings)
 
 
@@ -139,7 +142,7 @@ def run_calibration(
         data.control,
         data.measured,
         settings.forward_model,
-        settings.own_priors,
+        settings.parameter_priors,
         folder=runs_in,
         workers=workers,
         step=step,
@@ -150,39 +153,37 @@ def run_calibration(
 
 def _read(settings: CalibrationSettings, folder: Path) -> Measured:
     table = read_table(folder / settings.file, settings.skip_rows, settings.sheet)
-    places = _places(table, (settings.control, settings.measured))
-    control, measured = (column[:: settings.every] for column in table.numbers(places))
-    return Measured(control, measured, *(_label(table, place) for place in places))
+    columns = _places(table, (settings.control, settings.measured))
+    control, measured = (column[:: settings.every] for column in table.numbers(columns))
+    return Measured(control, measured, *(_label(table, column_index) for column_index in columns))
 
 
-def _places(table: Table, asked: Sequence[str | int | None]) -> tuple[int, int]:
+def _places(table: Table, requested: Sequence[str | int | None]) -> tuple[int, int]:
     """Return the columns of the control and of what was measured, counted from 0."""
-    if None in asked:
-        if asked != (None, None) or len(table.names) != 2:
-            names = ", ".join(table.label(place) for place in range(len(table.names)))
+    if None in requested:
+        if requested != (None, None) or len(table.names) != 2:
+            names = ", ".join(table.label(index) for index in range(len(table.names)))
             raise InputError(
-                f"{table.file} has the columns {names}: say which one is the control, such as a depth, and which one "
-                "was measured, such as a force (--control NAME --measured NAME)."
+                f"{table.file} has the columns {names}: name the column of the control, such as a depth, and the "
+                "column of the measured values, such as a force (--control NAME --measured NAME)."
             )
         return 0, 1
-    found = [_place(table, each) for each in asked if each is not None]
-    if found[0] == found[1]:
-        raise InputError(
-            f"{table.file}: the control and what was measured are the same column {table.label(found[0])}."
-        )
-    return found[0], found[1]
+    columns = [_place(table, column) for column in requested if column is not None]
+    if columns[0] == columns[1]:
+        raise InputError(f"{table.file}: control and measured values are the same column {table.label(columns[0])}.")
+    return columns[0], columns[1]
 
 
-def _place(table: Table, asked: str | int) -> int:
-    own = [place for place, name in enumerate(table.names) if name == asked]
-    if own:
-        return own[0]
-    if isinstance(asked, int) and 1 <= asked <= len(table.names):
-        return asked - 1
-    raise InputError(f"{table.file} has no column '{asked}'; it has {', '.join(filter(None, table.names))}.")
+def _place(table: Table, requested: str | int) -> int:
+    matches = [index for index, name in enumerate(table.names) if name == requested]
+    if matches:
+        return matches[0]
+    if isinstance(requested, int) and 1 <= requested <= len(table.names):
+        return requested - 1
+    raise InputError(f"{table.file} has no column '{requested}'; it has {', '.join(filter(None, table.names))}.")
 
 
-def _label(table: Table, place: int) -> str:
-    unit = table.units[place].strip("[]() ")
-    name = table.names[place] or f"column {place + 1}"
+def _label(table: Table, index: int) -> str:
+    unit = table.units[index].strip("[]() ")
+    name = table.names[index] or f"column {index + 1}"
     return f"{name} [{unit}]" if unit else name

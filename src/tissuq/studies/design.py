@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from tissuq.assessment.candidates import Candidate, candidate_named
-from tissuq.assessment.next_test import NextTest
-from tissuq.assessment.ranking import rank_tests
-from tissuq.assessment.targets import MODULUS, Target, target_named
 from tissuq.errors import InputError
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
-from tissuq.posterior import Posterior
-from tissuq.studies.earlier_run import load_run
+from tissuq.next_test.candidates import Candidate, candidate_named
+from tissuq.next_test.next_test import NextTest
+from tissuq.next_test.ranking import rank_tests
+from tissuq.next_test.targets import MODULUS, Target, target_named
+from tissuq.parameters.seeds import MAX_SEED
+from tissuq.posterior.posterior import Posterior
+from tissuq.studies.earlier_run import load
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,20 +47,22 @@ class DesignSettings(BaseModel):
     targets: tuple[str, ...] = Field((MODULUS,), min_length=1)
     points: tuple[int, ...] = ()
     specimen: Literal["same", "other"] | None = None
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, le=MAX_SEED)
 
     @property
     def tests(self) -> list[Candidate]:
-        """The candidates; none where these are the usual ones."""
+        """The candidates; empty for the default ones."""
         return [
-            candidate_named(each) if isinstance(each, str) else Candidate(each.mode, each.stretch, each.name)
-            for each in self.candidates
+            candidate_named(candidate)
+            if isinstance(candidate, str)
+            else Candidate(candidate.mode, candidate.stretch, candidate.name)
+            for candidate in self.candidates
         ]
 
 
 @dataclass(frozen=True)
 class DesignStudy:
-    """What was found.
+    """Results of a ranking of tests.
 
     Attributes
     ----------
@@ -69,7 +72,7 @@ class DesignStudy:
     table : pandas.DataFrame
         Of `tissuq.assessment.rank_tests`.
     specimen : str
-        Of which specimen a test to come was taken to be, and by how much, relative, its stress may be off by itself.
+        Whether the next test is on the same specimen or another one, and the relative error of its stress as a whole.
     error : float
     """
 
@@ -86,21 +89,25 @@ class DesignStudy:
         return stress_unit(self.posterior.model.experiment.stress_unit)
 
     @property
-    def notes(self) -> list[str]:
-        """What a reader must know."""
+    def explanations(self) -> list[str]:
+        """How to read the table."""
         whose = (
-            f"of another specimen, whose stresses are off by {self.error:.0%} or so as a whole"
+            f"another specimen, whose stresses differ by about {self.error:.0%} as a whole"
             if self.specimen == "other"
-            else "of the same specimen, without errors of its own; ask for one of another (--specimen other) otherwise"
+            else "the same specimen, without additional test errors; for another specimen use --specimen other"
         )
-        rough = ["Rough: few components of the posterior would be left, and the number is not to be trusted."]
         return [
-            "Expected sd: root of the expected posterior variance, over all that the test may show. Its error is that "
-            "of a simulation; differences of the order of it say nothing.",
-            f"A test to come is one {whose}. Its noise is that of the data.",
-            "What is expected holds as far as the fitted model does: material, discrepancy and noise.",
-            *rough * bool(self.table["is_rough"].any()),
+            "Expected sd: square root of the expected posterior variance, averaged over the possible outcomes of the "
+            "test. The error given is that of the simulation; smaller differences are not significant.",
+            f"The next test is on {whose}. Its noise is that of the data.",
+            "The expectations are only as good as the fitted model: material, discrepancy and noise.",
         ]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the numbers in the table."""
+        inaccurate = "Numbers marked rough are not reliable: few components of the posterior would remain."
+        return [inaccurate] * bool(self.table["is_rough"].any())
 
 
 def run_design(
@@ -118,11 +125,13 @@ def run_design(
     """
     tests = settings.tests
     if tests and settings.points:
-        raise InputError("numbers of points are those of the usual tests; a candidate says its own: give only one.")
-    step("the earlier run")
-    posterior = load_run(folder / settings.run, settings.discrepancy, law)
-    targets = tuple(dict.fromkeys(target_named(each, posterior.model) for each in settings.targets))
+        raise InputError(
+            "--points is for the default tests and a candidate states its own points: give only one of them."
+        )
+    step("loading the run")
+    posterior = load(folder / settings.run, settings.discrepancy, law)
+    targets = tuple(dict.fromkeys(target_named(name, posterior.model) for name in settings.targets))
     options = {"points": settings.points, "specimen": settings.specimen, "seed": settings.seed}
     table = rank_tests(posterior.solution, tests, targets, step=step, **options)  # type: ignore[arg-type]
-    asked = NextTest(posterior.solution, targets, settings.specimen)
-    return DesignStudy(settings, posterior, targets, table, asked.specimen, asked.tolerances.stress)
+    next_test = NextTest(posterior.solution, targets, settings.specimen)
+    return DesignStudy(settings, posterior, targets, table, next_test.specimen, next_test.tolerances.stress)

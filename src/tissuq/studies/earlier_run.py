@@ -1,85 +1,97 @@
-"""The posterior of an earlier run, fitted again as its recipe says."""
+"""What an earlier run left: its posteriors, as they were saved, and its settings."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 from warnings import warn
 
-from tissuq.discrepancy import Auto, NoDiscrepancy
 from tissuq.errors import InputError
-from tissuq.mechanics import Material, material_named
-from tissuq.mechanics.user_law import LAW
-from tissuq.posterior import Posterior
-from tissuq.studies.settings import RECIPE, load_settings
+from tissuq.mechanics import Material
+from tissuq.model.discrepancy import Auto, Discrepancy, NoDiscrepancy
+from tissuq.posterior.archive import read_modes
+from tissuq.posterior.posterior import Posterior
+from tissuq.studies.settings import RECIPE, damage_reported, load_settings
 
 if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenSettings
 
-__all__ = ["load_run", "load_run_without", "recipe_of"]
+__all__ = ["POSTERIORS", "load", "load_run", "load_without_discrepancy", "modes_of", "recipe_of"]
 
-SUMMARY = "summary.json"
-AGREEMENT = 1e-6
-"""Relative difference between the headline parameter's means in the run and fitted again that needs no word."""
+POSTERIORS = "posterior"
+"""Subfolder of a run with a file for each of its posteriors."""
 
 
-def load_run(folder: str | Path, discrepancy: str | None = None, material: Material | None = None) -> Posterior:
-    """Return a posterior of a run of ``tissuq fit``.
+def load(path: str | Path, discrepancy: str | Discrepancy | None = None, material: Material | None = None) -> Posterior:
+    """Return a posterior that was saved, by `Posterior.save` or in a run of ``tissuq fit``, as it was.
 
-    The run's measurements are fitted again as its ``run.toml`` says, from the copies in the run folder, with the same
-    seed: a posterior is more than its draws. A warning tells where the result is not that of the run.
+    Nothing is fitted again, and no code in the folder is run.
 
     Parameters
     ----------
-    folder : str or Path
-        The run folder.
-    discrepancy : str, optional
-        Which of the run's discrepancies; unless given, ``"auto"`` where the run has it, or the only one.
+    path : str or Path
+        The file, or the run folder.
+    discrepancy : str or Discrepancy, optional
+        Which of the run's discrepancies; unless given, ``"auto"`` where the run has it, or the only one. An object,
+        where it is of a class of your own.
     material : Material, optional
-        The material, where the run's is a law in a file of the user's own, which is not run unasked.
+        The material, where it is a law of your own.
 
     Raises
     ------
-    InputError, ModelError, ConvergenceError
-        When the folder is no such run, or the discrepancy is not one of the run's; and as `tissuq.fit`.
+    InputError
+        When there is no such file or run, or it is damaged, or the discrepancy is not one of the run's, or material or
+        discrepancy must be given.
 
     Examples
     --------
     >>> import tissuq as tq
-    >>> posterior = tq.load_run("runs/brain", discrepancy="auto")  # doctest: +SKIP
+    >>> posterior = tq.load("runs/brain", discrepancy="auto")  # doctest: +SKIP
+    """
+    place = Path(path)
+    own = discrepancy if isinstance(discrepancy, Discrepancy) else None
+    return Posterior.load(place if place.is_file() else _file_in(place, discrepancy), material, own)
+
+
+def load_run(
+    folder: str | Path, discrepancy: str | Discrepancy | None = None, material: Material | None = None
+) -> Posterior:
+    """Return `load` of the same arguments: its earlier name, deprecated."""
+    warn("tissuq.load_run is now called tissuq.load.", DeprecationWarning, stacklevel=2)
+    return load(folder, discrepancy, material)
+
+
+def load_without_discrepancy(folder: str | Path, material: Material | None = None) -> Posterior:
+    """Return the posterior without discrepancy of the measurements of a run; fitted, where the run has none.
+
+    Parameters
+    ----------
+    folder : str or Path
+    material : Material, optional
+        As of `load`.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        As `load` and `tissuq.fit`.
     """
     from tissuq.studies.specimen import fitted
 
     run = Path(folder)
-    settings, rows = recipe_of(run), _summary(run)
-    _check_material(settings.material, material, folder)
-    names = list(rows)
-    name = discrepancy or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
-    if name not in names:
-        known = ", ".join(names)
-        what = f"has no discrepancy '{name}'" if name else "has several discrepancies"
-        raise InputError(f"run '{folder}' {what}: choose one of {known}.")
-    posterior = fitted(settings, name, run, material)
-    headline = posterior.model.headline
-    before, now = rows[name].get(f"{headline}_mean"), float(posterior.summary(parameters=[headline])["mean"].iloc[0])
-    if before is not None and abs(now - before) > AGREEMENT * abs(before):
-        warn(
-            f"fitted again, run '{folder}' gives {headline} = {now:.6g} MPa, and it gave {before:.6g} MPa: its files "
-            "or tissuq have changed since.",
-            stacklevel=2,
-        )
-    return posterior
+    if NoDiscrepancy.name in _files(run):
+        return load(run, NoDiscrepancy.name, material)
+    return fitted(recipe_of(run), NoDiscrepancy.name, run, material)
 
 
-def load_run_without(folder: str | Path, material: Material | None = None) -> Posterior:
-    """Return the posterior without discrepancy of the measurements of a run, whether the run has one or not.
+def modes_of(folder: str | Path, discrepancy: str | None = None) -> list[str]:
+    """Return the loading modes of the tests of a run.
 
-    Parameters and exceptions are those of `load_run`.
+    Raises
+    ------
+    InputError
+        As `load`.
     """
-    from tissuq.studies.specimen import fitted
-
-    return fitted(recipe_of(folder), NoDiscrepancy.name, Path(folder), material)
+    return read_modes(_file_in(Path(folder), discrepancy))
 
 
 def recipe_of(folder: str | Path) -> SpecimenSettings:
@@ -94,29 +106,34 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
 
     run = Path(folder)
     recipe = run / RECIPE
-    if not run.is_dir():
-        raise InputError(f"there is no run folder '{run}'.")
-    if not recipe.is_file() or not (run / SUMMARY).is_file():
-        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE} or {SUMMARY}.")
-    if " tissuq fit " not in recipe.read_text(encoding="utf-8").partition("\n")[0]:
-        raise InputError(f"run '{run}' is not one of tissuq fit, and only these have a posterior to go on with.")
+    _files(run)
+    if not recipe.is_file():
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it lacks {RECIPE}.")
+    with damage_reported(recipe):
+        command = recipe.read_text(encoding="utf-8").partition("\n")[0]
+    if " tissuq fit " not in command:
+        raise InputError(f"run '{run}' is not a run of tissuq fit; only these have a posterior to continue from.")
     return load_settings(SpecimenSettings, recipe, {})
 
 
-def _summary(run: Path) -> dict[str, dict[str, float]]:
-    """Return the rows of a run's summary by discrepancy."""
-    try:
-        rows = {row["formulation"]: row for row in json.loads((run / SUMMARY).read_text(encoding="utf-8"))}
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: its {SUMMARY} is damaged.") from error
-    if not rows:
-        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: its {SUMMARY} has no rows.")
-    return rows
+def _files(run: Path) -> dict[str, Path]:
+    """Return the files with the posteriors of a run, by discrepancy."""
+    if not run.is_dir():
+        raise InputError(f"there is no run folder '{run}'.")
+    files = {file.stem: file for file in sorted((run / POSTERIORS).glob("*.nc"))}
+    if not files:
+        raise InputError(f"folder '{run}' is not a complete run of tissuq fit: it has no {POSTERIORS}/*.nc.")
+    return files
 
 
-def _check_material(named: str, given: Material | None, run: str | Path) -> None:
-    """Refuse another material than that of the run: what is wanted is the run's posterior, not a new fit."""
-    if given is not None and not LAW.search(named) and given != material_named(named):
-        raise InputError(
-            f"run '{run}' is of the material '{named}', not '{given.name}': leave the material out, or fit anew."
-        )
+def _file_in(run: Path, discrepancy: str | Discrepancy | None) -> Path:
+    """Return the file with the posterior of a run under one of its discrepancies."""
+    files = _files(run)
+    names = list(files)
+    name = discrepancy.name if isinstance(discrepancy, Discrepancy) else discrepancy
+    name = name or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
+    if name not in files:
+        known = ", ".join(names)
+        what = f"has no discrepancy '{name}'" if name else "has several discrepancies"
+        raise InputError(f"run '{run}' {what}: choose one of {known}.")
+    return files[name]

@@ -1,4 +1,4 @@
-"""Every test predicted from the others: whether what was learnt in some modes holds in another."""
+"""Each test predicted from the others: whether what is learnt in some modes holds in another."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.fitting import fit
-from tissuq.mechanics.path import invariants
-from tissuq.posterior import Posterior
+from tissuq.mechanics.invariants import invariants, largest_invariants
+from tissuq.posterior.fitting import fit
+from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.scores import judged
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
 
     Parameters
     ----------
-    tests : sequence of Experiment, or a JointExperiment
+    tests : sequence of Experiment, or an Experiment of several tests
         Two or more, in any modes.
     options
         Those of `tissuq.fit`; noise of each test is not taken.
@@ -53,19 +53,19 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     """
     import pandas as pd
 
-    tests = tests.parts if isinstance(tests, Experiment) else tests
+    tests = tests.tests if isinstance(tests, Experiment) else tests
     if len(tests) < 2:
-        raise InputError("to predict a test from the others there must be two or more.")
+        raise InputError("predicting a test from the others needs two or more tests.")
     if isinstance(options.get("noise_sd"), Sequence) and not isinstance(options["noise_sd"], str):
-        raise InputError("to predict a test from the others give one noise_sd for all tests, or none.")
+        raise InputError("to predict a test from the others give one noise_sd for all tests, or leave it unknown.")
     if options.get("tolerances") is None:  # those of all tests, of which one alone has none
         options["tolerances"] = fit(tests, **options).model.tolerances
     rows = []
-    for place, test in enumerate(tests):
-        posterior = fit([other for number, other in enumerate(tests) if number != place], **options)
+    for index, test in enumerate(tests):
+        posterior = fit([training_test for number, training_test in enumerate(tests) if number != index], **options)
         headline = posterior.summary(parameters=[posterior.model.headline]).iloc[0]
-        own = {f"{posterior.model.headline}_{name}": headline[name] for name in ("median", "hdi_low", "hdi_high")}
-        rows += [each | own for each in prediction_of(posterior, test)]
+        estimates = {f"{posterior.model.headline}_{name}": headline[name] for name in ("median", "hdi_low", "hdi_high")}
+        rows += [row | estimates for row in prediction_of(posterior, test)]
     return pd.DataFrame(rows)
 
 
@@ -80,13 +80,14 @@ def prediction_of(posterior: Posterior, test: Experiment, prob: float = 0.95) ->
         scores of `tissuq.prediction.scores.Judged.summary`. Measurements without stress are left out, and the band is
         that of a new test with an error of its own.
     """
-    data, rows = posterior.model.experiment, []
-    most = [float(each.max()) for each in invariants(data.mode, data.stretch)]
-    for _, number, _ in test.curves:
-        every = judged(posterior.solution, test, number, prob=prob)
-        reached = invariants(test.mode.channels[number], every.points)
-        known = np.logical_and.reduce([each <= end * (1 + 1e-9) for each, end in zip(reached, most, strict=True)])
-        own: dict[str, Any] = {"test": test.name, "mode": test.mode.name, "measured": test.mode.stresses[number]}
-        shares = {"inside": float(every.is_inside.mean()), "beyond": float(1 - known.mean())}
-        rows.append(own | every.where(known).summary() | shares)
+    largest, rows = largest_invariants(posterior.model.experiment.states), []
+    for curve in test.curves:
+        judged_all = judged(posterior.solution, curve, prob=prob)
+        reached = invariants(curve.path.at(judged_all.points))
+        calibrated = np.logical_and.reduce(
+            [invariant <= end * (1 + 1e-9) for invariant, end in zip(reached, largest, strict=True)]
+        )
+        labels: dict[str, Any] = {"test": curve.name, "mode": curve.mode.name, "measured": curve.quantity}
+        shares = {"inside": float(judged_all.is_inside.mean()), "beyond": float(1 - calibrated.mean())}
+        rows.append(labels | judged_all.where(calibrated).summary() | shares)
     return rows

@@ -1,17 +1,22 @@
-"""Files of measurements and how to read them: what the commands that read them have in common."""
+"""Settings that studies of measured files share: how a file is read, which material and noise are fitted."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from pathlib import Path
-from typing import cast
+from typing import Any, Literal, Self, cast
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading import Reading, ReadingOptions, read_file
+from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
+from tissuq.experiments.reading.units import StressUnit
+from tissuq.model.noise import Noise, noise_named
+from tissuq.parameters.seeds import MAX_SEED
+from tissuq.posterior.solver import Method
 
-__all__ = ["MeasuredFile", "MeasuredTest", "ReadingSettings"]
+__all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
 
 class ReadingSettings(BaseModel):
@@ -65,6 +70,41 @@ class MeasuredTest(MeasuredFile):
 
     def reading(self, folder: Path = Path()) -> Reading:
         """Read the file, and say which specimen it was."""
-        found = super().reading(folder)
-        named = replace(found.experiment, name=self.name or found.experiment.name, specimen=self.specimen)
-        return replace(found, experiment=named)
+        reading = super().reading(folder)
+        named = reading.experiment.labelled(name=self.name or reading.experiment.name, specimen=self.specimen)
+        return replace(reading, experiment=named)
+
+
+class FittedSettings(BaseModel):
+    """What is fitted; the noise is in the files' unit of stress."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    material: str = "neo-hookean"
+    noise_sd: float | Literal["unknown"] = "unknown"
+    noise: Literal["unknown", "proportional", "repeats", "autoregressive"] | None = None
+    method: Method = "auto"
+    seed: int = Field(0, ge=0, le=MAX_SEED)
+
+    @field_validator("noise_sd", mode="before")
+    @classmethod
+    def _positive_or_unknown(cls, value: Any) -> Any:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if value != "unknown" and not (is_number and 0 < value < inf):
+            raise ValueError(
+                f"must be a positive number in the file's stress unit, or 'unknown', not {value!r}; noise of zero "
+                "would make every measurement exact"
+            )
+        return value
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> Self:
+        if self.noise is not None and self.noise_sd != "unknown":
+            raise ValueError(f"give noise_sd or noise, not both (noise_sd is {self.noise_sd}, noise is '{self.noise}')")
+        return self
+
+    def noise_in(self, unit: StressUnit) -> Noise:
+        """Return the noise, a known standard deviation converted from a unit to MPa."""
+        if self.noise_sd == "unknown":
+            return noise_named(self.noise or "unknown")
+        return noise_named(self.noise_sd * unit.to_mpa)

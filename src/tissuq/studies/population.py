@@ -11,23 +11,22 @@ from time import perf_counter
 from pydantic import Field
 
 from tissuq.errors import InputError
-from tissuq.experiments.doubts import doubts
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading import Reading
-from tissuq.experiments.specimens import find_tests, read_column
-from tissuq.experiments.told_mode import told_mode
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.reading.data_warnings import doubts
+from tissuq.experiments.reading.experiment_file import Reading
+from tissuq.experiments.reading.specimens import find_tests, read_column
+from tissuq.experiments.reading.stated_mode import told_mode
+from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
-from tissuq.studies.fitted import FittedSettings
-from tissuq.studies.measured_file import MeasuredTest, ReadingSettings
+from tissuq.studies.measured_file import FittedSettings, MeasuredTest, ReadingSettings
 
 __all__ = ["PopulationSettings", "PopulationStudy", "run_population"]
 
-USUAL_MODE = "uniaxial"
-MOST_DOUBTS = 8
-"""Different ones that are told."""
+DEFAULT_MODE = "uniaxial"
+MAX_DATA_WARNINGS = 8
+"""Number of different warnings about the data that are shown."""
 
 
 class PopulationSettings(FittedSettings, ReadingSettings):
@@ -48,7 +47,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         if self.specimen is None:
             return find_tests([folder / file for file in self.files])
         if len(self.files) > 1 or (folder / self.files[0]).is_dir():
-            raise InputError("a column names the specimens of one file: give one FILE, or leave --specimen out.")
+            raise InputError("--specimen names a column of a single file: give one FILE, or leave --specimen out.")
         return {Path(self.files[0]).stem: [folder / self.files[0]]}
 
     def readings(self, folder: Path = Path()) -> dict[str, list[Reading]]:
@@ -57,25 +56,25 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         if self.specimen is None:
             return {name: [self._test(name, file).reading() for file in files] for name, files in sources.items()}
         (file,) = next(iter(sources.values()))
-        found = read_column(file, self.specimen, **self._test("", file).reading_options)
-        return {name: [reading] for name, reading in found.items()}
+        readings = read_column(file, self.specimen, **self._test("", file).reading_options)
+        return {name: [reading] for name, reading in readings.items()}
 
     def _test(self, specimen: str, file: Path) -> MeasuredTest:
-        own = {name: getattr(self, name) for name in ReadingSettings.model_fields}
-        mode = self.mode or told_mode(file, otherwise=USUAL_MODE)
-        return MeasuredTest(**own | {"mode": mode, "file": str(file), "name": specimen, "specimen": specimen})
+        options = {name: getattr(self, name) for name in ReadingSettings.model_fields}
+        mode = self.mode or told_mode(file, otherwise=DEFAULT_MODE)
+        return MeasuredTest(**options | {"mode": mode, "file": str(file), "name": specimen, "specimen": specimen})
 
 
 @dataclass(frozen=True)
 class PopulationStudy:
-    """What was found."""
+    """Results of a population study."""
 
     settings: PopulationSettings
     tests: dict[str, list[Experiment]]
     population: Population
     seconds: float
-    doubts: tuple[str, ...] = ()
-    """What is strange about the measurements."""
+    data_warnings: tuple[str, ...] = ()
+    """What is implausible in the measurements."""
 
     @property
     def unit(self) -> StressUnit:
@@ -89,8 +88,8 @@ class PopulationStudy:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader must know."""
-        return [*self.doubts, *self.population.warnings]
+        """Warnings about data and fit."""
+        return [*self.data_warnings, *self.population.warnings]
 
 
 def run_population(
@@ -108,12 +107,14 @@ def run_population(
     """
     step("reading")
     readings = settings.readings(folder)
-    tests = {name: [reading.experiment for reading in own] for name, own in readings.items()}
+    tests = {
+        name: [reading.experiment for reading in specimen_readings] for name, specimen_readings in readings.items()
+    }
     units = _units(tests)
     if settings.noise_sd != "unknown" and len(units) > 1:
         raise InputError(
-            f"the files give stresses in different units ({', '.join(sorted(units))}), so that it is not clear which "
-            "one the noise is in: leave --noise-sd out, or convert the files."
+            f"the files give stresses in different units ({', '.join(sorted(units))}), so the unit of the "
+            "noise is ambiguous: leave --noise-sd out, or convert the files."
         )
     step(f"{len(tests)} specimens")
     start = perf_counter()
@@ -127,11 +128,11 @@ def run_population(
         method=settings.method,
         seed=settings.seed,
     )
-    return PopulationStudy(settings, tests, population, perf_counter() - start, _doubts(readings))
+    return PopulationStudy(settings, tests, population, perf_counter() - start, _data_warnings(readings))
 
 
 def _units(tests: Mapping[str, Sequence[Experiment]]) -> set[str]:
-    return {each.stress_unit for own in tests.values() for each in own}
+    return {test.stress_unit for specimen_tests in tests.values() for test in specimen_tests}
 
 
 def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
@@ -139,15 +140,18 @@ def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
     return stress_unit(units.pop() if len(units) == 1 else "MPa")
 
 
-def _doubts(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]:
-    """Return what is strange about the files, each once with the specimens that it concerns."""
+def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]:
+    """Return the warnings about the files, each once with the specimens that it concerns."""
     concerned: dict[str, list[str]] = {}
-    for name, own in readings.items():
-        for text in dict.fromkeys(text for reading in own for text in doubts(reading)):
+    for name, specimen_readings in readings.items():
+        for text in dict.fromkeys(text for reading in specimen_readings for text in doubts(reading)):
             concerned.setdefault(text, []).append(name)
-    found = [
+    messages = [
         f"{'all specimens' if len(names) == len(readings) else ', '.join(names)}: {text}"
         for text, names in concerned.items()
     ]
-    left = len(found) - MOST_DOUBTS
-    return (*found[:MOST_DOUBTS], *([f"{left} more of this kind; tissuq inspect FILE tells them."] if left > 0 else []))
+    omitted = len(messages) - MAX_DATA_WARNINGS
+    return (
+        *messages[:MAX_DATA_WARNINGS],
+        *([f"{omitted} more warnings about the data; see tissuq inspect FILE."] if omitted > 0 else []),
+    )

@@ -1,4 +1,4 @@
-"""What a run predicts in any loading mode, beside measurements of that mode where there are some."""
+"""Predictions of a run in any loading mode, compared with measurements of that mode if given."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +16,13 @@ from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
-from tissuq.mechanics.path import invariants
-from tissuq.posterior import Posterior
+from tissuq.mechanics.invariants import largest_invariants
+from tissuq.posterior.netcdf import LabelledGroup, save_groups
+from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import speaks_of
-from tissuq.studies.earlier_run import load_run
+from tissuq.studies.earlier_run import load
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ __all__ = ["POINTS", "Prediction", "predict_run", "predicted"]
 FloatArray = NDArray[np.float64]
 
 POINTS = 101
-"""Stretches of a band, unless said."""
+"""Number of stretches of a band by default."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class Prediction:
         The measurements that it is compared with.
     scores : pandas.DataFrame, optional
         How they are predicted (`Posterior.scores`), with the discrepancy or without as column ``discrepancy``.
-    notes : tuple of str
-        What a reader must know.
+    warnings : tuple of str
+        Warnings about fit and prediction.
     """
 
     posterior: Posterior
@@ -71,7 +71,7 @@ class Prediction:
     bands: Mapping[tuple[int, bool, bool], pd.DataFrame]
     data: Experiment | None
     scores: pd.DataFrame | None
-    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
     @property
     def unit(self) -> StressUnit:
@@ -82,13 +82,13 @@ class Prediction:
     def stresses(self) -> tuple[str, ...]:
         """The names of the predicted stresses."""
         name = "Cauchy stress" if self.stress_type == "cauchy" else "engineering stress"
-        return tuple(each.replace("engineering stress", name) for each in self.mode.stresses)
+        return tuple(stress.replace("engineering stress", name) for stress in self.mode.stresses)
 
     @property
     def controls(self) -> dict[str, FloatArray]:
         """The points by control: stretch, and stretch2 of a second one."""
         columns = self.points.reshape(len(self.points), -1).T
-        return {f"stretch{place if place > 1 else ''}": column for place, column in enumerate(columns, 1)}
+        return {f"stretch{number if number > 1 else ''}": column for number, column in enumerate(columns, 1)}
 
     @cached_property
     def is_calibrated(self) -> NDArray[np.bool_]:
@@ -98,7 +98,7 @@ class Prediction:
     @property
     def is_data_calibrated(self) -> NDArray[np.bool_]:
         """Of which measurements (n,) that is true."""
-        assert self.data is not None  # noqa: S101 (asked for where there are some)
+        assert self.data is not None  # noqa: S101 (requested only if there are measurements)
         return is_calibrated(self.posterior.model.experiment, self.mode, self.data.stretch)
 
     @property
@@ -108,9 +108,9 @@ class Prediction:
 
     def measured(self, channel: int) -> FloatArray:
         """Return the measurements (n,) of a stress that it is compared with, MPa."""
-        assert self.data is not None  # noqa: S101 (asked for where there are some)
-        ratio = self.mode.channels[channel].cauchy_ratio(self.data.stretch) if self.stress_type == "cauchy" else 1.0
-        return np.asarray(self.data.stress.reshape(len(self.data), -1)[:, channel] * ratio)
+        assert self.data is not None  # noqa: S101 (requested only if there are measurements)
+        ratio = self.mode.paths[channel].cauchy_ratio(self.data.stretch) if self.stress_type == "cauchy" else 1.0
+        return np.asarray(self.data.curves[channel].stress * ratio)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -124,14 +124,14 @@ class Prediction:
 
         tables = []
         for channel, name in enumerate(self.stresses):
-            own: dict[str, Any] = {"measured": name} if len(self.stresses) > 1 else {}
-            own |= self.controls | {"is_calibrated": self.is_calibrated}
+            columns: dict[str, Any] = {"measured": name} if len(self.stresses) > 1 else {}
+            columns |= self.controls | {"is_calibrated": self.is_calibrated}
             for kind in self.kinds:
                 prefix = "" if kind else "alone_"
                 stress, noisy = (self.bands[channel, kind, noise] for noise in (False, True))
-                own |= {f"{prefix}{end}": stress[end].to_numpy() for end in ("mean", "low", "high")}
-                own |= {f"{prefix}predictive_{end}": noisy[end].to_numpy() for end in ("low", "high")}
-            tables.append(pd.DataFrame(own))
+                columns |= {f"{prefix}{end}": stress[end].to_numpy() for end in ("mean", "low", "high")}
+                columns |= {f"{prefix}predictive_{end}": noisy[end].to_numpy() for end in ("low", "high")}
+            tables.append(pd.DataFrame(columns))
         return pd.concat(tables, ignore_index=True)
 
     @property
@@ -141,8 +141,10 @@ class Prediction:
         Dimensions discrepancy and noise (``"with"``, ``"without"``), stress, and stretch, or point where the mode has
         several controls.
         """
-        import xarray as xr
+        return self._group.to_dataset()
 
+    @property
+    def _group(self) -> LabelledGroup:
         along = "stretch" if self.points.ndim == 1 else "point"
         words = {kind: "with" if kind else "without" for kind in (True, False)}
         order = [*product(self.kinds, (True, False), range(len(self.stresses)))]
@@ -152,25 +154,22 @@ class Prediction:
             for end in ("mean", "low", "high")
         }
         mpa, dims = {"units": "MPa"}, ("discrepancy", "noise", "stress", along)
-        found = xr.Dataset(
-            {
-                "mean": ((dims[0], *dims[2:]), arrays["mean"][:, 0], mpa | {"long_name": "mean stress"}),
-                "low": (dims, arrays["low"], mpa | {"long_name": f"lower end of the {self.prob:.12g} interval"}),
-                "high": (dims, arrays["high"], mpa | {"long_name": f"upper end of the {self.prob:.12g} interval"}),
-                "is_calibrated": (along, self.is_calibrated.astype(np.int8), {"units": "1"}),
-            },
-            {name: (along, column, {"units": "1"}) for name, column in self.controls.items()}
-            | {"discrepancy": [words[kind] for kind in self.kinds], "noise": [words[True], words[False]]}
-            | {"stress": list(self.stresses)},
-            self._labels,
-        )
+        by_name: dict[str, Any] = {
+            "mean": ((dims[0], *dims[2:]), arrays["mean"][:, 0], mpa | {"long_name": "mean stress"}),
+            "low": (dims, arrays["low"], mpa | {"long_name": f"lower end of the {self.prob:.12g} interval"}),
+            "high": (dims, arrays["high"], mpa | {"long_name": f"upper end of the {self.prob:.12g} interval"}),
+            "is_calibrated": (along, self.is_calibrated.astype(np.int8), {"units": "1"}),
+        }
+        coordinates: dict[str, Any] = {name: (along, column, {"units": "1"}) for name, column in self.controls.items()}
+        coordinates |= {"discrepancy": [words[kind] for kind in self.kinds], "noise": [words[True], words[False]]}
+        coordinates |= {"stress": list(self.stresses)}
         if self.data is not None:
             stress = [self.measured(channel) for channel in range(len(self.stresses))]
-            found["measured"] = (("stress", "measurement"), np.array(stress), mpa)
-            for place, column in enumerate(self.data.stretch.reshape(len(self.data), -1).T, 1):
-                name = f"measured_stretch{place if place > 1 else ''}"
-                found[name] = ("measurement", column, {"units": "1"})
-        return found
+            by_name["measured"] = (("stress", "measurement"), np.array(stress), mpa)
+            for number, column in enumerate(self.data.stretch.reshape(len(self.data), -1).T, 1):
+                name = f"measured_stretch{number if number > 1 else ''}"
+                by_name[name] = ("measurement", column, {"units": "1"})
+        return LabelledGroup(by_name, coordinates, self._labels)
 
     @property
     def _labels(self) -> dict[str, Any]:
@@ -182,8 +181,7 @@ class Prediction:
 
     def save(self, path: str | Path) -> None:
         """Write `data_set` as NetCDF."""
-        content = bytes(self.data_set.to_netcdf(engine="h5netcdf"))  # in memory first, as a posterior is saved
-        Path(path).write_bytes(content)
+        save_groups({"/": self._group}, Path(path))
 
 
 def predict_run(
@@ -196,7 +194,7 @@ def predict_run(
     run : str or Path
         The run folder.
     discrepancy, material
-        As for `tissuq.load_run`.
+        As for `tissuq.load`.
     options
         mode : str or LoadingMode, by default that of the data, or else of the run.
         stretch : (g,) array, or (g, c) for a mode with c controls; by default ``points`` stretches, 101 unless said,
@@ -212,20 +210,16 @@ def predict_run(
     Raises
     ------
     InputError, ModelError, ConvergenceError
-        When the run cannot be used (`tissuq.load_run`), or cannot predict what is asked for.
+        When the run cannot be used (`tissuq.load`), or cannot predict what is asked for.
 
     Examples
     --------
     >>> import tissuq as tq
     >>> planar = tq.datasets.load("rubber-treloar-planar")
     >>> found = tq.predict_run("runs/rubber-treloar-uniaxial", data=planar)  # doctest: +SKIP
-    >>> found.table, found.scores, found.notes  # doctest: +SKIP
+    >>> found.table, found.scores, found.warnings  # doctest: +SKIP
     """
-    with catch_warnings(record=True) as said:
-        simplefilter("always", UserWarning)
-        posterior = load_run(run, discrepancy, material)
-    notes = tuple(str(each.message) for each in said if issubclass(each.category, UserWarning))
-    return predicted(posterior, notes=notes, **options)
+    return predicted(load(run, discrepancy, material), **options)
 
 
 def predicted(
@@ -237,28 +231,24 @@ def predicted(
     prob: float = 0.95,
     stress_type: str = "engineering",
     data: Experiment | None = None,
-    notes: tuple[str, ...] = (),
 ) -> Prediction:
-    """Return what a posterior predicts in a loading mode; the arguments are the options of `predict_run`.
-
-    ``notes`` are sentences that go before those about the prediction.
-    """
-    asked = _mode(posterior, mode, data)
-    at = _points(posterior, asked, stretch, points, data)
+    """Return what a posterior predicts in a loading mode; the arguments are the options of `predict_run`."""
+    target = _mode(posterior, mode, data)
+    grid = _points(posterior, target, stretch, points, data)
     model = posterior.model
-    kinds = (True, False) if model.discrepancy.parameters and speaks_of(model, asked) else (False,)
+    kinds = (True, False) if model.discrepancy.parameters and speaks_of(model, target) else (False,)
     options: dict[str, Any] = {"prob": prob, "stress_type": stress_type}
-    order = product(range(len(asked.stresses)), kinds, (False, True))
-    bands = {each: _band(posterior, asked, at, *each, options) for each in order}
+    order = product(range(len(target.stresses)), kinds, (False, True))
+    bands = {key: _band(posterior, target, grid, *key, options) for key in order}
     scores = None if data is None else _scores(posterior, data, kinds, options)
-    known = (*notes, *_notes(posterior, asked, at, data))
-    return Prediction(posterior, asked, at, prob, stress_type, kinds, bands, data, scores, known)
+    warnings = tuple(_prediction_warnings(posterior, target, grid, data))
+    return Prediction(posterior, target, grid, prob, stress_type, kinds, bands, data, scores, warnings)
 
 
 def _band(
     posterior: Posterior,
     mode: LoadingMode,
-    at: FloatArray,
+    grid: FloatArray,
     channel: int,
     kind: bool,
     noise: bool,
@@ -266,62 +256,61 @@ def _band(
 ) -> pd.DataFrame:
     """Return mean, low and high of a stress at points; refuse where it is too large for a number."""
     with np.errstate(over="ignore", invalid="ignore"):
-        found = posterior.predict(at, mode=mode, channel=channel, discrepancy=kind, noise=noise, **options)
-    is_finite = np.isfinite(found.to_numpy()).all(axis=1)
+        band = posterior.predict(grid, mode=mode, channel=channel, discrepancy=kind, noise=noise, **options)
+    is_finite = np.isfinite(band.to_numpy()).all(axis=1)
     if not is_finite.all():
-        beyond = at.reshape(len(at), -1)[~is_finite, 0][0]
+        value = grid.reshape(len(grid), -1)[~is_finite, 0][0]
         raise ModelError(
-            f"the predicted stress is too large for a number at a {mode.controls[0].name} of {beyond:g}: predict "
-            "nearer to what was measured."
+            f"the predicted stress overflows at a {mode.controls[0].name} of {value:g}: predict nearer to the "
+            "measured range."
         )
-    return found
+    return band
 
 
 def _mode(posterior: Posterior, mode: str | LoadingMode | None, data: Experiment | None) -> LoadingMode:
     """Return the mode to predict, which must be that of the data."""
     modes = posterior.model.experiment.modes
-    if data is not None and len(data.parts) > 1:
-        raise InputError(f"'{data.name}' are several tests: give those of one to compare with.")
+    if data is not None and len(data.tests) > 1:
+        raise InputError(f"'{data.name}' holds several tests: give the measurements of one test to compare with.")
     if mode is None and data is None and len(modes) > 1:
-        names = ", ".join(each.name for each in modes)
-        raise InputError(f"the run is of tests in several modes ({names}): say which mode to predict.")
-    found = loading_mode(mode) if mode is not None else data.parts[0].mode if data is not None else modes[0]
-    if data is not None and data.parts[0].mode != found:
+        names = ", ".join(measured_mode.name for measured_mode in modes)
+        raise InputError(f"the run has tests in several modes ({names}): choose the mode to predict.")
+    target = loading_mode(mode) if mode is not None else data.mode if data is not None else modes[0]
+    if data is not None and data.mode != target:
         raise InputError(
-            f"the measurements '{data.name}' are of mode {data.parts[0].mode.name}, and {found.name} is predicted: "
-            "give measurements of that mode."
+            f"the measurements '{data.name}' are of mode {data.mode.name}, but the predicted mode is "
+            f"{target.name}: give measurements of that mode."
         )
-    return found
+    return target
 
 
 def _points(
     posterior: Posterior, mode: LoadingMode, stretch: ArrayLike | None, points: int, data: Experiment | None
 ) -> FloatArray:
-    """Return the points at which to predict: those that were asked for, or the usual ones."""
+    """Return the points at which to predict: the requested ones, or the default ones."""
     if len(mode.controls) > 1 and stretch is not None and data is not None:
         raise InputError(
-            f"mode '{mode.name}' has several controls, and measurements lie where they lie: give stretches or "
-            "measurements to compare with, not both."
+            f"mode '{mode.name}' has several controls: give either stretches or measurements to compare with, not both."
         )
     if stretch is not None:
         return checked_points(mode, stretch)
     ends = _range(posterior, mode)
     if ends is not None:
         return np.linspace(*(ends if data is None else _beside(ends, mode, data.stretch)), points)
-    own = [part.stretch for part in posterior.model.experiment.parts if part.mode == mode]
-    if data is None and not own:
+    measured = [test.stretch for test in posterior.model.experiment.tests if test.mode == mode]
+    if data is None and not measured:
         names = ", ".join(control.name for control in mode.controls)
         raise InputError(
-            f"mode '{mode.name}' has several controls ({names}): say at which values of each to predict (stretch and "
-            "stretch2)."
+            f"mode '{mode.name}' has several controls ({names}): give the values of each at which to predict (stretch "
+            "and stretch2)."
         )
-    return own[0] if data is None else data.stretch
+    return measured[0] if data is None else data.stretch
 
 
 def _beside(ends: tuple[float, float], mode: LoadingMode, measured: FloatArray) -> tuple[float, float]:
     """Return the ends of a range on those sides of rest on which there are measurements, and no nearer than these."""
-    rest, low, high = float(mode.reference), float(measured.min()), float(measured.max())
-    return min(ends[0], low) if low < rest else rest, max(ends[1], high) if high > rest else rest
+    reference, low, high = float(mode.reference), float(measured.min()), float(measured.max())
+    return min(ends[0], low) if low < reference else reference, max(ends[1], high) if high > reference else reference
 
 
 def _range(posterior: Posterior, mode: LoadingMode) -> tuple[float, float] | None:
@@ -337,45 +326,42 @@ def _scores(posterior: Posterior, data: Experiment, kinds: tuple[bool, ...], opt
     return pd.concat(tables.values(), ignore_index=True)
 
 
-def _notes(posterior: Posterior, mode: LoadingMode, points: FloatArray, data: Experiment | None) -> list[str]:
-    """Return what a reader must know, in sentences."""
-    model, found = posterior.model, []
+def _prediction_warnings(
+    posterior: Posterior, mode: LoadingMode, points: FloatArray, data: Experiment | None
+) -> list[str]:
+    """Return the warnings about a prediction."""
+    model, texts = posterior.model, []
     if not speaks_of(model, mode):
-        measured = ", ".join(each.name for each in model.experiment.modes)
-        found.append(
-            f"the discrepancy '{model.discrepancy.name}' is an error of the {measured} stress and says nothing about "
-            f"the {mode.name} one, which is predicted without it: by the material alone. Fit with one that is an "
-            "energy, such as 'auto', to have it there, too."
+        measured = ", ".join(measured_mode.name for measured_mode in model.experiment.modes)
+        texts.append(
+            f"the discrepancy '{model.discrepancy.name}' is an error of the {measured} stress and does not apply to "
+            f"the {mode.name} stress, which is predicted by the material alone. To predict with a discrepancy, fit "
+            "with one that is an energy, such as 'auto'."
         )
     was_fitted = data is not None and _was_fitted(model.experiment, data)
     if was_fitted:
-        found.append(
-            "the run was fitted to these very measurements: how they are predicted is a check of the fit, and says "
-            "nothing of other data."
+        texts.append(
+            "the run was fitted to these measurements: their prediction checks the fit and says nothing about "
+            "other data."
         )
-    beyond = [(int((~is_calibrated(model.experiment, mode, points)).sum()), len(points), "points")]
+    outside_counts = [(int((~is_calibrated(model.experiment, mode, points)).sum()), len(points), "points")]
     if data is not None:
-        known = is_calibrated(model.experiment, mode, data.stretch)
-        beyond.append((int((~known).sum()), len(data), "measurements"))
-    outside = " and ".join(f"{count} of {whole} {what}" for count, whole, what in beyond if count)
+        is_inside = is_calibrated(model.experiment, mode, data.stretch)
+        outside_counts.append((int((~is_inside).sum()), len(data), "measurements"))
+    outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
-        found.append(f"{outside} lie beyond what was measured: {_calibrated_in_words(posterior, mode)}.")
+        texts.append(f"{outside} lie outside the measured range: {_calibrated_in_words(posterior, mode)}.")
     if data is not None and not was_fitted and not model.tolerances:
-        found.append(
-            "the run allows for no errors of whole tests, so that its bands are those of the specimen that was "
-            "fitted: a test of another one, or another area or gauge length, is not covered by them. Fit with "
-            "--tolerance stress=18% (or what is usual between your specimens) to have that in the bands."
+        texts.append(
+            "the run has no tolerances for errors of whole tests, so its bands hold for the fitted specimen only: they "
+            "do not cover another specimen, area or gauge length. To include these in the bands, fit with "
+            "--tolerance stress=18% (or the spread between your specimens)."
         )
-    return found
+    return texts
 
 
 def _was_fitted(experiment: Experiment, data: Experiment) -> bool:
-    return any(
-        part.mode == data.mode
-        and np.array_equal(part.stretch, data.stretch)
-        and np.array_equal(part.stress, data.stress)
-        for part in experiment.parts
-    )
+    return any(test.has_measurements_of(data) for test in experiment.tests)
 
 
 def _calibrated_in_words(posterior: Posterior, mode: LoadingMode) -> str:
@@ -384,6 +370,5 @@ def _calibrated_in_words(posterior: Posterior, mode: LoadingMode) -> str:
     if ends is not None:
         control, (low, high) = mode.controls[0].name, ends
         return f"in mode {mode.name} the run is calibrated from {low:.4g} to {high:.4g} ({control})"
-    data = posterior.model.experiment
-    first, second = (float(each.max()) for each in invariants(data.mode, data.stretch))
-    return f"the run is calibrated up to I1 - 3 = {first:.3g} and I2 - 3 = {second:.3g}"
+    I1, I2 = largest_invariants(posterior.model.experiment.states)
+    return f"the run is calibrated up to I1 - 3 = {I1:.3g} and I2 - 3 = {I2:.3g}"

@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
-from tissuq.experiments.told_mode import said_mode
+from tissuq.experiments.reading.stated_mode import said_mode
 from tissuq.mechanics import Material
-from tissuq.studies.earlier_run import recipe_of
+from tissuq.studies.earlier_run import modes_of
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.prediction import POINTS, Prediction, predict_run
 
@@ -53,20 +53,19 @@ class PredictionSettings(BaseModel):
         InputError
             When the data say that they are of another mode, or the run is of several modes.
         """
-        told = None if self.data is None else self.data.mode or said_mode(folder / self.data.file)
-        if self.mode and told and loading_mode(self.mode) != loading_mode(told):
+        stated = None if self.data is None else self.data.mode or said_mode(folder / self.data.file)
+        if self.mode and stated and loading_mode(self.mode) != loading_mode(stated):
             assert self.data is not None  # noqa: S101 (they told)
             raise InputError(
-                f"'{self.data.file}' says that it was measured in mode {told}, and mode {self.mode} is to be "
+                f"'{self.data.file}' was measured in mode {stated}, but mode {self.mode} is to be "
                 "predicted: leave --mode out, or give measurements of that mode."
             )
-        own = recipe_of(folder / self.run)
-        modes = sorted({test.mode for test in own.tests} or {own.mode})
-        if not (self.mode or told) and len(modes) > 1:
+        modes = modes_of(folder / self.run, self.discrepancy)
+        if not (self.mode or stated) and len(modes) > 1:
             raise InputError(
-                f"run '{self.run}' is of tests in several modes ({', '.join(modes)}): say with --mode which to predict."
+                f"run '{self.run}' has tests in several modes ({', '.join(modes)}): choose one with --mode."
             )
-        return self.mode or told or modes[0]
+        return self.mode or stated or modes[0]
 
     def points_of(self, mode: str) -> FloatArray | None:
         """Return the points that were asked for, (g,) or (g, 2); None where none were.
@@ -84,16 +83,16 @@ class PredictionSettings(BaseModel):
         if self.stretch is None or self.stretch2 is None:
             names = " and ".join(control.name for control in controls)
             raise InputError(f"mode '{mode}' has two controls, {names}: give both --stretch and --stretch2.")
-        first = stretches(self.stretch, self.points)
-        second = stretches(self.stretch2, len(first))
-        if len(first) == 1 or len(second) == 1:
-            first, second = np.broadcast_arrays(first, second)
-        if len(first) != len(second):
+        axis1 = stretches(self.stretch, self.points)
+        axis2 = stretches(self.stretch2, len(axis1))
+        if len(axis1) == 1 or len(axis2) == 1:
+            axis1, axis2 = np.broadcast_arrays(axis1, axis2)
+        if len(axis1) != len(axis2):
             raise InputError(
-                f"--stretch has {len(first)} values and --stretch2 {len(second)}: give pairs of them, or one number "
+                f"--stretch has {len(axis1)} values and --stretch2 {len(axis2)}: give pairs of them, or one number "
                 "for an axis that is held."
             )
-        return np.column_stack([first, second])
+        return np.column_stack([axis1, axis2])
 
 
 def stretches(text: str, points: int = POINTS) -> FloatArray:
@@ -111,13 +110,13 @@ def stretches(text: str, points: int = POINTS) -> FloatArray:
     """
     is_range = ":" in text
     try:
-        numbers = np.array([float(part) for part in text.split(":" if is_range else ",")])
+        numbers = np.array([float(number) for number in text.split(":" if is_range else ",")])
     except ValueError:
         numbers = np.array([])
     is_good = len(numbers) == 2 and numbers[0] < numbers[1] if is_range else len(numbers) > 0
     if not is_good or not np.isfinite(numbers).all():
         raise InputError(
-            f"'{text}' says no stretches: write two ends as 0.7:2.0, the lesser first, or a list as 1.1,1.2,1.5."
+            f"'{text}' is not a range or list of stretches: write LOW:HIGH as 0.7:2.0, or a list as 1.1,1.2,1.5."
         )
     return np.linspace(numbers[0], numbers[-1], points) if is_range else numbers
 
@@ -128,7 +127,7 @@ def run_prediction(
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
 ) -> Prediction:
-    """Fit a run's measurements again and predict what the settings ask for; relative paths lie in ``folder``.
+    """Predict what the settings ask for from a run; relative paths lie in ``folder``.
 
     Raises
     ------
@@ -139,7 +138,7 @@ def run_prediction(
     mode = settings.mode_in(folder)
     options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}
     options |= {"mode": mode, "stretch": settings.points_of(mode), "data": _data(settings, mode, folder)}
-    step("fitting the run again, and predicting")
+    step("predicting")
     return predict_run(folder / settings.run, settings.discrepancy, law, **options)
 
 

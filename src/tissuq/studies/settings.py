@@ -1,8 +1,10 @@
-"""Settings of a study from a TOML file, checked, with whatever is wrong in sentences."""
+"""Settings of a study from a TOML file, checked, with an explanation of each error."""
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,10 +13,13 @@ from tissuq.errors import InputError
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["RECIPE", "load_settings"]
+__all__ = ["DAMAGE", "RECIPE", "damage_reported", "load_settings"]
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
+
+DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
+"""What readers of damaged files raise: no TOML, JSON or UTF-8, values of other kinds, endless nesting."""
 
 Settings = TypeVar("Settings", bound="BaseModel")
 
@@ -24,22 +29,42 @@ def load_settings(
 ) -> Settings:
     """Return validated settings from a TOML file (or nothing) and the options of the command line, which prevail.
 
-    Of ``rivals`` only one can be set: an option for one of them puts the others in the file out of force.
+    Of ``rivals`` only one can be set: an option for one of them overrides the others in the file.
     """
     from pydantic import ValidationError
 
-    given = _read_toml(config) if config else {}
+    values = _read_toml(config) if config else {}
+    if config is not None and config.name == RECIPE:
+        with damage_reported(config):
+            _check_inside(config, values)
     if any(options.get(name) is not None for name in rivals):
-        given = {name: value for name, value in given.items() if name not in rivals}
+        values = {name: value for name, value in values.items() if name not in rivals}
     for name, value in options.items():
-        both = isinstance(value, dict) and isinstance(given.get(name), dict)
+        is_nested = isinstance(value, dict) and isinstance(values.get(name), dict)
         if value is not None:
-            given[name] = given[name] | value if both else value
+            values[name] = values[name] | value if is_nested else value
     try:
-        return kind.model_validate(given)
+        return kind.model_validate(values)
     except ValidationError as error:
-        place = f"{config}: " if config else ""
-        raise InputError(place + "; ".join(_explanations(error, kind)) + ".") from error
+        prefix = f"{config}: " if config else ""
+        raise InputError(prefix + "; ".join(_explanations(error, kind)) + ".") from error
+
+
+@contextmanager
+def damage_reported(file: Path) -> Iterator[None]:
+    """Turn what a damaged file of a run does to its reader into one message.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or holds something else than the run wrote.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"'{file}' cannot be read: {error.strerror or error}.") from error
+    except DAMAGE as error:
+        raise InputError(f"'{file}' is damaged ({type(error).__name__}). Make the run again.") from error
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -49,29 +74,49 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"there is no configuration file '{path}'.") from error
     except OSError as error:
         raise InputError(f"configuration file '{path}' cannot be read: {error.strerror}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"configuration file '{path}' is not TOML: {error}.") from error
 
 
+def _check_inside(recipe: Path, given: Any) -> None:
+    """Refuse the recipe of a run that names files outside of the run's folder: a run holds copies of them."""
+    folder = recipe.parent.resolve()
+    for name, value in given.items() if isinstance(given, dict) else ():
+        for each in value if isinstance(value, list) else [value]:
+            _check_inside(recipe, each)
+            if name in ("file", "files") and isinstance(each, str) and not _is_inside(folder / each, folder):
+                raise InputError(
+                    f"{recipe} names the file '{each}', which does not lie in the folder of that run. Give the file "
+                    f"itself, or call the configuration another name than {RECIPE} if it is your own."
+                )
+
+
+def _is_inside(file: Path, folder: Path) -> bool:
+    try:
+        return file.resolve().is_relative_to(folder)
+    except (OSError, ValueError, RuntimeError):  # such as a NUL or a circle of links
+        return False
+
+
 def _explanations(error: ValidationError, kind: type[BaseModel]) -> list[str]:
-    """Return one sentence for each thing that is wrong; all unknown settings together are one."""
+    """Return one explanation for each error; all unknown settings share one."""
     items = error.errors()
     unknown = [_place(item) for item in items if item["type"] == "extra_forbidden"]
-    sentences = [_explain(item) for item in items if item["type"] != "extra_forbidden"]
+    explanations = [_explain(item) for item in items if item["type"] != "extra_forbidden"]
     if unknown:
         settings = ", ".join(kind.model_fields)
-        sentences.append(f"there is no setting {', '.join(map(repr, unknown))}; the settings are {settings}")
-    return sentences
+        explanations.append(f"there is no setting {', '.join(map(repr, unknown))}; the settings are {settings}")
+    return explanations
 
 
 def _explain(item: Any) -> str:
-    place, message = _place(item), str(item["msg"]).removeprefix("Value error, ").rstrip(".")
+    location, message = _place(item), str(item["msg"]).removeprefix("Value error, ").rstrip(".")
     if item["type"] == "missing":
-        return f"setting '{place}' is missing"
+        return f"setting '{location}' is missing"
     is_told = item["type"] == "value_error" or isinstance(item["input"], dict)
-    found = "" if is_told else f" (it is {item['input']!r})"
-    return f"{place}: {message}{found}" if place else f"{message}{found}"
+    value = "" if is_told else f" (it is {item['input']!r})"
+    return f"{location}: {message}{value}" if location else f"{message}{value}"
 
 
 def _place(item: Any) -> str:
-    return ".".join(str(part) for part in item["loc"])
+    return ".".join(str(key) for key in item["loc"])

@@ -7,28 +7,33 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from tissuq.assessment import Assessment, design_warnings
-from tissuq.discrepancy import Auto, ConditionedProcess, EnergyDiscrepancy, discrepancies, discrepancy_named, separated
+from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
-from tissuq.experiments.doubts import doubts
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading import Reading
-from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.fitting import fit
+from tissuq.experiments.reading.data_warnings import doubts
+from tissuq.experiments.reading.experiment_file import Reading
+from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
-from tissuq.mechanics.joint import joined
-from tissuq.noise import Noise, noise_named
-from tissuq.parameters import Parameter
-from tissuq.posterior import Posterior
-from tissuq.priors import Prior, prior_from
-from tissuq.studies.fitted import FittedSettings
+from tissuq.model.discrepancy import (
+    Auto,
+    ConditionedProcess,
+    EnergyDiscrepancy,
+    discrepancies,
+    discrepancy_named,
+)
+from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.noise import Noise, noise_named
+from tissuq.parameters.parameter import Parameter
+from tissuq.parameters.priors import Prior, prior_from
+from tissuq.posterior.fitting import fit
+from tissuq.posterior.posterior import Posterior
+from tissuq.posterior.warnings import PRIOR_BOUND_REACHED
 from tissuq.studies.held_out import held_out_tests
-from tissuq.studies.measured_file import MeasuredFile, MeasuredTest, ReadingSettings
-from tissuq.tolerances import Tolerances
+from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "fitted", "run_specimen"]
 
@@ -44,7 +49,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
 
     file: str = ""
     tests: tuple[MeasuredTest, ...] = ()
-    tolerances: dict[Literal["stress", "length", "slack", "zero", "stretch"], float] | None = None
+    tolerances: dict[str, float] | None = None
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
     held_out: bool = False
@@ -52,10 +57,19 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
 
     @field_validator("discrepancies")
     @classmethod
-    def _all_or_named(cls, given: tuple[str, ...]) -> tuple[str, ...]:
-        if ALL in given and given != (ALL,):
-            raise ValueError(f"'{ALL}' stands alone; leave it out, or leave out the names beside it")
-        return given
+    def _all_or_named(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if ALL in names and names != (ALL,):
+            raise ValueError(f"'{ALL}' cannot be combined with other names; give '{ALL}', or names")
+        return names
+
+    @field_validator("tolerances")
+    @classmethod
+    def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
+        try:
+            Tolerances(**sizes or {})
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return sizes
 
     @model_validator(mode="after")
     def _measured(self) -> Self:
@@ -63,13 +77,13 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
             raise ValueError("give one file, or several tests with a file each")
         reading = set(ReadingSettings.model_fields)
         if self.tests and self.model_fields_set & reading:
-            where = ", ".join(sorted(self.model_fields_set & reading))
-            raise ValueError(f"how files are read is said in each of the tests, not beside them ({where})")
-        told = [test.noise_sd is not None for test in self.tests]
-        if any(told) and (not all(told) or self.noise or self.noise_sd != "unknown"):
-            raise ValueError("give noise_sd in each of the tests, or once for all")
-        if self.held_out and (len(self.tests) < 2 or any(told)):
-            raise ValueError("held_out needs two tests or more, and one noise_sd for all of them or an unknown one")
+            misplaced = ", ".join(sorted(self.model_fields_set & reading))
+            raise ValueError(f"reading options belong in each of the tests, not beside them ({misplaced})")
+        has_noise_sd = [test.noise_sd is not None for test in self.tests]
+        if any(has_noise_sd) and (not all(has_noise_sd) or self.noise or self.noise_sd != "unknown"):
+            raise ValueError("give noise_sd for each of the tests, or once for all of them")
+        if self.held_out and (len(self.tests) < 2 or any(has_noise_sd)):
+            raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
         return self
 
     def readings(self, folder: Path = Path()) -> list[Reading]:
@@ -78,26 +92,27 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements, of all tests together."""
-        return joined([reading.experiment for reading in self.readings(folder)])
+        return Experiment.of([reading.experiment for reading in self.readings(folder)])
 
     def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
         """Return the tolerances, those of stresses converted from a unit to MPa; None for the usual ones."""
         if self.tolerances is None:
             return None
-        scale = {"zero": unit.to_mpa}
-        return Tolerances(**{name: value * scale.get(name, 1.0) for name, value in self.tolerances.items()})
+        is_stress = {error.name for error, _ in Tolerances(**self.tolerances) if error.is_stress}
+        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in self.tolerances}
+        return Tolerances(**{name: size * scale[name] for name, size in self.tolerances.items()})
 
     def noise_in(self, unit: StressUnit) -> Noise:
         """Return the noise, known standard deviations converted from a unit to MPa."""
-        every = [test.noise_sd for test in self.tests if test.noise_sd is not None]
-        if every:
-            return noise_named([each * unit.to_mpa for each in every])
+        values = [test.noise_sd for test in self.tests if test.noise_sd is not None]
+        if values:
+            return noise_named([value * unit.to_mpa for value in values])
         return super().noise_in(unit)
 
 
 @dataclass(frozen=True)
 class SpecimenStudy:
-    """What was found: a posterior for each discrepancy, why some do not apply, and what those that do, do.
+    """Results of a fit: a posterior and an assessment for each discrepancy, and why others do not apply.
 
     Sampled posteriors are not assessed, which would sample them again.
     """
@@ -108,10 +123,10 @@ class SpecimenStudy:
     seconds: dict[str, float]
     skipped: dict[str, str]
     assessments: dict[str, Assessment]
-    doubts: tuple[str, ...] = ()
-    """What is strange about the measurements."""
+    data_warnings: tuple[str, ...] = ()
+    """What is implausible in the measurements."""
     held_out: tuple[dict[str, Any], ...] = ()
-    """How every test is predicted from the others, where that was asked for."""
+    """How each test is predicted from the others, if requested."""
 
     @property
     def unit(self) -> StressUnit:
@@ -120,13 +135,13 @@ class SpecimenStudy:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader must know of the data and the fits, each once with the discrepancies that it concerns."""
+        """Warnings about data and fits, each once with the discrepancies that it concerns."""
         concerned: dict[str, list[str]] = {}
         for name, posterior in self.posteriors.items():
             for text in posterior.warnings:
                 concerned.setdefault(text, []).append(name)
-        found = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
-        return [*self.doubts, *found, *design_warnings(self.experiment)]
+        texts = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        return [*self.data_warnings, *texts, *measurement_warnings(self.experiment)]
 
     @property
     def headline(self) -> str:
@@ -134,8 +149,8 @@ class SpecimenStudy:
         return next(iter(self.posteriors.values())).model.headline
 
     def is_cut_by_prior(self, name: str) -> bool:
-        """Whether a bound of a prior, not the data, decides part of a fit."""
-        return any("cut by a bound" in text for text in self.posteriors[name].warnings)
+        """Whether a bound of a prior, not the data, determines part of a fit."""
+        return any(PRIOR_BOUND_REACHED in text for text in self.posteriors[name].warnings)
 
     @property
     def not_converged(self) -> list[str]:
@@ -160,7 +175,7 @@ def run_specimen(
         is skipped with the reason when all were asked for.
     """
     readings = settings.readings(folder)
-    experiment = joined([reading.experiment for reading in readings])
+    experiment = Experiment.of([reading.experiment for reading in readings])
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
     is_all = settings.discrepancies == (ALL,)
@@ -171,9 +186,11 @@ def run_specimen(
     for name in names:
         step(name)
         start = perf_counter()
-        own = {p.symbol for p in symbols[name]}
-        if is_all and len(experiment) < len(own):
-            skipped[name] = f"{len(experiment)} measurements are too few for its parameters {', '.join(sorted(own))}."
+        parameter_names = {p.symbol for p in symbols[name]}
+        if is_all and experiment.size < len(parameter_names):
+            skipped[name] = (
+                f"{experiment.size} measurements are too few for the parameters {', '.join(sorted(parameter_names))}."
+            )
             continue
         try:
             options = _options(settings, material, priors, symbols[name], unit)
@@ -187,23 +204,31 @@ def run_specimen(
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
     step("assessing")
-    assessments = {name: each.assess() for name, each in posteriors.items() if name != "none" and not each.diagnostics}
+    assessments = {
+        name: posterior.assess()
+        for name, posterior in posteriors.items()
+        if name != "none" and not posterior.diagnostics
+    }
     held_out: list[dict[str, Any]] = []
     for name in posteriors if settings.held_out else ():
-        step(f"{name}: each test from the others")
-        if separated(discrepancy_named(name), material, experiment).parameters != discrepancy_named(name).parameters:
-            skipped[f"{name}, each test from the others"] = "it is another error of the stress in each test."
+        step(f"{name}: each test predicted from the others")
+        if discrepancy_named(name).adapted_to(material, experiment).parameters != discrepancy_named(name).parameters:
+            skipped[f"{name}, each test predicted from the others"] = (
+                "this discrepancy is a separate error of the stress in each test."
+            )
             continue
         options = _options(settings, material, priors, symbols[name], unit)
         options["tolerances"] = posteriors[name].model.tolerances
         try:
-            found = held_out_tests(experiment.parts, discrepancy=name, **options).to_dict("records")
+            predictions = held_out_tests(experiment.tests, discrepancy=name, **options).to_dict("records")
         except TissuqError as error:
-            skipped[f"{name}, each test from the others"] = str(error)
+            skipped[f"{name}, each test predicted from the others"] = str(error)
             continue
-        held_out += [{"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in found]
-    parts = settings, experiment, posteriors, seconds, skipped, assessments, _doubts(readings)
-    return SpecimenStudy(*parts, tuple(held_out))
+        held_out += [
+            {"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in predictions
+        ]
+    results = settings, experiment, posteriors, seconds, skipped, assessments, _data_warnings(readings)
+    return SpecimenStudy(*results, tuple(held_out))
 
 
 def fitted(
@@ -218,10 +243,12 @@ def fitted(
     """
     experiment = settings.experiment(folder)
     material, unit = law or material_named(settings.material), stress_unit(experiment.stress_unit)
-    own = _parameters(settings, material, discrepancy, experiment)
-    chosen = {symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in own]}
-    priors = _priors(settings.model_copy(update={"priors": chosen}), {discrepancy: own}, unit)
-    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, own, unit))
+    parameters = _parameters(settings, material, discrepancy, experiment)
+    applicable = {
+        symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in parameters]
+    }
+    priors = _priors(settings.model_copy(update={"priors": applicable}), {discrepancy: parameters}, unit)
+    return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
 
 
 def _known(value: Any) -> Any:
@@ -237,11 +264,11 @@ def _options(
     unit: StressUnit,
 ) -> dict[str, Any]:
     """Return the options of a fit but the discrepancy."""
-    own = {p.symbol for p in parameters}
+    parameter_names = {p.symbol for p in parameters}
     return {
         "material": material,
         "noise": settings.noise_in(unit),
-        "priors": {symbol: prior for symbol, prior in priors.items() if symbol in own},
+        "priors": {symbol: prior for symbol, prior in priors.items() if symbol in parameter_names},
         "tolerances": settings.tolerances_in(unit),
         "method": settings.method,
         "stable_in": settings.stable_in,
@@ -249,36 +276,38 @@ def _options(
     }
 
 
-def _doubts(readings: Sequence[Reading]) -> tuple[str, ...]:
-    """Return what is strange about the files, each with the name of its test where there are several."""
-    every = [(reading.experiment.name, text) for reading in readings for text in doubts(reading)]
-    return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in every)
+def _data_warnings(readings: Sequence[Reading]) -> tuple[str, ...]:
+    """Return the warnings about the files, each with the name of its test if there are several."""
+    messages = [(reading.experiment.name, text) for reading in readings for text in doubts(reading)]
+    return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in messages)
 
 
 def _every() -> list[str]:
-    others = EnergyDiscrepancy, ConditionedProcess
-    return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, others)]
+    excluded = EnergyDiscrepancy, ConditionedProcess
+    return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, excluded)]
 
 
 def _parameters(
     settings: SpecimenSettings, material: Material, discrepancy: str, experiment: Experiment
 ) -> tuple[Parameter, ...]:
     noise = settings.noise_in(stress_unit("MPa")).parameters
-    own = discrepancy_named(discrepancy)
+    error_model = discrepancy_named(discrepancy)
     with suppress(ModelError):  # which the fit itself raises
-        own = separated(own, material, experiment)
-    return (*material.parameters, *own.parameters, *noise)
+        error_model = error_model.adapted_to(material, experiment)
+    return (*material.parameters, *error_model.parameters, *noise)
 
 
 def _priors(
     settings: SpecimenSettings, parameters: Mapping[str, tuple[Parameter, ...]], unit: StressUnit
 ) -> Mapping[str, Prior]:
     """Return the chosen priors in MPa and stretch."""
-    known = {p.symbol: p for own in parameters.values() for p in own}
-    unknown = sorted(set(settings.priors) - set(known))
+    parameters_by_name = {p.symbol: p for group in parameters.values() for p in group}
+    unknown = sorted(set(settings.priors) - set(parameters_by_name))
     if unknown:
-        raise InputError(f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(known)}.")
+        raise InputError(
+            f"there is a prior for '{unknown[0]}', but the parameters of this fit are {', '.join(parameters_by_name)}."
+        )
     return {
-        symbol: prior_from(given).scaled(unit.to_mpa if known[symbol].unit else 1.0)
-        for symbol, given in settings.priors.items()
+        symbol: prior_from(prior).scaled(unit.to_mpa if parameters_by_name[symbol].unit else 1.0)
+        for symbol, prior in settings.priors.items()
     }

@@ -5,68 +5,42 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from multiprocessing import get_context
+from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from tissuq.errors import InputError
+from tissuq.studies.workers import WorkerProcesses
 
-__all__ = ["RESULTS", "Step", "open_pool", "run_tasks", "silent"]
+__all__ = ["RESULTS", "Step", "run_tasks", "silent"]
 
 RESULTS = "tasks.jsonl"
 """The file of the results: a line a task."""
+MAX_LOSSES = 3
+"""Times in a row that worker processes may be lost with nothing done in between."""
 
 Step = Callable[[str, bool], None]
-"""Told of every task that is done: its label, and whether it was done now or before."""
+"""Called after each task: its label, and whether it was done now or earlier."""
 
 
 def silent(label: str, is_new: bool) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 class Task(Protocol):
-    """What is done by itself."""
+    """One unit of work."""
 
     @property
     def key(self) -> str:
-        """What tells it from every other task."""
+        """Identifies the task."""
 
     @property
     def label(self) -> str:
-        """What is shown when it is done."""
+        """Shown when the task is done."""
 
 
 Kind = TypeVar("Kind", bound=Task)
-
-
-@contextmanager
-def open_pool(workers: int = 1, scheduler: str | None = None) -> Iterator[Executor | None]:
-    """Give the workers of a campaign: processes on this machine, or those of a Dask scheduler; None for no other.
-
-    Raises
-    ------
-    InputError
-        When the scheduler cannot be reached.
-    """
-    if scheduler is None:
-        if workers == 1:
-            yield None
-            return
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            yield pool
-        return
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InputError("--scheduler needs Dask: install tissuq with its extra 'cluster'.") from error
-    try:
-        client = Client(scheduler, timeout="5s")
-    except (OSError, ValueError) as error:
-        raise InputError(f"no Dask scheduler answers at '{scheduler}' ({error}).") from error
-    with client, client.get_executor(retries=5) as pool:
-        yield pool
 
 
 def run_tasks(
@@ -90,7 +64,7 @@ def run_tasks(
     folder : Path
         Exists; holds the results so far, if any.
     pool : Executor, optional
-        From `open_pool`.
+        From `tissuq.studies.workers.open_pool`.
     step : callable
         Told of every task that is done: its label, and whether it was done now or before.
     """
@@ -100,40 +74,76 @@ def run_tasks(
         if task.key in done:
             step(task.label, False)
     with path.open("a", encoding="utf-8") as file:
-        for task, found in _carried_out([task for task in tasks if task.key not in done], carry_out, pool):
-            done[task.key] = {"key": task.key, **found}
+        for task, result in _carried_out([task for task in tasks if task.key not in done], carry_out, pool):
+            done[task.key] = {"key": task.key, **result}
             file.write(json.dumps(done[task.key]) + "\n")
             file.flush()
             os.fsync(file.fileno())
             step(task.label, True)
     results = [done[task.key] for task in tasks]
     scratch = path.with_suffix(".new")
-    scratch.write_text("".join(json.dumps(each) + "\n" for each in results), encoding="utf-8")
+    scratch.write_text("".join(json.dumps(result_row) + "\n" for result_row in results), encoding="utf-8")
     scratch.replace(path)
     return results
 
 
 def _read(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the results on disk by their keys; a line that was cut short by a kill is taken off the file."""
+    """Return the results on disk by their keys; a line that was cut short by a kill is taken off the file.
+
+    A line that is damaged in another way is passed over, so that its task is carried out again.
+    """
     if not path.exists():
         return {}
     content = path.read_bytes()
-    whole = content[: content.rfind(b"\n") + 1]
-    if len(whole) < len(content):
+    complete = content[: content.rfind(b"\n") + 1]
+    if len(complete) < len(content):
         with path.open("r+b") as file:
-            file.truncate(len(whole))
-    return {found["key"]: found for found in map(json.loads, whole.decode("utf-8").splitlines())}
+            file.truncate(len(complete))
+    results = (_parsed(line) for line in complete.splitlines())
+    return {result["key"]: result for result in results if result is not None}
+
+
+def _parsed(line: bytes) -> dict[str, Any] | None:
+    """Return the result in a line, None where it is damaged."""
+    try:
+        result = json.loads(line)
+    except ValueError:
+        return None
+    return result if isinstance(result, dict) and isinstance(result.get("key"), str) else None
 
 
 def _carried_out(
     tasks: Sequence[Kind], carry_out: Callable[[Kind], dict[str, Any]], pool: Executor | None
 ) -> Iterator[tuple[Kind, dict[str, Any]]]:
-    """Yield tasks and their results as they come."""
+    """Yield tasks and their results as they come; processes that are killed are replaced."""
     if pool is None:
         yield from ((task, carry_out(task)) for task in tasks)
         return
-    futures = {pool.submit(carry_out, task): task for task in tasks}
+    remaining = {task.key: task for task in tasks}
+    losses = 0
+    while remaining:
+        try:
+            for task, result in _submitted(list(remaining.values()), carry_out, pool):
+                losses = 0
+                del remaining[task.key]
+                yield task, result
+        except BrokenProcessPool as error:
+            losses += 1
+            if losses == MAX_LOSSES or not isinstance(pool, WorkerProcesses):
+                raise InputError(
+                    f"worker processes were killed {losses} times in a row, perhaps for want of memory. What is done "
+                    "is kept: the same command goes on from there; give it fewer --workers."
+                ) from error
+            pool.replace()
+
+
+def _submitted(
+    tasks: Sequence[Kind], carry_out: Callable[[Kind], dict[str, Any]], pool: Executor
+) -> Iterator[tuple[Kind, dict[str, Any]]]:
+    """Yield tasks and their results as they come from a pool."""
+    futures: dict[Future[dict[str, Any]], Kind] = {}
     try:
+        futures |= {pool.submit(carry_out, task): task for task in tasks}
         yield from ((futures[future], future.result()) for future in as_completed(futures))
     finally:
         for future in futures:

@@ -1,8 +1,9 @@
 """Loading modes: how a specimen is deformed, as a path of deformations along what each measured stress works on."""
 
 from tissuq.experiments.modes.biaxial import Biaxial, ConstrainedUniaxial, ThinTube
-from tissuq.experiments.modes.mode import Control, Deformation, LoadingMode, Path, loading_mode, loading_modes
+from tissuq.experiments.modes.mode import Control, LoadingMode, loading_mode, loading_modes
 from tissuq.experiments.modes.one_stretch import Equibiaxial, Planar, Uniaxial
+from tissuq.experiments.modes.path import Deformation, Path, States
 from tissuq.experiments.modes.shear import SimpleShear, SimpleShearNormal
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "Planar",
     "SimpleShear",
     "SimpleShearNormal",
+    "States",
     "ThinTube",
     "Uniaxial",
     "loading_mode",

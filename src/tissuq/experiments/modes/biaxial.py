@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.experiments.modes.mode import Control, Deformation, LoadingMode, Path
+from tissuq.experiments.modes.mode import Control, LoadingMode
 from tissuq.experiments.modes.one_stretch import Planar
+from tissuq.experiments.modes.path import Deformation, Path
 
 __all__ = ["Biaxial", "ConstrainedUniaxial", "ThinTube"]
 
@@ -53,11 +54,11 @@ class Biaxial(LoadingMode):
     stresses = ("engineering stress of axis 1", "engineering stress of axis 2")
     machine_axes: ClassVar[tuple[str, ...]] = ("x", "y")
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        return _sheet(stretch[..., 0], stretch[..., 1]).stretches
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return _sheet(point[..., 0], point[..., 1]).stretches
 
     @property
-    def channels(self) -> tuple[Path, ...]:
+    def paths(self) -> tuple[Path, ...]:
         return _Pulled(0), _Pulled(1)
 
 
@@ -114,9 +115,9 @@ class ConstrainedUniaxial(LoadingMode):
     description = "tension with one lateral axis held, with the stresses of both axes"
     stresses = ("engineering stress of the pulled axis", "engineering stress of the held axis")
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        return Planar().principal_stretches(stretch)
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return Planar().principal_stretches(point)
 
     @property
-    def channels(self) -> tuple[Path, ...]:
-        return Planar(), _Held()
+    def paths(self) -> tuple[Path, ...]:
+        return Planar().path, _Held()

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
+from tissuq.experiments.modes.path import Deformation, Path, States
 from tissuq.registry import find, variants
 
-__all__ = ["SHEAR", "STRETCH", "Control", "Deformation", "LoadingMode", "Path", "loading_mode", "loading_modes"]
+__all__ = ["SHEAR", "STRETCH", "Control", "ControlPath", "LoadingMode", "loading_mode", "loading_modes"]
 
 
 @dataclass(frozen=True)
@@ -30,86 +31,58 @@ SHEAR = Control("amount of shear", reference=0.0, above=-inf)
 
 
 @dataclass(frozen=True)
-class Deformation:
-    """An isochoric deformation in the axes of the test: what a strain energy is a function of.
+class LoadingMode(ABC):
+    """Isochoric deformations from the identity that a test sets, and a path for each stress that it measures.
 
-    Attributes
-    ----------
-    stretches : tuple of three arrays
-        The principal stretches, that of the thickness last where it is free of stress.
-    plane : tuple of three arrays
-        C11, C22 and C12 of C = F'F in the plane of the test, the first loaded axis first: what fibres there feel.
-        None where the test leaves it to the material, so that only a symmetric one is known to deform like this.
+    A new mode is one subclass: it names itself and says which principal stretches belong to a point. Its engineering
+    stress is then the derivative of the strain energy by its control. A mode whose principal axes are not those of the
+    test overrides `deformation`, too, as does one whose deformation only an isotropic material has. One with other
+    controls or with several stresses names them; where a stress is not the derivative by the control, or several axes
+    carry it, the mode overrides `paths`.
     """
 
-    stretches: tuple[Any, Any, Any]
-    plane: tuple[Any, Any, Any]
-
-    @classmethod
-    def along_axes(cls, stretches: tuple[Any, Any, Any]) -> Deformation:
-        """Return the deformation whose principal axes are those of the test."""
-        first, second, _ = stretches
-        return cls(stretches, (first**2, second**2, 0.0))
-
-
-class Path(ABC):
-    """Deformations at some points, and how they change with what the measured stress does work on.
-
-    Points are the values of a mode's controls: (n,) where there is one, (n, c) where there are c. `moved` also takes a
-    single point, of shape () or (c,), because JAX maps over them.
-    """
-
-    loaded_axes: ClassVar[int] = 1
-    """Number of axes that carry the measured stress (work per step = loaded_axes * stress)."""
-
-    @abstractmethod
-    def moved(self, point: Any, step: Any) -> Deformation:
-        """Return the deformation a step further than at a point: plain arithmetic, differentiable."""
-
-    def abscissa(self, points: Any) -> Any:
-        """Return what the measured stress is drawn against, one number for each point."""
-        return points
-
-    def cauchy_ratio(self, points: Any) -> Any:
-        """Return the Cauchy stress over the engineering stress: the stretch along the axis of the stress."""
-        return self.abscissa(points)
-
-
-@dataclass(frozen=True)
-class LoadingMode(Path):
-    """A path of isochoric deformations from the identity, or one for each of several measured stresses.
-
-    A new mode is one subclass: it names itself and says which deformation belongs to a stretch. The
-    engineering stress is the derivative of the strain energy along the path, shared by the loaded axes. A mode with
-    other controls, or with several stresses, names them and overrides `moved` or `channels`; one whose deformation only
-    an isotropic material has overrides `moved` to say so.
-    """
-
+    entry_point_group: ClassVar[str] = "tissuq.modes"
     name: ClassVar[str]
     description: ClassVar[str]
     controls: ClassVar[tuple[Control, ...]] = (STRETCH,)
     """What is set, in the order of the last axis of points."""
     stresses: ClassVar[tuple[str, ...]] = ("engineering stress",)
-    """What is measured, in the order of `channels`."""
+    """What is measured, in the order of `paths`."""
     machine_axes: ClassVar[tuple[str, ...]] = ()
     """What the axes of the stresses are called in the file of a biaxial machine, where the mode is of such a test."""
 
     @abstractmethod
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
         """Return the principal stretches at a point: plain arithmetic, differentiable."""
 
-    def moved(self, point: Any, step: Any) -> Deformation:
+    def deformation(self, point: Any) -> Deformation:
+        """Return the deformation at a point."""
+        return Deformation.along_axes(self.principal_stretches(point))
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """One path for each measured stress, along what that stress does work on; here its one control."""
+        return (ControlPath(self),)
+
+    @property
+    def path(self) -> Path:
+        """The path of the only stress.
+
+        Raises
+        ------
+        ModelError
+            When there are several.
+        """
         if len(self.stresses) > 1:
             raise ModelError(
                 f"loading mode '{self.name}' measures {' and '.join(self.stresses)}, each along a path of its own: "
-                "take one of its channels."
+                "take one of its paths."
             )
-        return Deformation.along_axes(self.principal_stretches(point + step))
+        return self.paths[0]
 
-    @property
-    def channels(self) -> tuple[Path, ...]:
-        """One path for each measured stress, along what that stress does work on; here there is one stress."""
-        return (self,)
+    def at(self, points: Any) -> States:
+        """Return the states at points of the mode, on the path of its only stress."""
+        return self.path.at(points)
 
     @property
     def is_curve(self) -> bool:
@@ -124,8 +97,19 @@ class LoadingMode(Path):
     def excursion(self, change: ArrayLike) -> NDArray[np.float64]:
         """Return points on a line through the reference: the first control changes so much, every further one less."""
         rates = 1 / np.arange(1.0, 1 + len(self.controls))
-        points = np.array([each.reference for each in self.controls]) + np.multiply.outer(change, rates)
+        points = np.array([control.reference for control in self.controls]) + np.multiply.outer(change, rates)
         return np.asarray(points if len(self.controls) > 1 else points[..., 0])
+
+
+@dataclass(frozen=True)
+class ControlPath(Path):
+    """The deformations of a mode with one control, whose stress does work on that."""
+
+    mode: LoadingMode
+    loaded_axes: int = 1
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        return self.mode.deformation(point + step)
 
 
 def loading_modes() -> dict[str, type[LoadingMode]]:

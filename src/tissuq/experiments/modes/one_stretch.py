@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from tissuq.experiments.modes.mode import Deformation, LoadingMode
+from tissuq.experiments.modes.mode import ControlPath, LoadingMode
+from tissuq.experiments.modes.path import Deformation, Path
 
 __all__ = ["Equibiaxial", "Planar", "Uniaxial"]
 
@@ -18,12 +19,12 @@ class Uniaxial(LoadingMode):
     name = "uniaxial"
     description = "tension or compression along one axis"
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        lateral = stretch**-0.5
-        return stretch, lateral, lateral
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        lateral = point**-0.5
+        return point, lateral, lateral
 
-    def moved(self, point: Any, step: Any) -> Deformation:
-        stretches = self.principal_stretches(point + step)
+    def deformation(self, point: Any) -> Deformation:
+        stretches = self.principal_stretches(point)
         return Deformation(stretches, (stretches[0] ** 2, None, None))
 
 
@@ -35,13 +36,16 @@ class Equibiaxial(LoadingMode):
 
     name = "equibiaxial"
     description = "equal tension along two axes"
-    loaded_axes = 2
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        return stretch, stretch, stretch**-2
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return point, point, point**-2
 
-    def moved(self, point: Any, step: Any) -> Deformation:
-        return Deformation(self.principal_stretches(point + step), (None, None, None))
+    def deformation(self, point: Any) -> Deformation:
+        return Deformation(self.principal_stretches(point), (None, None, None))
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return (ControlPath(self, loaded_axes=2),)
 
 
 class Planar(LoadingMode):
@@ -50,5 +54,5 @@ class Planar(LoadingMode):
     name = "planar"
     description = "planar tension (pure shear), one lateral axis held"
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        return stretch, 1.0, 1.0 / stretch
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return point, 1.0, 1.0 / point

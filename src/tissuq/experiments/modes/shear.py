@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tissuq.experiments.modes.mode import SHEAR, Deformation, LoadingMode, Path
+from tissuq.experiments.modes.mode import SHEAR, ControlPath, LoadingMode
+from tissuq.experiments.modes.path import Deformation, Path
 
 __all__ = ["SimpleShear", "SimpleShearNormal"]
 
@@ -33,12 +34,19 @@ class SimpleShear(LoadingMode):
     controls = (SHEAR,)
     stresses = ("shear stress",)
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        return self.moved(stretch, 0.0).stretches
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return self.deformation(point).stretches
 
-    def moved(self, point: Any, step: Any) -> Deformation:
-        shear = point + step
-        return _sheared(shear, 1.0, shear)
+    def deformation(self, point: Any) -> Deformation:
+        return _sheared(point, 1.0, point)
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return (_Shear(self),)
+
+
+class _Shear(ControlPath):
+    """A step of the shear, whose stress is engineering and Cauchy stress alike."""
 
     def cauchy_ratio(self, points: Any) -> Any:
         return np.ones_like(points)
@@ -68,9 +76,9 @@ class SimpleShearNormal(LoadingMode):
     controls = (SHEAR,)
     stresses = ("shear stress", "normal stress")
 
-    def principal_stretches(self, stretch: Any) -> tuple[Any, Any, Any]:
-        return SimpleShear().principal_stretches(stretch)
+    def principal_stretches(self, point: Any) -> tuple[Any, Any, Any]:
+        return SimpleShear().principal_stretches(point)
 
     @property
-    def channels(self) -> tuple[Path, ...]:
-        return SimpleShear(), _Normal()
+    def paths(self) -> tuple[Path, ...]:
+        return _Shear(SimpleShear()), _Normal()

@@ -1,0 +1,60 @@
+"""The public names, and the modules they are imported from when they are first used."""
+
+from tissuq import finite_elements as finite_elements
+from tissuq.assessment import Assessment as Assessment, Average as Average, average as average, compare as compare
+from tissuq.emulation import Calibration as Calibration, Emulator as Emulator, UmbridgeForward as UmbridgeForward
+from tissuq.errors import (
+    ConvergenceError as ConvergenceError,
+    InputError as InputError,
+    ModelError as ModelError,
+    TissuqError as TissuqError,
+)
+from tissuq.experiments import datasets as datasets
+from tissuq.experiments.experiment import Experiment as Experiment
+from tissuq.experiments.reading.inspection import Inspection as Inspection, inspect as inspect
+from tissuq.experiments.modes import LoadingMode as LoadingMode, loading_modes as loading_modes
+from tissuq.experiments.reading.experiment_file import read_experiment as read_experiment
+from tissuq.mechanics import (
+    FibreMaterial as FibreMaterial,
+    FunctionLaw as FunctionLaw,
+    Material as Material,
+    StretchMaterial as StretchMaterial,
+    engineering_stress as engineering_stress,
+    initial_shear_modulus as initial_shear_modulus,
+    load_material as load_material,
+    simulate as simulate,
+)
+from tissuq.mechanics.material import materials as materials
+from tissuq.model.discrepancy import Discrepancy as Discrepancy, discrepancies as discrepancies
+from tissuq.model.measurement_errors import MeasurementError as MeasurementError, Tolerances as Tolerances
+from tissuq.model.noise import (
+    KnownNoise as KnownNoise,
+    Noise as Noise,
+    ProportionalNoise as ProportionalNoise,
+    RepeatNoise as RepeatNoise,
+    UnknownNoise as UnknownNoise,
+)
+from tissuq.next_test import Candidate as Candidate
+from tissuq.parameters.parameter import Parameter as Parameter
+from tissuq.parameters.priors import (
+    Exponential as Exponential,
+    Flat as Flat,
+    HalfCauchy as HalfCauchy,
+    HalfNormal as HalfNormal,
+    LogNormal as LogNormal,
+    LogUniform as LogUniform,
+    Normal as Normal,
+    Prior as Prior,
+    Uniform as Uniform,
+)
+from tissuq.population import Population as Population, fit_population as fit_population
+from tissuq.posterior.ensemble import EnergyDraw as EnergyDraw, Ensemble as Ensemble
+from tissuq.posterior.fitting import fit as fit, fit_many as fit_many
+from tissuq.posterior.posterior import Posterior as Posterior
+from tissuq.report.cards import write_cards as write_cards
+from tissuq.studies.calibrate import calibrate as calibrate
+from tissuq.studies.earlier_run import load as load, load_run as load_run
+from tissuq.studies.held_out import held_out_tests as held_out_tests
+from tissuq.studies.prediction import Prediction as Prediction, predict_run as predict_run
+
+__version__: str

@@ -1,0 +1,69 @@
+"""Warnings about the measurements of a test, with advice for the next ones, and the factors between several tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.inference.solution import Solution
+from tissuq.prediction.moments import mean_curve
+
+__all__ = ["factors_of_tests", "measurement_warnings"]
+
+MIN_MEASUREMENTS = 12
+"""Smallest number of measurements that describe how the stress deviates from the material."""
+NEAR_STRAIN_SHARE = 0.15
+"""Share of the largest strain within which a measurement is near the reference."""
+
+
+def measurement_warnings(experiment: Experiment) -> Iterator[str]:
+    """Yield a warning for each gap in the measured range of a test, with advice what to measure next."""
+    strain = np.concatenate([curve.abscissa - curve.mode.controls[0].reference for curve in experiment.curves])
+    reach = float(np.abs(strain).max())
+    has_directions = len(experiment.modes) == 1 and experiment.modes[0].controls[0] != SHEAR
+    if has_directions and not ((strain > 1e-9).any() and (strain < -1e-9).any()):
+        measured, missing = ("tension", "compression") if (strain > 0).any() else ("compression", "tension")
+        yield (
+            f"there is {measured} only, which leaves the initial modulus about twice as uncertain as both directions: "
+            f"measure in {missing}, too, if the specimen allows it."
+        )
+    is_near = (np.abs(strain) <= NEAR_STRAIN_SHARE * reach) & (strain != 0)
+    if not is_near.any():
+        control = experiment.curves[0].mode.controls[0]
+        nearest = control.reference + strain[np.abs(strain) > 0][np.abs(strain[np.abs(strain) > 0]).argmin()]
+        yield (
+            f"nothing is measured near the reference (the nearest {control.name} is {nearest:.4g}), so the initial "
+            f"modulus is extrapolated: measure within {NEAR_STRAIN_SHARE * reach:.2g} of {control.name} "
+            f"{control.reference:g}."
+        )
+    if experiment.size < MIN_MEASUREMENTS:
+        yield (
+            f"{experiment.size} measurements are too few to show how the stress deviates from the material: "
+            f"measure at {MIN_MEASUREMENTS} stretches or more."
+        )
+
+
+def factors_of_tests(solution: Solution) -> dict[str, float]:
+    """Return the factor of the stress of every test over that of the common material, by the tests' names.
+
+    Tests of the same name are numbered. The factors are posterior means, relative to the mean of all specimens, which
+    the data do not determine. There are none where tests have no stress error of their own, or autocorrelated errors.
+    """
+    model = solution.model
+    whitening, tests = model.whitening, model.experiment.tests
+    if whitening is None or not model.tolerances.stress or not len(whitening.spread) or model.fitted_errors.lag:
+        return {}
+    curve = mean_curve(solution)
+    residual = model.experiment.measured - curve
+    noise = whitening.size**2 * whitening.transposed(whitening(residual))
+    ends = np.cumsum([test.size for test in tests])[:-1]
+    pairs = zip(np.split(residual - noise, ends), np.split(curve, ends), strict=True)
+    names = [test.name for test in tests]
+    labels = [f"{name} ({number})" if names.count(name) > 1 else name for number, name in enumerate(names, 1)]
+    return {
+        label: 1 + float(error @ test_curve / (test_curve @ test_curve))
+        for label, (error, test_curve) in zip(labels, pairs, strict=True)
+    }

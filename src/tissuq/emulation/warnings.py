@@ -1,0 +1,140 @@
+"""Warnings about a calibration, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from tissuq.emulation.checks import EmulatorCheck
+from tissuq.emulation.emulator import Emulator
+from tissuq.emulation.problem import Problem
+
+if TYPE_CHECKING:
+    from tissuq.emulation.sampling import SampledPosterior
+
+__all__ = ["calibration_warnings"]
+
+MIN_EMULATOR_SHARE = 0.1
+"""Share of a posterior variance due to the emulator from which a warning is given."""
+MAX_MEAN_SHIFT = 0.5
+"""Largest shift of a mean by the emulator's error without a warning, in posterior standard deviations."""
+MAX_RMS_STANDARDISED = 1.5
+"""Largest root mean square of the standardised errors of an emulator that is not over-confident."""
+EDGE_WIDTH, MAX_EDGE_PROBABILITY = 0.01, 0.02
+"""Width of an edge of the run plan, as a share of its own, and the largest posterior probability there without a
+warning."""
+MAX_SHARE_NEAR_FAILURES = 0.05
+"""Largest share of the posterior nearer to a failed run than to any other without a warning."""
+DRAWS_NEAR_FAILURES = 400
+"""Number of draws from which that share is computed."""
+DISCREPANCY_WARNINGS = {
+    "none": (
+        "no error of the forward model is allowed for: where the model is wrong, its parameters are over-confident, "
+        "and the interval does not show it."
+    ),
+    "gp": (
+        "the discrepancy has initial stiffness of its own, and takes it from the parameters: in tests, its intervals "
+        "cover the initial modulus far less often than stated (docs/expensive-models.md). Prefer gp-pinned."
+    ),
+    "gp-pinned": (
+        "the initial stiffness is left to the parameters; the learnt discrepancy holds for this experiment only."
+    ),
+}
+"""Warning that belongs to each discrepancy beside a forward model."""
+
+
+def calibration_warnings(
+    problem: Problem,
+    emulator: Emulator,
+    check: EmulatorCheck,
+    posterior: SampledPosterior,
+    exact: SampledPosterior,
+    emulator_share: Mapping[str, float],
+) -> Iterator[str]:
+    """Yield the warnings that a calibration carries, the gravest first.
+
+    Parameters
+    ----------
+    problem : Problem
+    emulator : Emulator
+    check : EmulatorCheck
+        Each run of the emulator predicted from the others.
+    posterior, exact : SampledPosterior
+        With the emulator's error, and as if it were exact.
+    emulator_share : mapping of str to float
+        Share of every parameter's posterior variance that is due to the emulator's error.
+    """
+    if not posterior.converged:
+        yield posterior.verdict
+    if emulator.runs.failed.any():
+        share = _share_near_failures(emulator, posterior)
+        position = (
+            f"A share of {share:.0%} of the posterior is nearer to a failed run than to any other: there the emulator "
+            "is unreliable."
+            if share > MAX_SHARE_NEAR_FAILURES
+            else "The posterior is not near them."
+        )
+        yield f"{emulator.runs.failure_summary} {position}"
+    yield from _emulator_warnings(problem, check, posterior, exact, emulator_share)
+    ends = [f"{symbol} ({end})" for symbol, end in _at_edge(problem, emulator, posterior)]
+    if ends:
+        yield (
+            f"the posterior reaches the end of the simulated range of {', '.join(ends)}: there the prior, not the "
+            "data, decides. Give a wider prior, unless the bound is intended."
+        )
+    yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
+
+
+def _emulator_warnings(
+    problem: Problem,
+    check: EmulatorCheck,
+    posterior: SampledPosterior,
+    exact: SampledPosterior,
+    emulator_share: Mapping[str, float],
+) -> Iterator[str]:
+    forward = problem.forward_symbols
+    shifts = {
+        symbol: abs(exact.marginals[symbol].mean - marginal.mean) / marginal.sd
+        for symbol, marginal in posterior.marginals.items()
+    }
+    largest_share = max(forward, key=lambda symbol: emulator_share[symbol])
+    largest_shift = max(forward, key=lambda symbol: shifts[symbol])
+    advice = "Give more runs, or let some be placed where the posterior is (refine)."
+    if emulator_share[largest_share] > MIN_EMULATOR_SHARE:
+        yield (
+            f"the emulator's error is large beside the noise: it makes {emulator_share[largest_share]:.0%} of the "
+            f"posterior variance of {largest_share}. {advice}"
+        )
+    elif shifts[largest_shift] > MAX_MEAN_SHIFT:
+        yield (
+            f"the emulator's error is large beside the noise: it shifts the mean of {largest_shift} by "
+            f"{shifts[largest_shift]:.1f} standard deviations. {advice}"
+        )
+    if check.rms_standardised > MAX_RMS_STANDARDISED:
+        yield (
+            "the emulator is over-confident: runs predicted from the others are off by "
+            f"{check.rms_standardised:.1f} of its standard deviations (root mean square; 1 is right). Where the model "
+            "is not smooth in its parameters, try the kernel matern-5/2; otherwise give more runs."
+        )
+
+
+def _share_near_failures(emulator: Emulator, posterior: SampledPosterior) -> float:
+    """Return the share of the posterior whose nearest run failed, in the unit box of the runs."""
+    runs, coordinates = emulator.runs, emulator.coordinates
+    draws = posterior.thinned(DRAWS_NEAR_FAILURES)[:, : len(runs.symbols)]
+    run_points, draw_points = coordinates.of(runs.points), coordinates.of(draws)
+    nearest = ((draw_points[:, None] - run_points[None]) ** 2).sum(axis=2).argmin(axis=1)
+    return float(runs.failed[nearest].mean())
+
+
+def _at_edge(problem: Problem, emulator: Emulator, posterior: SampledPosterior) -> Iterator[tuple[str, str]]:
+    """Yield the forward parameters with posterior at an end of the run plan, and which end."""
+    for symbol, column in zip(problem.forward_symbols, emulator.runs.points.T, strict=True):
+        low, high = problem.priors[symbol].support
+        low, high = max(low, column.min()), min(high, column.max())
+        values = posterior.values[:, problem.symbols.index(symbol)]
+        edge = EDGE_WIDTH * (high - low)
+        if posterior.weights[values < low + edge].sum() > MAX_EDGE_PROBABILITY:
+            yield symbol, "lower"
+        if posterior.weights[values > high - edge].sum() > MAX_EDGE_PROBABILITY:
+            yield symbol, "upper"

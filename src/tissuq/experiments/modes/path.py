@@ -1,0 +1,190 @@
+"""Paths of deformations, what measured stresses work along, and the states on them at which stresses are asked for."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["STEP", "UNMEASURED", "Deformation", "Path", "States"]
+
+FloatArray = NDArray[np.float64]
+
+STEP = 1e-30
+"""Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
+UNMEASURED = -1
+"""Number of the curve of states that belong to no measured one."""
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """An isochoric deformation in the axes of the test: what a strain energy is a function of.
+
+    Attributes
+    ----------
+    stretches : tuple of three arrays
+        The principal stretches, that of the thickness last where it is free of stress.
+    plane : tuple of three arrays
+        C11, C22 and C12 of C = F'F in the plane of the test, the first loaded axis first: what fibres there feel.
+        None where the test leaves it to the material, so that only a symmetric one is known to deform like this.
+    """
+
+    stretches: tuple[Any, Any, Any]
+    plane: tuple[Any, Any, Any]
+
+    @classmethod
+    def along_axes(cls, stretches: tuple[Any, Any, Any]) -> Deformation:
+        """Return the deformation whose principal axes are those of the test."""
+        first, second, _ = stretches
+        return cls(stretches, (first**2, second**2, 0.0))
+
+
+class Path(ABC):
+    """Deformations at some points, and how they change with what one measured stress does work on.
+
+    Points are the values of a mode's controls: (n,) where there is one, (n, c) where there are c. `moved` also takes a
+    single point, of shape () or (c,), because JAX maps over them.
+    """
+
+    loaded_axes: int = 1
+    """Number of axes that carry the measured stress (work per step = loaded_axes * stress)."""
+
+    @abstractmethod
+    def moved(self, point: Any, step: Any) -> Deformation:
+        """Return the deformation a step further than at a point: plain arithmetic, differentiable."""
+
+    def abscissa(self, points: Any) -> Any:
+        """Return what the measured stress is drawn against, one number for each point."""
+        return points
+
+    def cauchy_ratio(self, points: Any) -> Any:
+        """Return the Cauchy stress over the engineering stress: the stretch along the axis of the stress."""
+        return self.abscissa(points)
+
+    def at(self, points: Any, curve: int = UNMEASURED) -> States:
+        """Return the states at points of this path, which are those of a measured curve where its number is given."""
+        return States((self,), (np.asarray(points, dtype=np.float64),), (curve,))
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """States of deformation at which stresses are measured or asked for, path by path.
+
+    States are equal where their paths, points and curves are.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+    points : tuple of arrays
+        On each path, (n,) or (n, c).
+    curves : tuple of int
+        The number of the measured curve that each path with its points belongs to, or `UNMEASURED`.
+    """
+
+    paths: tuple[Path, ...]
+    points: tuple[Any, ...]
+    curves: tuple[int, ...]
+
+    @classmethod
+    def joined(cls, states: Sequence[States]) -> States:
+        """Return the states of several, one after another."""
+        return cls(*(tuple(chain(*(getattr(one, name) for one in states))) for name in ("paths", "points", "curves")))
+
+    def __len__(self) -> int:
+        return sum(self._counts)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, States) or (self.paths, self.curves) != (other.paths, other.curves):
+            return False
+        return all(np.array_equal(*pair) for pair in zip(self.points, other.points, strict=True))
+
+    def __hash__(self) -> int:
+        ends = tuple((points.shape, points[:1].tobytes(), points[-1:].tobytes()) for points in self.points)
+        return hash((self.paths, self.curves, ends))
+
+    @property
+    def _counts(self) -> list[int]:
+        return [len(points) for points in self.points]
+
+    @property
+    def curve(self) -> NDArray[np.intp]:
+        """The number (n,) of the curve of every state."""
+        return np.repeat(self.curves, self._counts)
+
+    @property
+    def abscissa(self) -> Any:
+        """What the stress at every state is drawn against, (n,)."""
+        return _end_to_end([path.abscissa(points) for path, points in zip(self.paths, self.points, strict=True)])
+
+    @property
+    def loaded_axes(self) -> Any:
+        """The loaded axes of every state, (n,), or the one number of all."""
+        axes = [path.loaded_axes for path in self.paths]
+        return axes[0] if len(set(axes)) == 1 else np.repeat(axes, self._counts)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether some of them belong to a measured curve."""
+        return any(curve != UNMEASURED for curve in self.curves)
+
+    def in_curve(self, number: int) -> Any:
+        """Return one for every state (n,) that belongs to that curve and zero for the others; 1.0 where all do."""
+        return 1.0 if self.curves == (number,) else (self.curve == number).astype(np.float64)
+
+    def moved(self, step: Any) -> Deformation:
+        """Return the deformation a step further than these states, on the path of each."""
+        pairs = zip(self.paths, self.points, strict=True)
+        moved = [path.moved(points, step) for path, points in pairs]
+        if len(moved) == 1:
+            return moved[0]
+        stretches = (self._column([one.stretches[axis] for one in moved]) for axis in range(3))
+        plane = (self._column([one.plane[component] for one in moved]) for component in range(3))
+        return Deformation((*stretches,), (*plane,))
+
+    def _column(self, components: list[Any]) -> Any:
+        """Return a component of the deformation of every state; NaN where only others have it, None where none has."""
+        if all(component is None for component in components):
+            return None
+        numbers = [np.nan if component is None else component for component in components]
+        return np.concatenate([np.broadcast_to(*pair) for pair in zip(numbers, self._counts, strict=True)])
+
+    @cached_property
+    def log_stretches(self) -> tuple[FloatArray, FloatArray]:
+        """The logarithms (n, 3) of the principal stretches, and their rates (n, 3) along the paths.
+
+        Divided by the number of loaded axes, so that the engineering stress of a separable energy
+        w(l1) + w(l2) + w(l3) is sum_k l_k w'(l_k) rate_k.
+        """
+        stretches = self.moved(1j * STEP).stretches
+        logs = np.log(np.stack([np.broadcast_to(one, len(self)).astype(complex) for one in stretches], axis=-1))
+        return np.asarray(logs.real), np.asarray((logs.imag.T / STEP / self.loaded_axes).T)
+
+    def by_path(self) -> Iterator[tuple[Path, Any, NDArray[np.intp]]]:
+        """Yield every different path with all its points, and their numbers among all states."""
+        numbers = np.split(np.arange(len(self)), np.cumsum(self._counts)[:-1])
+        for path in dict.fromkeys(self.paths):
+            chosen = [number for number, other in enumerate(self.paths) if other == path]
+            points = _end_to_end([self.points[number] for number in chosen])
+            yield path, points, np.concatenate([numbers[number] for number in chosen])
+
+    def thinned(self, step: int) -> States:
+        """Return one of so many states of every path, from its first."""
+        return States(self.paths, tuple(points[::step] for points in self.points), self.curves)
+
+    def one(self, number: int) -> States:
+        """Return the state of that number by itself."""
+        ends = np.cumsum(self._counts)
+        path = int(np.searchsorted(ends, number, side="right"))
+        first = number - int(ends[path]) + self._counts[path]
+        return States((self.paths[path],), (self.points[path][first : first + 1],), (self.curves[path],))
+
+
+def _end_to_end(arrays: list[Any]) -> Any:
+    """Return arrays of NumPy or JAX one after another."""
+    return arrays[0] if len(arrays) == 1 else arrays[0].__array_namespace__().concat(arrays)

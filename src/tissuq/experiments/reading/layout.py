@@ -1,0 +1,178 @@
+"""How a text file lays out its table: separator, first row of data, names and units above it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from tissuq.experiments.reading.units import looks_like_unit
+
+__all__ = ["NUMBER", "WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
+
+WHITESPACE = " "
+SEPARATORS = ("\t", ";", ",", WHITESPACE)
+NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
+SPREADSHEET_ERRORS = frozenset(
+    ["#n/a", "#nv", "#ref!", "#bezug!", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#name?", "#null!", "#calc!",
+     "#spill!", "#field!", "#getting_data"]
+)  # fmt: skip
+"""What Excel and its like write where a formula fails, in English and in German."""
+MISSING = SPREADSHEET_ERRORS | frozenset(
+    ["", "-", "--", "---", "n/a", "na", "nan", "null", "none", "inf", "+inf", "-inf"]
+)
+LINES_TO_JUDGE = 500
+SHORT, FAR_LONGER = 3, 10
+"""Rows that a table passed over has at most, and how many times more the one beneath it has at least."""
+
+Split = Callable[[str], list[str]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the table is in a list of lines; all positions count from 0.
+
+    Parameters
+    ----------
+    separator : str
+        What stands between two cells; a space means any run of whitespace.
+    first_row : int
+        Position of the first row of data.
+    width : int
+        Number of cells in the first row of data without fault.
+    names : int or None
+        Position of the row of column names.
+    units : int or None
+        Position of the row of units beneath the names.
+    """
+
+    separator: str
+    first_row: int
+    width: int
+    names: int | None
+    units: int | None
+
+
+def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | None:
+    """Return the layout of the first table in lines without blanks and comments; None if there is none.
+
+    A table of a few rows, such as a machine's table of results, is passed over for a far longer one beneath it with
+    other names.
+    """
+    separator = separator or _likely_separator(lines[:LINES_TO_JUDGE])
+    cells = partial(split, separator=separator)
+    confirmed = _main_row(lines, cells)
+    if confirmed is None:
+        return None
+    first = _with_faulty_rows_above(lines, cells, confirmed)
+    has_units = first > 1 and _is_units_row(cells(lines[first - 1])) and _are_names(cells(lines[first - 2]))
+    above = first - 2 if has_units else first - 1
+    width = len(cells(lines[confirmed]))
+    named = above >= 0 and bool(column_names(lines[above], width, separator))
+    return Layout(separator, first, width, above if named else None, first - 1 if has_units else None)
+
+
+def is_comment(line: str) -> bool:
+    """Tell whether a line is a comment: it begins with a hash that is not that of a spreadsheet's error."""
+    text = line.lstrip(' \t"')
+    return line.lstrip().startswith("#") and re.split(r'[\s;,"]', text)[0].lower() not in SPREADSHEET_ERRORS
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, without quotation marks and surrounding blanks."""
+    if '"' not in line:
+        return line.split() if separator == WHITESPACE else [cell.strip() for cell in line.split(separator)]
+    if separator == WHITESPACE:
+        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|\S+', line)]
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+
+
+def column_names(line: str, width: int, separator: str) -> list[str]:
+    """Return the column names in a line above ``width`` columns of data; none when it holds no names.
+
+    Columns separated by blanks may have blanks in their names when two or more stand between names.
+    """
+    names = split(line, separator)
+    if separator == WHITESPACE and len(names) != width:
+        names = re.split(r"\s{2,}|\t", line.strip())
+        if len(names) != width:
+            return []
+    while names and not names[-1]:
+        names.pop()
+    return names if _are_names(names) else []
+
+
+def _likely_separator(lines: Sequence[str]) -> str:
+    def share_of_numbers(line: str, separator: str) -> float:
+        cells = [cell for cell in split(line, separator) if cell]
+        numbers = _count_numbers(cells)
+        return numbers / len(cells) if numbers >= 2 else 0.0
+
+    return max(SEPARATORS, key=lambda separator: sum(share_of_numbers(line, separator) for line in lines))
+
+
+def _main_row(lines: Sequence[str], cells: Split) -> int | None:
+    """Find the first row of the first table that is not far shorter than a named one after it."""
+    first = _first_numeric_row(lines, cells)
+    if first is None:
+        return None
+    length = _length(lines, cells, first, limit=SHORT + 1)
+    if length > SHORT:
+        return first
+    later = _first_numeric_row(lines, cells, first + length)
+    headings = [] if later is None else lines[max(later - 2, first + length) : later]
+    if later is None or not any(_are_names(cells(line)) and line not in lines[:first] for line in headings):
+        return first
+    return later if _length(lines, cells, later, limit=FAR_LONGER * length) == FAR_LONGER * length else first
+
+
+def _length(lines: Sequence[str], cells: Split, first: int, limit: int) -> int:
+    """Count the rows of data from the first on, up to a limit."""
+    rows = lines[first : first + limit]
+    return next((count for count, line in enumerate(rows) if not _is_data(cells(line))), len(rows))
+
+
+def _first_numeric_row(lines: Sequence[str], cells: Split, start: int = 0) -> int | None:
+    """Find a row of numbers alone, or of two numbers before more data: metadata may hold numbers too."""
+    for position, line in enumerate(lines[start:], start):
+        row = cells(line)
+        next_row = cells(lines[position + 1]) if position + 1 < len(lines) else []
+        if _count_numbers(row) >= 2 and (_are_values(row) or _is_data(next_row)):
+            return position
+    return None
+
+
+def _with_faulty_rows_above(lines: Sequence[str], cells: Split, first: int) -> int:
+    """Take in rows above that hold a number or a mark for none: faulty data to report, not names."""
+    width = len(cells(lines[first]))
+    while first > 0:
+        above = cells(lines[first - 1])
+        is_row = _are_values(above) or (_is_data(above) and len(above) == width)
+        beneath_names = first > 1 and _are_names(cells(lines[first - 2]))
+        if not is_row or (beneath_names and _is_units_row(above)):
+            break
+        first -= 1
+    return first
+
+
+def _count_numbers(cells: Sequence[str]) -> int:
+    return sum(NUMBER.fullmatch(cell) is not None for cell in cells)
+
+
+def _are_values(cells: Sequence[str]) -> bool:
+    return all(cell.lower() in MISSING or NUMBER.fullmatch(cell) for cell in cells)
+
+
+def _is_data(cells: Sequence[str]) -> bool:
+    return _count_numbers(cells) > 0 or _are_values(cells)
+
+
+def _are_names(cells: Sequence[str]) -> bool:
+    words = [cell for cell in cells if cell.lower() not in MISSING and any(map(str.isalpha, cell))]
+    return len(cells) >= 2 and len(words) >= 1 and _count_numbers(cells) == 0
+
+
+def _is_units_row(cells: Sequence[str]) -> bool:
+    return all(map(looks_like_unit, cells)) and any(re.search(r"[^\W\d_]|%", cell) for cell in cells)

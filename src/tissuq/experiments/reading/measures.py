@@ -1,0 +1,219 @@
+"""From the numbers of two columns to stretch and stress: units, strains, displacements and forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading import units
+from tissuq.experiments.reading.columns import ColumnChoice, declared_unit, heading
+from tissuq.experiments.reading.dimensions import Dimension, Dimensions
+from tissuq.experiments.reading.plausibility import check_strain
+from tissuq.experiments.reading.quantities import FORCE, LENGTH, Kind
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.vocabulary import on_axis
+
+__all__ = ["Load", "initial_size", "stress_of", "stretch_of"]
+
+Column = NDArray[np.float64]
+
+SHOWN_FOR_FORCES = "kPa"
+"""The unit in which stresses from forces are shown unless another is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """The stress (MPa), the unit in which people want to read it, and how it was obtained.
+
+    ``area`` (mm²) is that by which forces were divided; None where the file gives stresses.
+    """
+
+    stress: Column
+    unit: units.StressUnit
+    source: str
+    area: float | None = None
+
+
+def stretch_of(
+    table: Table,
+    choice: ColumnChoice,
+    values: Column,
+    load: Column,
+    dimensions: Dimensions,
+    strain_unit: str | None,
+    displacement_unit: str | None,
+) -> tuple[Column, str]:
+    """Return the stretches and how they were obtained.
+
+    Raises
+    ------
+    InputError
+        When units contradict each other or are missing, or the length of the specimen is not known.
+    """
+    if choice.measure == "displacement":
+        return _from_displacement(table, choice, values, dimensions, displacement_unit)
+    _refuse(table, choice, "displacement_unit", displacement_unit)
+    if "length" in dimensions.given:
+        raise InputError(
+            f"{table.place(choice.deformation)} is read as {choice.measure}, which needs no length. Leave --length "
+            "out, or name the column of displacements: --column displacement=NAME."
+        )
+    if not choice.is_strain:
+        _refuse(table, choice, "strain_unit", strain_unit)
+    declared = declared_unit(table, choice.deformation)
+    if not choice.is_strain and not units.looks_like_unit(declared):
+        declared = ""
+    factor = _strain_factor(table, choice, declared, strain_unit)
+    label = table.label(choice.deformation)
+    scaled = "" if factor == 1 else f" x {factor:g}"
+    if choice.is_strain:
+        check_strain(table, choice, values * factor, load, has_unit=bool(declared or strain_unit))
+        return 1 + values * factor, f"stretch = 1 + column {label}{scaled}"
+    what = "amount of shear" if choice.measure == "shear" else "stretch"
+    return values * factor, f"{what} = column {label}{scaled}"
+
+
+def stress_of(
+    table: Table,
+    choice: ColumnChoice,
+    values: Column,
+    dimensions: Dimensions,
+    stress_type: str,
+    stress_unit: str | None,
+    force_unit: str | None,
+) -> Load:
+    """Return the stresses, of the kind that the file gives, and how they were obtained.
+
+    Raises
+    ------
+    InputError
+        When units contradict each other or are missing, or the cross-section of the specimen is not known.
+    """
+    label = table.label(choice.stress)
+    if choice.load == "force":
+        if stress_type != "engineering":
+            raise InputError(
+                f"{table.place(choice.stress)} holds forces, which over the undeformed cross-section are engineering "
+                "stress. Leave stress_type (--stress-type) out."
+            )
+        factor, unit_source = _factor(table, choice.stress, FORCE, "force_unit", force_unit)
+        area = dimensions.area
+        source = f"engineering stress = column {label} in {unit_source} / {area.value:g} mm2 ({area.source})"
+        shown = units.stress_unit(stress_unit or SHOWN_FOR_FORCES)
+        return Load(values * factor / area.value, shown, source, area.value)
+    sections = sorted(dimensions.given - {"length"})
+    if sections or force_unit is not None:
+        unneeded = sections[0] if sections else "force_unit"
+        raise InputError(
+            f"{table.place(choice.stress)} is read as stress, which needs no {unneeded}. "
+            "Leave it out, or name the column of forces: --column force=NAME."
+        )
+    unit, unit_source = _stress_unit(table, choice, stress_unit)
+    return Load(values * unit.to_mpa, unit, f"{stress_type} stress from column {label} in {unit_source}")
+
+
+def _from_displacement(
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
+) -> tuple[Column, str]:
+    factor, unit_source = _factor(table, choice.deformation, LENGTH, "displacement_unit", unit)
+    own = initial_size(table, choice, values) if "length" not in dimensions.known else None
+    length = own or dimensions.length
+    label = table.label(choice.deformation)
+    source = f"stretch = 1 + column {label} in {unit_source} / {length.value:g} mm (length {length.source})"
+    return 1 + values * factor / length.value, source
+
+
+def initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> Dimension | None:
+    """Return the length from a column of sizes beside that of displacements (CellScale's machines write one)."""
+    chosen = heading(table.names[choice.deformation])
+    axis, _ = on_axis(chosen.quantity)
+    names = [heading(name) for name in table.names]
+    sizes = [k for k, name in enumerate(names) if on_axis(name.quantity) == (axis, "size") or name.quantity == "size"]
+    if len(sizes) != 1 or names[sizes[0]].unit != chosen.unit or LENGTH.known(chosen.unit) is None:
+        return None
+    (size,) = table.taken(np.arange(1)).numbers(sizes)
+    value = float(size[0] - displacement[0]) * LENGTH.factor(chosen.unit)
+    return Dimension(value, f"from column {table.label(sizes[0])} less the displacement")
+
+
+def _factor(table: Table, column: int, kind: Kind, option: str, given: str | None) -> tuple[float, str]:
+    """Return the factor from a column's unit of force or length, and the words for where it comes from."""
+    declared = declared_unit(table, column)
+    hint = f"give {option} (--{option.replace('_', '-')} {kind.unit})"
+    if given is None:
+        if not declared:
+            raise InputError(f"{table.place(column)}: the file states no unit of {kind.name}; {hint}.")
+        try:
+            return kind.factor(declared), f"{declared} (from the file)"
+        except InputError as error:
+            raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
+    factor = kind.factor(given)
+    in_file = kind.known(declared)
+    if in_file is not None and in_file != factor:
+        raise InputError(
+            f"{table.place(column)}: {option}='{given}' is given, but the file says '{declared}'. Leave {option} out, "
+            "or correct the file."
+        )
+    return factor, f"{given} (as given)"
+
+
+def _refuse(table: Table, choice: ColumnChoice, option: str, value: str | None) -> None:
+    if value is not None:
+        role = option.removesuffix("_unit")
+        raise InputError(
+            f"{table.place(choice.deformation)} is read as {choice.measure}, but {option}='{value}' is "
+            f"given. Leave {option} (--{role}-unit) out, or give the column as {role}."
+        )
+
+
+def _strain_factor(table: Table, choice: ColumnChoice, declared: str, given: str | None) -> float:
+    place = table.place(choice.deformation)
+    try:
+        in_file = units.strain_factor(declared)
+    except InputError as error:
+        if given is None:
+            hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.is_strain else ""
+            raise InputError(f"{place}: {error}{hint}") from error
+        declared, in_file = "", 1.0
+    if given is None:
+        return in_file
+    factor = units.strain_factor(given)
+    if declared and in_file != factor:
+        raise InputError(
+            f"{place}: strain_unit='{given}' is given, but the file says '{declared}'. Leave strain_unit "
+            "(--strain-unit) out, or correct the file."
+        )
+    return factor
+
+
+def _stress_unit(table: Table, choice: ColumnChoice, given: str | None) -> tuple[units.StressUnit, str]:
+    """Return the unit of the stresses and the words for where it comes from."""
+    declared = declared_unit(table, choice.stress)
+    if given is not None:
+        unit = units.stress_unit(given)
+        in_file = _unit_or_none(declared)
+        if in_file and not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
+            raise InputError(
+                f"{table.place(choice.stress)}: stress_unit='{given}' is given, but the file says "
+                f"'{declared}'. Leave stress_unit (--stress-unit) out, or correct the file."
+            )
+        return unit, f"{unit.name} (as given)"
+    if not declared:
+        return units.StressUnit("MPa", 1.0), "MPa (assumed: the file states no unit)"
+    try:
+        unit = units.stress_unit(declared)
+    except InputError as error:
+        raise InputError(
+            f"{table.place(choice.stress)}: {error} To say it yourself, give stress_unit (--stress-unit)."
+        ) from error
+    return unit, f"{unit.name} (from the file)"
+
+
+def _unit_or_none(text: str) -> units.StressUnit | None:
+    try:
+        return units.stress_unit(text) if text else None
+    except InputError:
+        return None

@@ -1,0 +1,83 @@
+"""Many specimens in files: a file each, a folder of tests each, or a column that names them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Unpack
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.columns import find_column
+from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_rows
+from tissuq.experiments.reading.table import read_table
+
+__all__ = ["SUFFIXES", "find_tests", "read_column"]
+
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
+"""Of files in a folder that may hold measurements."""
+
+
+def find_tests(paths: Sequence[str | os.PathLike[str]]) -> dict[str, list[Path]]:
+    """Return the files of every specimen.
+
+    A file is a specimen of its name. In a folder, every file is, and every folder is one specimen with a file for each
+    test.
+
+    Raises
+    ------
+    InputError
+        When there is no file in a folder, or two specimens have one name.
+    """
+    found: dict[str, list[Path]] = {}
+    for path in map(Path, paths):
+        for place, files in (_in_folder(path) if path.is_dir() else {path: [path]}).items():
+            name = place.name if place.is_dir() else place.stem
+            if name in found:
+                raise InputError(
+                    f"'{found[name][0]}' and '{files[0]}' are both named '{name}': rename one, or put the tests of one "
+                    "specimen into a folder of its own within the folder of all."
+                )
+            found[name] = files
+    return found
+
+
+def read_column(
+    path: str | os.PathLike[str], specimen: str | int, **options: Unpack[ReadingOptions]
+) -> dict[str, Reading]:
+    """Return what is read of each specimen that a column of one file names, in the order of the file.
+
+    Parameters
+    ----------
+    path : str or path
+    specimen : str or int
+        Name, or number from 1, of the column.
+    options
+        As for `tissuq.read_experiment`.
+    """
+    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
+    column = find_column(table, "specimen", specimen)
+    labels = np.array(table.texts(column))
+    if (labels == "").any():
+        row = int(np.argmax(labels == ""))
+        raise InputError(f"{table.place(column, row)}: the name of the specimen is missing.")
+    found = {}
+    for label in dict.fromkeys(labels.tolist()):
+        own: ReadingOptions = {**options, "name": label}
+        found[label] = read_rows(table.taken(np.flatnonzero(labels == label)), path, **own)
+    return found
+
+
+def _in_folder(folder: Path) -> dict[Path, list[Path]]:
+    """Return the files of every specimen in a folder, by the file or the folder that names it."""
+    found = {child: _tables(child) for child in sorted(folder.iterdir()) if child.is_dir()}
+    found = {child: files for child, files in found.items() if files} | {file: [file] for file in _tables(folder)}
+    if not found:
+        raise InputError(f"folder '{folder}' holds no files that end in {', '.join(SUFFIXES)}.")
+    return dict(sorted(found.items()))
+
+
+def _tables(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())

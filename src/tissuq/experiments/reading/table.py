@@ -1,0 +1,283 @@
+"""The table in a file: named columns of numbers, each row with its line in the file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from io import StringIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.layout import NUMBER, WHITESPACE, column_names, find_layout, is_comment, split
+from tissuq.experiments.reading.text_file import read_lines
+from tissuq.experiments.reading.workbook import is_workbook, sheet_lines
+
+__all__ = ["Table", "read_table"]
+
+Lines = list[tuple[int, str]]
+
+LONG = 10_000
+"""Lines from which a file is first tried on a fast parser."""
+HEAD = 1000
+"""Lines of it that tell its layout."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table found in a file; a row of an Excel sheet is a line.
+
+    Parameters
+    ----------
+    file : str
+        The file as the user named it.
+    names : tuple of str
+        Column names, one for every column; empty texts when the file names none.
+    units : tuple of str
+        Cells of the units row, one for every column; empty texts when there is no such row.
+    separator : str
+        What stands between two cells; a space means any run of whitespace.
+    rows : list of str
+        The rows of data as text.
+    lines : sequence of int
+        The line in the file of every row, counted from 1.
+    above : sequence of (int, str)
+        The lines above the rows, with their numbers.
+    block : (rows, columns) array, optional
+        All cells, where they have been read as numbers already.
+    """
+
+    file: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    separator: str
+    rows: list[str]
+    lines: Sequence[int]
+    above: Sequence[tuple[int, str]] = ()
+    block: NDArray[np.float64] | None = None
+
+    def label(self, column: int) -> str:
+        """Return how messages name a column (counted from 0)."""
+        return f"'{self.names[column]}'" if self.names[column] else f"number {column + 1}"
+
+    def place(self, column: int, row: int | None = None) -> str:
+        """Return the place of a column, or of its cell in a row, as an editor shows it."""
+        line = "" if row is None else f", line {self.lines[row]}"
+        return f"{self.file}{line}, column {self.label(column)}"
+
+    def taken(self, rows: NDArray[np.intp]) -> Table:
+        """Return the table with only some rows, in that order."""
+        kept = rows.tolist()
+        block = None if self.block is None else self.block[rows]
+        return replace(self, rows=[self.rows[k] for k in kept], lines=[self.lines[k] for k in kept], block=block)
+
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column (counted from 0) as text, empty ones where a row ends before it."""
+        cells = (split(row, self.separator) for row in self.rows)
+        return [row[column] if column < len(row) else "" for row in cells]
+
+    def numbers(self, columns: Sequence[int]) -> list[NDArray[np.float64]]:
+        """Return columns (counted from 0) as finite numbers, written with decimal points or decimal commas.
+
+        Raises
+        ------
+        InputError
+            When a cell is empty, not a number or not finite, naming its line and column.
+        """
+        if self.block is not None and max(columns) < self.block.shape[1]:
+            return [np.ascontiguousarray(self.block[:, column]) for column in columns]
+        for converter in (None, _from_decimal_comma):
+            try:
+                block = np.loadtxt(
+                    self.rows,
+                    delimiter=None if self.separator == WHITESPACE else self.separator,
+                    usecols=columns,
+                    quotechar='"',
+                    comments=None,
+                    ndmin=2,
+                    converters=converter,
+                )
+            except ValueError:
+                continue
+            if np.isfinite(block).all():
+                return list(block.T)
+        raise self._bad_cell(columns)
+
+    def _bad_cell(self, columns: Sequence[int]) -> InputError:
+        marks: dict[str, str] = {}
+        for row, text in enumerate(self.rows):
+            cells = split(text, self.separator)
+            for column in columns:
+                cell = cells[column] if column < len(cells) else ""
+                problem = _problem(cell)
+                if problem:
+                    return InputError(f"{self.place(column, row)}: {problem}")
+                for mark in set(cell) & {".", ","}:
+                    marks.setdefault(mark, f"'{cell}' in line {self.lines[row]}")
+                if len(marks) == 2:
+                    return InputError(
+                        f"{self.place(column, row)}: decimal points and decimal commas are mixed: "
+                        f"{marks['.']}, {marks[',']}. Write all numbers in one way, "
+                        "without thousands separators."
+                    )
+        return InputError(f"{self.file}: columns {' and '.join(map(self.label, columns))} do not hold numbers.")
+
+
+def read_table(path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None) -> Table:
+    """Return the table in a file: lines above it, names, units and rows are recognised.
+
+    Parameters
+    ----------
+    path : str or path
+        Comma-, semicolon-, tab- or blank-separated text, or an Excel workbook (.xlsx).
+    skip_rows : int
+        Number of lines at the top of the file to pass over unseen.
+    sheet : str or int, optional
+        Name or number (from 1) of a workbook's sheet; without it the only one that holds a table.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, holds no table of numbers, or its rows do not match its header.
+    """
+    if not isinstance(skip_rows, int) or skip_rows < 0:
+        raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
+    if is_workbook(path):
+        name, lines = sheet_lines(path, sheet)
+        return _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, "	")
+    if sheet is not None:
+        raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
+    file, lines = str(path), read_lines(path)
+    return _read_long(file, lines, skip_rows) or _read_every_line(file, lines, skip_rows)
+
+
+def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
+    """Return the table of a long and regular file, whose cells a fast parser takes; None for any other.
+
+    The layout is found in the first lines, and all below the first row must be numbers in as many columns.
+    """
+    if len(lines) < LONG:
+        return None
+    try:
+        head = _read_every_line(file, lines[:HEAD], skip_rows)
+    except InputError:
+        return None
+    rows = lines[head.lines[0] - 1 :]
+    while rows and not rows[-1].strip():
+        rows.pop()
+    text = "\n".join(rows)
+    if "#" in text or '"' in text:
+        return None
+    import pandas as pd
+
+    separator = r"\s+" if head.separator == WHITESPACE else head.separator
+    try:
+        table = pd.read_csv(
+            StringIO(text), sep=separator, header=None, dtype=np.float64, skip_blank_lines=False, na_filter=False
+        )
+    except (ValueError, pd.errors.ParserError):
+        return None
+    block = table.to_numpy()
+    if block.shape != (len(rows), len(head.names)) or not np.isfinite(block).all():
+        return None
+    numbers = range(head.lines[0], head.lines[0] + len(rows))
+    return replace(head, rows=rows, lines=numbers, block=block)
+
+
+def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str | None = None) -> Table:
+    """Return the table of any file, looking at every line."""
+    every_line = list(enumerate(lines, start=1))[skip_rows:]
+    filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
+    content = [(line, text) for line, text in filled if not is_comment(text)]
+    texts = [text for _, text in content]
+    layout = find_layout(texts, separator)
+    if layout is None:
+        raise _no_table(file, content)
+    first = layout.first_row
+    if layout.names is None:
+        header_line, header = _comment_above(filled, content[first][0])
+    else:
+        header_line, header = content[layout.names]
+    names = column_names(header, layout.width, layout.separator)
+    width = len(names) or layout.width
+    units = [] if layout.units is None else split(texts[layout.units], layout.separator)
+    table = Table(
+        file=file,
+        names=_padded(names, width),
+        units=_padded(units, width),
+        separator=layout.separator,
+        rows=texts[first:],
+        lines=[line for line, _ in content[first:]],
+        above=[each for each in filled if each[0] < content[first][0]],
+    )
+    _check_shape(table, f"line {header_line} with the column names" if names else "the table")
+    return table
+
+
+def _no_table(file: str, content: Lines) -> InputError:
+    if not content:
+        return InputError(f"{file} holds only comments and blank lines; expected a table of numbers.")
+    line, text = content[-1]
+    return InputError(
+        f"{file} holds no rows of numbers: no line has numbers in two columns. The last line "
+        f"with text ({line}) reads '{text.strip()[:80]}'. Expected a column of stretches and one of stresses."
+    )
+
+
+def _comment_above(filled: Lines, first_line: int) -> tuple[int, str]:
+    """Return the comment just above the data as a candidate for the names: numpy.savetxt writes them so."""
+    above = [(line, text) for line, text in filled if line < first_line]
+    if above and is_comment(above[-1][1]):
+        return above[-1][0], above[-1][1].lstrip("# \t")
+    return 0, ""
+
+
+def _padded(cells: list[str], width: int) -> tuple[str, ...]:
+    return tuple([*cells, *[""] * width][:width])
+
+
+def _check_shape(table: Table, header: str) -> None:
+    width = len(table.names)
+    hint = (
+        " If its commas are decimal commas, separate the columns by semicolons or tabs."
+        if table.separator == ","
+        else ""
+    )
+    for line, row in zip(table.lines, table.rows, strict=True):
+        if '"' in row and row.count('"') % 2:
+            raise InputError(f"{table.file}, line {line}: a quotation mark has no partner: {row.strip()[:80]}")
+        may_be_long = len(row.split()) > width if table.separator == WHITESPACE else row.count(table.separator) >= width
+        if may_be_long:
+            cells = split(row, table.separator)
+            if any(cells[width:]):
+                raise InputError(f"{table.file}, line {line} has {len(cells)} cells, but {header} has {width}.{hint}")
+    if table.separator == "," and not any(table.names) and not any("." in row or '"' in row for row in table.rows):
+        raise InputError(
+            f"{table.file} has no column names and no decimal points, so its commas may be decimal commas or "
+            f"separators (line {table.lines[0]}: {table.rows[0].strip()[:80]}). Separate the columns by "
+            "semicolons or tabs, or add a line of column names."
+        )
+
+
+def _from_decimal_comma(text: str) -> float:
+    if "." in text:
+        raise ValueError
+    return float(text.replace(",", "."))
+
+
+def _problem(cell: str) -> str:
+    """Say what is wrong with a cell; nothing when it is a finite number."""
+    if not cell:
+        return "the cell is empty. Fill in the value or delete the whole row."
+    if NUMBER.fullmatch(cell):
+        finite = np.isfinite(float(cell.replace(",", ".")))
+        return "" if finite else f"'{cell}' is too large for a number. Correct the value or delete the row."
+    if "." in cell and "," in cell and NUMBER.fullmatch(cell.replace(",", "").replace(".", "")):
+        return f"'{cell}' seems to have a thousands separator. Write numbers without one."
+    if NUMBER.fullmatch(cell.rstrip(" %")):
+        return f"'{cell}' is a percentage. Write plain numbers, and the unit % in the heading."
+    if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+        return f"'{cell}' is not a finite number. Fill in the value or delete the row."
+    return f"'{cell}' is not a number. Correct the value or delete the row."

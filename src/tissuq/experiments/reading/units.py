@@ -1,0 +1,170 @@
+"""Units of stress and strain as laboratories write them, and their factors to MPa and to 1."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from tissuq.errors import InputError
+
+__all__ = ["StressUnit", "looks_like_unit", "strain_factor", "stress_unit"]
+
+COMMON_STRESS_UNITS = {
+    "Pa": 1e-6,
+    "hPa": 1e-4,
+    "kPa": 1e-3,
+    "MPa": 1.0,
+    "GPa": 1e3,
+    "N/mm2": 1.0,
+    "N/cm2": 1e-2,
+    "N/m2": 1e-6,
+    "kN/m2": 1e-3,
+    "MN/m2": 1.0,
+    "mN/mm2": 1e-3,
+    "kgf/cm2": 0.0980665,
+    "kgf/mm2": 9.80665,
+    "gf/mm2": 9.80665e-3,
+    "dyn/cm2": 1e-7,
+    "psi": 0.006894757293168361,
+}
+PASCALS = {unit.lower(): unit for unit in COMMON_STRESS_UNITS if unit.endswith("Pa")}
+
+STRAIN_UNITS = dict.fromkeys(["", "1", "-", "mm/mm", "m/m", "in/in", "um/um"], 1.0)
+STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
+STRAIN_UNITS |= {"‰": 1e-3} | dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
+
+LONGEST_UNIT = 40
+"""Characters."""
+UNIT_EXPRESSION = re.compile(
+    r"(?:[^\W\d]\w*|(?:\^|\*\*)\s*\(?[+-]?\d(?:\.\d)?\)?(?!\s*[\d^*])|1(?![\d.])|[%‰°*/·.()\s⁻⁰¹²³⁴⁵⁶⁷⁸⁹])++"
+)
+"""Products, quotients and powers of names, and no arithmetic of numbers, which could take for ever."""
+
+SYMBOLS = (
+    {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
+    | {"bar", "mbar", "atm"}
+    | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
+    | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
+    | {"V", "mV", "deg", "rad", "percent", "pct"}
+)
+
+
+@dataclass(frozen=True)
+class StressUnit:
+    """A unit of stress.
+
+    Parameters
+    ----------
+    name : str
+        The unit as the user wrote it.
+    to_mpa : float
+        Number of MPa in one such unit.
+    """
+
+    name: str
+    to_mpa: float
+
+
+def stress_unit(text: str) -> StressUnit:
+    """Return the stress unit that a text means.
+
+    Accepted are all pressure units that pint knows, powers with or without a mark (``N/mm2``,
+    ``N/mm^2``, ``N/mm²``), and pascals in any capitals: ``KPa``, ``MPA`` and ``mpa`` are kilo- and
+    megapascal. Only ``mPa`` is refused: it is the millipascal of the SI, and nearly always a slip.
+
+    Raises
+    ------
+    InputError
+        When the unit is unknown, is not a force over an area, or is ``mPa``.
+
+    Examples
+    --------
+    >>> stress_unit("kPa").to_mpa
+    0.001
+    >>> stress_unit("N/mm²")
+    StressUnit(name='N/mm²', to_mpa=1.0)
+    """
+    name = str(text).strip()
+    compact = re.sub(r"\s+|\^|\*\*", "", name).replace("²", "2")
+    if compact == "mPa":
+        raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
+    if compact.lower() in PASCALS:
+        compact = PASCALS[compact.lower()]
+    factor = COMMON_STRESS_UNITS.get(compact)
+    return StressUnit(name, _factor_from_pint(name) if factor is None else factor)
+
+
+def strain_factor(text: str) -> float:
+    """Return what one unit of strain is as a plain ratio: 1 for ``mm/mm``, ``-`` or nothing, 0.01 for ``%``.
+
+    Raises
+    ------
+    InputError
+        When the text is not a unit of strain.
+
+    Examples
+    --------
+    >>> strain_factor("%")
+    0.01
+    """
+    compact = re.sub(r"\s+", "", str(text)).lower()
+    if compact not in STRAIN_UNITS:
+        raise InputError(f"'{text}' is not a unit of strain; write '%', or '1' (also 'mm/mm') for a plain ratio.")
+    return STRAIN_UNITS[compact]
+
+
+def looks_like_unit(text: str) -> bool:
+    """Tell whether a cell beneath a column name reads as a unit of anything: ``[kPa]``, ``%``, ``s``."""
+    text = text.strip()
+    if re.fullmatch(r"\[.*\]|\(.*\)|[%‰°1-]|", text):
+        return True
+    symbols = [symbol for symbol in re.split(r"[\s\d·*/.^%°⁻²³-]+", text.replace("µ", "u").replace("μ", "u")) if symbol]
+    return bool(symbols) and all(symbol in SYMBOLS for symbol in symbols)
+
+
+def _factor_from_pint(name: str) -> float:
+    for spelling in (name, _spelled_for_pint(name)):
+        quantity = _parsed_by_pint(spelling)
+        if quantity is not None and quantity.check("[pressure]"):
+            return float(quantity.to("megapascal").magnitude)
+        if quantity is not None and quantity.check("[mass] / [length]**2"):
+            raise InputError(
+                f"'{name}' is a mass over an area, not a stress. If the unit of force is meant, write it as "
+                "a force: kgf/cm2, gf/mm2 or lbf/in2 (psi)."
+            )
+        if quantity is not None and quantity.check("[force]"):
+            raise InputError(
+                f"'{name}' is a force, not a stress. Say that the column holds forces (--column force=NAME) and give "
+                "the undeformed cross-section (--area)."
+            )
+        if quantity is not None:
+            raise InputError(f"'{name}' is not a unit of stress (a force over an area). {_CHOICES}")
+    raise InputError(f"the unit '{name}' is not known. {_CHOICES}")
+
+
+_CHOICES = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
+
+
+def _spelled_for_pint(name: str) -> str:
+    """Rewrite powers without a mark (mm2), dots as products (N.mm-2) and the kilopond."""
+    spelling = re.sub(r"(?<=[^\W\d_])(-?\d+)(?![^\W\d_])", r"^\1", name.replace("²", "2").replace("**", ""))
+    spelling = re.sub(r"(?<=\w)[.·](?=[^\W\d_])", "*", spelling)
+    return re.sub(r"\bkp\b", "kgf", spelling)
+
+
+def _parsed_by_pint(spelling: str) -> Any | None:
+    if len(spelling) > LONGEST_UNIT or not UNIT_EXPRESSION.fullmatch(spelling):
+        return None
+    try:
+        return _pint_registry().Quantity(1.0, spelling)
+    except Exception:  # pint raises a dozen unrelated types (TypeError, AttributeError, tokenize errors)
+        return None
+
+
+@cache
+def _pint_registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()

@@ -1,0 +1,226 @@
+"""The exact route: linear parameters in closed form, quadrature over the nonlinear ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ConvergenceError, ModelError
+from tissuq.inference.algebra import Conditional
+from tissuq.inference.bounds import bounded
+from tissuq.inference.conditional import ConditionalGaussian
+from tissuq.inference.enumerators.missed import QUANTILES, has_missed
+from tissuq.inference.enumerators.quadrature import MAX_DIMENSION, Quadrature, integrate
+from tissuq.inference.enumerators.survey import log_prior_density, survey
+from tissuq.inference.enumerators.warp import Warp, warp_along
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.marginal import Marginal, marginal_of_quadrature
+from tissuq.inference.solution import Marginals, Solution
+from tissuq.inference.threads import one_thread
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Flat
+
+__all__ = ["AdaptiveCells", "solve_exactly"]
+
+FloatArray = NDArray[np.float64]
+
+TOGETHER = (2000, 200, 40, 5)
+"""Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
+IRRELEVANT = 14.0
+"""Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
+MOST_ERROR = 0.1
+"""Error of the log mass within bounds from which the result is refused."""
+HEAVY = 1e-6
+"""Share of the posterior, and mass beyond bounds, above which a component's error counts."""
+
+
+class AdaptiveCells:
+    """Adaptive quadrature over at most three nonlinear parameters; a single setting where there is none."""
+
+    def why_not(self, model: StatisticalModel) -> str:
+        """Return why quadrature does not serve a model; nothing where it does."""
+        if not model.has_directions:
+            return (
+                f"noise '{model.noise.name}' and discrepancy '{model.discrepancy.name}' are not independent along any "
+                "fixed directions"
+            )
+        if len(model.nonlinear) > MAX_DIMENSION:
+            return (
+                f"it integrates at most {MAX_DIMENSION} nonlinear parameters, and this model has "
+                f"{len(model.nonlinear)} ({', '.join(model.nonlinear)})"
+            )
+        return ""
+
+    def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
+        """Return the posteriors of models on the same stretches, all integrated together."""
+        return solve_exactly(models, seed)
+
+
+def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+    """Return posterior and evidence of models with at most three nonlinear parameters each.
+
+    Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
+    linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
+    off more, they are integrated numerically. The error given with the evidence is that of the
+    quadrature and of the mass within the bounds.
+
+    Parameters
+    ----------
+    models : sequence of StatisticalModel
+        With the same material, discrepancy and noise on the same stretches: they share every factorisation.
+    seed : int
+        Of the draws; nothing else is random.
+
+    Raises
+    ------
+    ModelError
+        When a model has more than three nonlinear parameters, or noise and discrepancy without closed form.
+    ConvergenceError
+        When the quadrature does not reach its tolerance.
+
+    References
+    ----------
+    Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
+    """
+    reason = AdaptiveCells().why_not(models[0])
+    if reason:
+        raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
+    together = TOGETHER[len(models[0].nonlinear)]
+    blocks = [models[start : start + together] for start in range(0, len(models), together)]
+    with one_thread():
+        return [
+            _solution(integration, index, seed)
+            for integration in map(_Integration, blocks)
+            for index in range(len(integration.models))
+        ]
+
+
+class _Integration:
+    """Everything that data sets on the same stretches share while their nonlinear parameters are integrated."""
+
+    def __init__(self, models: Sequence[StatisticalModel]) -> None:
+        self.models = models
+        self.conditional = ConditionalGaussian(models)
+        self.dimension = len(models[0].nonlinear)
+        self._priors = [[model.priors[symbol] for symbol in model.nonlinear] for model in models]
+        self._top = np.full((len(models), 1), -np.inf)
+        self.rule: Quadrature | None = None
+        self.warp: Warp | None = None
+        if self.dimension:
+            self.warp = warp_along(survey(self._priors, len(models[0].structure), self._log_ceiling))
+            self.rule = integrate(self._log_integrand, self.dimension)
+            self.settings = self.warp.parameters(self.rule.points)[0]
+        else:
+            self.settings = np.zeros((len(models), 1, 0))
+        self.given = self.conditional(self.settings)
+        if self.rule and len(models[0].structure) > 1:
+            for index in range(len(models)):
+                self._check_found(index, self.rule.weights[index])
+
+    def _check_found(self, index: int, weights: FloatArray) -> None:
+        """Refuse the integral of one posterior that has mass where the survey's lattice did not see it."""
+        assert self.warp is not None  # noqa: S101 (there is a structure)
+        is_log, priors = self.warp.is_log, self._priors[index : index + 1]
+        conditional, structure = ConditionalGaussian(self.models[index : index + 1]), self.models[0].structure
+
+        def coordinates(h: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
+            return np.where(is_log, np.log(np.where(is_log, h, 1.0)), h)
+
+        def log_density(g: FloatArray) -> FloatArray:
+            h = np.where(is_log, np.exp(np.where(is_log, g, 0.0)), g)[None]
+            try:
+                gaussians = conditional(h)
+            except (ConvergenceError, np.linalg.LinAlgError):  # where columns depend on each other, far away
+                return np.full(len(g), -np.inf)
+            value = (
+                gaussians.log_likelihood
+                + _ceiling(conditional, gaussians)
+                + log_prior_density(priors, h)
+                + (g * is_log).sum(axis=1)
+            )
+            return np.asarray(np.where(np.isnan(value), -np.inf, value)[0])
+
+        tried = np.array([prior.quantile(QUANTILES) for prior in priors[0][: len(structure)]])
+        starts = coordinates(tried.T, is_log[: len(structure)]).T
+        bounds = np.column_stack([self.warp.lower[index], self.warp.upper[index]])
+        if has_missed(log_density, bounds, coordinates(self.settings[index], is_log), weights, starts):
+            raise ConvergenceError(
+                f"the posterior of {', '.join(structure)} is a ridge too thin for quadrature beside this noise: use "
+                "the method 'nuts', or give a narrow prior of one of them."
+            )
+
+    def _log_ceiling(self, h: FloatArray) -> FloatArray:
+        """Return a likelihood that is no less than the true one, and equal where at most one bound is near."""
+        gaussians = self.conditional(h)
+        return np.asarray(gaussians.log_likelihood + _ceiling(self.conditional, gaussians))
+
+    def _log_integrand(self, u: FloatArray) -> FloatArray:
+        """Return the posterior's log density (B, N) in the coordinates of the warp; bounds count where it matters."""
+        assert self.warp is not None  # noqa: S101 (only called once it is there)
+        h, log_density = self.warp.parameters(u)
+        gaussians = self.conditional(h)
+        ceiling = _ceiling(self.conditional, gaussians)
+        value = gaussians.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
+        value = np.where(np.isnan(value), -np.inf, value)
+        is_exact = np.zeros(value.shape, dtype=bool)
+        for margin in (0.0, IRRELEVANT):  # the best ones first, which tell what matters
+            floor = self._top if margin else value.max(axis=1, keepdims=True)
+            relevant = ~is_exact & (value >= floor - margin) & np.isfinite(value)
+            data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
+            log_mass, _ = self.conditional.boxes[data_set].log_mass(gaussians.mean[relevant], gaussians.root[relevant])
+            value[relevant] += log_mass - ceiling[relevant]
+            is_exact |= relevant
+            exact = np.where(is_exact, value, -np.inf)
+            self._top = np.maximum(self._top, exact.max(axis=1, keepdims=True))
+        return value
+
+
+def _ceiling(conditional: ConditionalGaussian, given: Conditional) -> FloatArray:
+    """Return no less than the log mass (B, N) within the bounds of the linear parameters."""
+    shape, size, p = given.log_likelihood.shape, given.log_likelihood.size, given.mean.shape[2]
+    every = conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
+    return every.ceiling(given.mean.reshape(size, p), given.root.reshape(size, p, p)).reshape(shape)
+
+
+def _solution(integration: _Integration, index: int, seed: int) -> Solution:
+    """Return the posterior of one of the data sets."""
+    model, rule, gaussians = integration.models[index], integration.rule, integration.given
+    box = integration.conditional.boxes[[index]]
+    weights = rule.weights[index] if rule else np.ones(1)
+    mixture = GaussianMixture(weights, integration.settings[index], gaussians.mean[index], gaussians.root[index])
+    mass_outside = box.beyond(mixture.mean, mixture.root)
+    truncated = bounded(mixture, mass_outside, box)
+
+    def marginal(symbol: str) -> Marginal:
+        if symbol in model.linear:
+            return truncated.marginal(model.linear.index(symbol))
+        assert integration.rule is not None  # noqa: S101 (there is a nonlinear parameter)
+        assert integration.warp is not None  # noqa: S101
+        side = model.nonlinear.index(symbol)
+        return marginal_of_quadrature(integration.rule, integration.warp, index, side, mixture.settings[:, side])
+
+    linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
+    integrated = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
+    cut = "; bounds of the linear parameters cut the posterior and were honoured" if truncated.is_cut else ""
+    found = Solution(
+        model, "exact", f"{linear}; {integrated}{cut}", truncated.components, Marginals.of(model, marginal), seed=seed
+    )
+    if any(isinstance(prior, Flat) for prior in model.priors.values()):
+        return found
+    heavy = np.flatnonzero((weights > HEAVY) & (mass_outside.sum(axis=1) > HEAVY))
+    log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
+    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY))
+    if error_of_mass > MOST_ERROR:
+        raise ConvergenceError(
+            f"bounds of several linear parameters ({', '.join(model.linear)}) cut so deep that the mass "
+            "within them is not known well enough; use the method 'joint', or wider priors."
+        )
+    if rule:
+        evidence = float(rule.log_integral[index])
+        error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT) + error_of_mass)
+    else:
+        evidence, error_of_evidence = float(gaussians.log_likelihood[index, 0] + log_mass.sum()), error_of_mass
+    return replace(found, log_evidence=evidence, log_evidence_error=error_of_evidence)

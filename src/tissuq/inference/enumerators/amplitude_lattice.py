@@ -1,0 +1,261 @@
+"""The posterior under an energy discrepancy: exact sums over its members and lattices of their amplitudes.
+
+Given a member and the ratios g = c / noise_sd of its amplitudes, everything is linear and Gaussian
+(`tissuq.inference.enumerators.lattice`). The integrand is smooth in log g and log noise_sd, so that equally spaced
+points integrate it with an error that falls exponentially with their number. Parameters that are left, such as
+exponents, take the values of weighted quasi-random points (`tissuq.inference.enumerators.outer`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ModelError
+from tissuq.inference.bounds import bounded
+from tissuq.inference.box import Boxes
+from tissuq.inference.enumerators.amplitudes import (
+    LIGHT,
+    Points,
+    log_prior_of_amplitude,
+    log_prior_of_noise,
+    noise_grid,
+)
+from tissuq.inference.enumerators.lattice import STEP, Reduced
+from tissuq.inference.enumerators.nodes import OUTER_STEP, Node, single_nodes, weighted_nodes
+from tissuq.inference.enumerators.outer import Outer
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.linear import LinearPriors
+from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
+from tissuq.inference.resampling import systematic
+from tissuq.inference.solution import Marginals, Solution, shares_of_members
+from tissuq.inference.threads import one_thread
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Flat, Prior
+
+__all__ = ["AmplitudeLattice", "solve_energies"]
+
+FloatArray = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+MOST_PRIOR_ERROR = 0.01
+TOUCHED = 1e-10
+"""Mass outside the bounds from which it is taken off a component's weight."""
+REPRESENTED = 3000
+"""Components, at most, that represent the posterior in draws and predictions."""
+NOISE_ROWS, NOISES = 1000, 400
+"""Points, and values of the noise for each, from which the marginal of the noise is computed."""
+PULLED = 5
+"""So many times fewer, where priors of linear parameters depend on the noise, too."""
+TAILS = 0.25
+"""Power of the weights by which components are taken that must represent the tails, too."""
+
+
+class AmplitudeLattice:
+    """Lattices of the amplitudes of an energy discrepancy, at importance points of parameters beside them."""
+
+    def why_not(self, model: StatisticalModel) -> str:
+        """Return why an energy discrepancy cannot be integrated with the rest of a model; nothing where it can."""
+        for symbol in model.energy_symbols:
+            if _lattice_error(model.priors[symbol]) > MOST_PRIOR_ERROR:
+                return (
+                    f"the prior {model.priors[symbol]} of {symbol} has a bound or is narrow, where a wide positive one "
+                    "is"
+                )
+        return "" if model.energy_symbols else f"discrepancy '{model.discrepancy.name}' is no energy"
+
+    def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
+        """Return the posteriors of models on the same stretches, which share every decomposition."""
+        return solve_energies(models, seed)
+
+
+def _lattice_error(prior: Prior) -> float:
+    """Return by how much the mass of a prior is wrong on every second point of the lattice, wherever this begins."""
+    if prior.support != (0.0, np.inf):
+        return np.inf
+    middle = np.log(prior.quantile(0.5))
+    starts = middle + 2 * STEP * np.arange(8)[:, None] / 8
+    amplitudes = np.exp(starts + 2 * STEP * np.arange(-60, 61))
+    masses = (2 * STEP * amplitudes * np.exp(prior.log_density(amplitudes))).sum(axis=1)
+    return float(np.abs(masses - 1).max())
+
+
+def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+    """Return posterior and evidence of models with an energy discrepancy, on the same stretches.
+
+    Parameters
+    ----------
+    models : sequence of StatisticalModel
+        With the same material, discrepancy and noise on the same stretches: they share every decomposition, unless
+        parameters are left that no lattice sums over.
+    seed : int
+        Of the draws; nothing else is random.
+
+    Raises
+    ------
+    ModelError
+        When the model has parameters that this route does not integrate.
+    ConvergenceError
+        When it is not found where the parameters lie that no lattice sums over.
+    """
+    reason = AmplitudeLattice().why_not(models[0])
+    if reason:
+        raise ModelError(
+            f"discrepancy '{models[0].discrepancy.name}' needs wide positive priors on its amplitudes. Here {reason}: "
+            "choose otherwise, or another discrepancy."
+        )
+    with one_thread():
+        if Outer(models[0]).symbols:
+            return [_EnergySums(model, *weighted_nodes(model)).solution(seed) for model in models]
+        nodes = single_nodes(models)
+        return [_EnergySums(m, [node], np.zeros(1), 0.0).solution(seed) for m, node in zip(models, nodes, strict=True)]
+
+
+class _EnergySums:
+    """The posterior of one data set under an energy discrepancy.
+
+    Parameters
+    ----------
+    model : StatisticalModel
+    nodes : sequence of Node
+        At weighted values of the outer parameters.
+    log_weights : (K,) array
+        Of the nodes: priors of the outer parameters over the density of the values taken.
+    error : float
+        Relative error of the nodes' sum.
+    """
+
+    def __init__(self, model: StatisticalModel, nodes: Sequence[Node], log_weights: FloatArray, error: float) -> None:
+        self.model, self._nodes = model, nodes
+        self._outer = Outer(model)
+        self._step = STEP if len(nodes) == 1 else OUTER_STEP
+        points = Points.joined([node.points for node in nodes])
+        self._node = np.repeat(np.arange(len(nodes)), [len(node.points.lattice) for node in nodes])
+        self._bare = tuple(np.concatenate([getattr(node, name) for node in nodes]) for name in ("mean", "root"))
+        self._priors = LinearPriors(model)
+        self._box = self._priors.box
+        mean, root, _ = self._priors.times(self._bare[0], self._bare[1] * points.noise_sd[:, None, None])
+        mass_outside = self._box.beyond(mean, root)
+        near = np.flatnonzero(mass_outside.sum(axis=1) > TOUCHED)
+        log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
+        boxes = self._box.repeated(len(near))
+        log_mass[near], error_of_mass[near] = boxes.log_mass(mean[near], root[near])
+        masses = points.log_weight + log_weights[self._node] + log_mass
+        top = masses.max()
+        total = np.exp(masses - top).sum()
+        self._points, self._weights = points, np.exp(masses - top) / total
+        settings = self._settings(points, self._node)
+        self._bounded = bounded(GaussianMixture(self._weights, settings, mean, root), mass_outside, self._box)
+        self._evidence: tuple[float, float] | tuple[None, None] = None, None
+        if not any(isinstance(prior, Flat) for prior in model.priors.values()):
+            evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
+            of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
+            self._evidence = evidence, float(error + of_sums + self._weights @ error_of_mass + LIGHT)
+
+    def solution(self, seed: int) -> Solution:
+        """Return the posterior; in its mixture the weights of the discrepancy follow the material's parameters."""
+        log_evidence, error = self._evidence
+        return Solution(
+            self.model,
+            "exact",
+            self._reason(),
+            partial(self._represented, 1.0),
+            Marginals.of(self.model, self._marginal),
+            partial(self._represented, TAILS),
+            seed,
+            log_evidence=log_evidence,
+            log_evidence_error=error,
+            members=shares_of_members(self.model, self._points.lattice, self._weights),
+        )
+
+    def _reason(self) -> str:
+        """Return what was done."""
+        model, outer = self.model, self._outer.symbols
+        inner = ", ".join(symbol for symbol in model.nonlinear if symbol not in outer)
+        done = (
+            f"{', '.join(model.linear)} and the discrepancy's weights integrated in closed form; sums over "
+            f"{len(model.energy_members)} energies and lattices of {inner}"
+        )
+        shares = np.bincount(self._node, self._weights, minlength=len(self._nodes))
+        effective = 1 / (shares @ shares)
+        return done + (
+            f", and over {len(shares)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
+        )
+
+    def _represented(self, power: float) -> GaussianMixture:
+        """Return components that stand for all points, taken as often as a power of their weights says."""
+        points, node, weights = self._points, self._node, self._weights
+        if len(weights) > REPRESENTED:
+            order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice, node))
+            representatives = order[systematic((weights**power)[order][None], REPRESENTED)[0]]  # neighbours are alike
+            points, node, weights = (
+                points[representatives],
+                node[representatives],
+                weights[representatives] ** (1 - power),
+            )
+            weights = weights / weights.sum()
+        features = {int(member): self.model.energy_features(member) for member in np.unique(points.lattice)}
+        width = len(self.model.linear) + max(sum(f.shape[1] for f in blocks) for blocks in features.values())
+        mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
+        for number in np.unique(node):
+            rows = self._outer.rows(self._nodes[number].outer)
+            for member in np.unique(points.lattice[node == number]):
+                of_member = np.flatnonzero((node == number) & (points.lattice == member))
+                amplitudes = points.amplitudes[of_member][:, list(self.model.energy_members[member].amplitude_indices)]
+                reduced = Reduced(rows, features[member])
+                linear_mean, linear_root = reduced.everything(0, amplitudes, points.noise_sd[of_member])
+                linear_mean, linear_root, _ = self._priors.times(linear_mean, linear_root)
+                q = linear_mean.shape[1]
+                mean[of_member, :q], root[of_member, :q, :q] = linear_mean, linear_root
+        mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
+        free = np.full((1, width - len(self.model.linear)), np.inf)
+        box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
+        return bounded(mixture, box.beyond(mean, root), box).components()
+
+    def _marginal(self, symbol: str) -> Marginal:
+        if symbol in self.model.linear:
+            return self._bounded.marginal(self.model.linear.index(symbol))
+        if symbol == "noise_sd":
+            return self._noise_marginal()
+        values = self._settings(self._points, self._node)[:, self.model.nonlinear.index(symbol)]
+        if symbol in self.model.energy_symbols:
+            return marginal_of_logs(values, self._weights, self._step)
+        if symbol not in self._nodes[0].ratios:  # one value at each node
+            first_of_node = np.flatnonzero(np.diff(self._node, prepend=-1))
+            shares = np.add.reduceat(self._weights, first_of_node)
+            return marginal_of_points(values[first_of_node], shares, self.model.priors[symbol].support)
+        return marginal_of_points(values, self._weights, self.model.priors[symbol].support)
+
+    def _noise_marginal(self) -> Marginal:
+        """Return the marginal of the noise from its densities given the rest, at some of the points."""
+        is_pulled = self._bounded.is_cut or self._priors.is_gaussian
+        representatives = systematic(self._weights[None], NOISE_ROWS // (PULLED if is_pulled else 1))[0]
+        points, freedom = self._points[representatives], self.model.experiment.size - len(self.model.linear)
+        logs = np.log(noise_grid(self.model, points, freedom, NOISES // (2 if is_pulled else 1)))
+        noise_sd, step = np.exp(logs), logs[1] - logs[0]
+        log_density = -freedom * logs - 0.5 * points.misfit[:, None] / noise_sd**2
+        for number in np.unique(self._node[representatives]):
+            is_concerned = self._node[representatives] == number
+            log_density[is_concerned] += log_prior_of_noise(self.model, self._nodes[number].ratios, noise_sd)
+        for index, symbol in enumerate(self.model.energy_symbols):
+            is_concerned = points.amplitudes[:, index] > 0
+            ratios = points.amplitudes[is_concerned, index] / points.noise_sd[is_concerned]
+            log_density[is_concerned] += log_prior_of_amplitude(self.model.priors[symbol], ratios[:, None] * noise_sd)
+        if is_pulled:
+            mean, root = (np.repeat(bare[representatives], len(noise_sd), axis=0) for bare in self._bare)
+            root = root * np.tile(noise_sd, len(representatives))[:, None, None]
+            log_density += self._priors.log_mass(mean, root).reshape(log_density.shape)
+        density = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+        density /= density.sum(axis=1, keepdims=True) * step
+        return marginal_of_table(noise_sd, density.mean(axis=0) / noise_sd)
+
+    def _settings(self, points: Points, node: Places) -> FloatArray:
+        """Return the nonlinear parameters (M, d)."""
+        columns = dict(zip(self.model.energy_symbols, points.amplitudes.T, strict=True)) | {"noise_sd": points.noise_sd}
+        for index, symbol in enumerate(self._outer.symbols):
+            values = np.array([one_node.outer[index] for one_node in self._nodes])[node]
+            columns[symbol] = values * (points.noise_sd if symbol in self._nodes[0].ratios else 1.0)
+        return np.column_stack([columns[symbol] for symbol in self.model.nonlinear])

@@ -1,0 +1,295 @@
+"""Sums over the amplitudes of energy discrepancies and over the noise: points of lattices, and what they weigh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.enumerators.lattice import Lattice
+from tissuq.inference.enumerators.quadrature import gauss_rule
+from tissuq.inference.linear import LinearPriors
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Prior
+
+__all__ = ["LIGHT", "Points", "Weighing", "log_prior_of_amplitude", "log_prior_of_noise", "noise_grid"]
+
+FloatArray = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
+"""Of the noise given the rest: values, and the reach of its logarithm around its mode, in standard deviations
+1 / sqrt(2 freedom); above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
+CUT_NODES = 24
+"""Values of the noise where its prior cuts or is narrow."""
+IRRELEVANT = 18.0
+"""Log density below the largest, at the best noise, at which a point of a lattice is left out at once."""
+LIGHT = 1e-6
+"""Share of the posterior that may be left out."""
+TRIED, HARDLY_PULLED = 8, 0.1
+"""Values of the noise among which the best is sought where priors pull at linear parameters, and the rise of its
+logarithm up to which they hardly do."""
+MOST_WIDER = 8.0
+"""Multiple of `CUT_NODES`, at most."""
+HARDLY_CUT = 0.5
+"""Share that bounds of linear parameters leave, above which points may be left out before they are looked at."""
+MOST_LAST = 1e-3
+"""Share of the posterior at the lattice's largest amplitudes from which it is not known what lies beyond."""
+LIKELY, POSSIBLE = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
+"""Probabilities of the noise's prior between which it is likely, and between which it is at all."""
+TINY = 1e-200
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """M points of lattices: which lattice, where in it, what noise, both amplitudes, log p(data and point).
+
+    ``misfit`` tells how likely any other noise would be at the same ratios, and ``strain`` what priors that pull at the
+    linear parameters may add to it. ``log_inside`` bounds from above what their bounds leave, which is not in
+    ``log_weight``.
+    """
+
+    lattice: Places
+    second: Places
+    first: Places
+    noise_sd: FloatArray
+    amplitudes: FloatArray
+    log_weight: FloatArray
+    misfit: FloatArray
+    strain: FloatArray
+    log_inside: FloatArray
+
+    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
+        return Points(*(array[chosen] for array in vars(self).values()))
+
+    @classmethod
+    def joined(cls, point_sets: Sequence[Points]) -> Points:
+        """Return all points of several sets."""
+        return cls(
+            *(np.concatenate(arrays) for arrays in zip(*(vars(points).values() for points in point_sets), strict=True))
+        )
+
+
+class Weighing:
+    """The posterior of amplitudes and noise of one data set on lattices, one for each member.
+
+    Parameters
+    ----------
+    model : StatisticalModel
+    lattices : sequence of Lattice
+    index : int
+        Of the data set in the lattices.
+    ratios : mapping of str to float
+        Values, over noise_sd, of the other parameters of the noise.
+    """
+
+    def __init__(
+        self,
+        model: StatisticalModel,
+        lattices: Sequence[Lattice],
+        index: int,
+        ratios: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
+        self._model, self._lattices, self._index, self._ratios = model, lattices, index, ratios
+        self._ends, self._priors = _ends(model, ratios), LinearPriors(model)
+        self._is_pulled = self._priors.is_gaussian
+
+    def points(self) -> tuple[Points, float]:
+        """Return the points that matter, and the relative error of their sum: from that of every second point.
+
+        Infinite where the largest amplitudes of the lattice hold a part. No points where the noise's priors exclude
+        each other.
+        """
+        if self._ends[0] >= self._ends[1]:
+            return self._weighed(0, *np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), 0.0
+        points_of_members = self._roughly()
+        if not self._is_pulled and self._are_cut(points_of_members):
+            self._is_pulled = True
+            points_of_members = self._roughly()
+        if self._model.noise.parameters:
+            points_of_members = [
+                self._all_noise(of_member) for of_member in points_of_members if len(of_member.lattice)
+            ]
+        points = Points.joined(points_of_members)
+        mass = _masses([points])[0]
+        coarse, last = 0.0, 0.0
+        for member, lattice in enumerate(self._lattices):
+            of_member_mask = at_even = points.lattice == member
+            for grid, indices in zip(lattice.ratios, (points.first, points.second), strict=True):
+                at_even = at_even & ((indices % 2 == 0) | (len(grid) == 1))
+                last += mass[of_member_mask & (indices == len(grid) - 1) & (len(grid) > 1)].sum()
+            coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[at_even].sum()
+        error = np.inf if last > MOST_LAST * mass.sum() else float(abs(coarse / mass.sum() - 1) ** 1.5)
+        return points[mass >= _least_that_matters(mass)], error
+
+    def _roughly(self) -> list[Points]:
+        """Return the points that matter of every lattice, each at one noise."""
+        points_of_members = [self._best_noise(member) for member in range(len(self._lattices))]
+        masses = _masses(points_of_members)
+        least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT))
+        return [points[mass >= least_mass] for points, mass in zip(points_of_members, masses, strict=True)]
+
+    def _are_cut(self, every: Sequence[Points]) -> bool:
+        """Return whether the bounds of linear parameters take away much."""
+        inside, total = 0.0, 0.0
+        for points, mass in zip(every, _masses(every), strict=True):
+            if len(points.lattice):
+                lattice = self._lattices[int(points.lattice[0])]
+                mean, root = lattice.linear(self._index, points.second, points.first)
+                ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
+                inside, total = inside + float(mass @ np.exp(ceiling)), total + float(mass.sum())
+        return inside < HARDLY_CUT * total
+
+    def _best_noise(self, place: int) -> Points:
+        """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
+        lattice, noise = self._lattices[place], self._model.noise
+        second, first = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
+        misfit = lattice.misfit[second, first, self._index]
+        if not noise.parameters:
+            return self._weighed(place, second, first, misfit, np.full(len(second), float(noise.sd({}, 0.0))))
+        likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY), *np.exp(self._ends))
+        most_likely_noise = np.sqrt(misfit / lattice.freedom)
+        candidates = [self._weighed(place, second, first, misfit, np.clip(most_likely_noise, *likely))]
+        rise = _rise(candidates[0])
+        for share in np.linspace(0, 1, TRIED)[1:] if rise.max() > HARDLY_PULLED else ():
+            noise_sd = np.clip(most_likely_noise * np.exp(share * rise), *likely)
+            candidates.append(self._weighed(place, second, first, misfit, noise_sd))
+        best = np.argmax([points.log_weight + points.log_inside for points in candidates], axis=0)
+        arrays = zip(*(vars(points).values() for points in candidates), strict=True)
+        return Points(*(np.stack(values)[best, np.arange(len(best))] for values in arrays))
+
+    def _all_noise(self, points: Points) -> Points:
+        """Return the points of a lattice with several values of the noise for each, row by row.
+
+        They are those of a Gauss rule for the likelihood's own shape; where the prior cuts that or is narrower,
+        those of a Gauss-Legendre rule on what it leaves.
+        """
+        member = int(points.lattice[0])
+        freedom, ends = self._lattices[member].freedom, self._ends
+        mode = 0.5 * np.log(np.maximum(points.misfit / freedom, TINY))[:, None]
+        reach_below, reach_above = _reach(freedom)
+        low, high = mode - reach_below, mode + _rise(points)[:, None] + reach_above
+        if not self._is_pulled and (low >= ends[0]).all() and (high <= ends[1]).all():
+            nodes, cells = _noise_rule(freedom)
+            logs = mode + nodes
+        else:
+            cut = np.maximum(low, ends[0]), np.minimum(high, ends[1])
+            keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
+            low, high = (np.where(keeps, value, end) for value, end in zip(cut, ends, strict=True))
+            wider = float((high - low).max()) / (reach_below + reach_above)
+            nodes, cells = gauss_rule(int(CUT_NODES * np.clip(wider, 1, MOST_WIDER)))
+            logs, cells = low + (high - low) * nodes, (high - low) * cells
+        noise_sd = np.exp(logs).ravel()
+        rows = np.repeat(np.arange(len(points.misfit)), len(nodes))
+        points_of_noise = self._weighed(member, points.second[rows], points.first[rows], points.misfit[rows], noise_sd)
+        log_cell = log_prior_of_noise(self._model, self._ratios, noise_sd) + np.log(
+            np.broadcast_to(cells, logs.shape).ravel()
+        )
+        return replace(points_of_noise, log_weight=points_of_noise.log_weight + log_cell)
+
+    def _weighed(self, place: int, second: Places, first: Places, misfit: FloatArray, noise_sd: FloatArray) -> Points:
+        """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
+        lattice, symbols = self._lattices[place], self._model.energy_symbols
+        amplitudes = np.zeros((len(first), len(symbols)))
+        log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
+        strain, log_inside = np.zeros(len(first)), np.zeros(len(first))
+        if self._is_pulled:
+            mean, root = lattice.linear(self._index, second, first)
+            strain = self._priors.strain(mean, root)
+            mean, root, log_mass = self._priors.times(mean, root * noise_sd[:, None, None])
+            log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
+        grids_and_indices = ((lattice.ratios[0], first), (lattice.ratios[1], second))
+        for amplitude, (grid, place_on_grid) in zip(lattice.member.amplitude_indices, grids_and_indices, strict=False):
+            amplitudes[:, amplitude] = grid[place_on_grid] * noise_sd
+            log_weight += log_prior_of_amplitude(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
+            # The first point stands for all smaller amplitudes, too, among which the density is constant.
+            log_weight += np.log(np.where(place_on_grid == 0, lattice.step / -np.expm1(-lattice.step), lattice.step))
+        member_of_point = np.full(len(first), place)
+        return Points(member_of_point, second, first, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
+
+
+def log_prior_of_amplitude(prior: Prior, amplitude: FloatArray) -> FloatArray:
+    """Return the log prior density (M,) of the logarithms of amplitudes (M,)."""
+    return np.asarray(prior.log_density(amplitude) + np.log(amplitude))
+
+
+def log_prior_of_noise(model: StatisticalModel, ratios: Mapping[str, float], noise_sd: FloatArray) -> FloatArray:
+    """Return the log prior density (M,) of log noise_sd, and of the noise's other parameters over it."""
+    value = model.priors["noise_sd"].log_density(noise_sd) + np.log(noise_sd)
+    for symbol, ratio in ratios.items():
+        value = value + model.priors[symbol].log_density(ratio * noise_sd) + np.log(noise_sd)
+    return np.asarray(value)
+
+
+def noise_grid(model: StatisticalModel, points: Points, freedom: int, count: int) -> FloatArray:
+    """Return values of the noise, evenly spaced in their logarithm, among which it lies given any of the points."""
+    low, high = (
+        0.5 * np.log(np.maximum(size / freedom, TINY)) for size in (points.misfit, points.misfit + points.strain)
+    )
+    reach_below, reach_above = _reach(freedom)
+    low, high = np.clip([low.min() - reach_below, high.max() + reach_above], *_ends(model, {}))
+    return np.exp(np.linspace(low, high, count))
+
+
+def _ends(model: StatisticalModel, ratios: Mapping[str, float]) -> FloatArray:
+    """Return the logarithms of the noise between which its priors leave it; of a known one, all."""
+    if not model.noise.parameters:
+        return np.array([-np.inf, np.inf])
+    low, high = model.priors["noise_sd"].quantile(POSSIBLE)
+    for symbol, ratio in ratios.items():
+        limits = model.priors[symbol].quantile(POSSIBLE) / ratio
+        low, high = max(low, limits[0]), min(high, limits[1])
+    return np.log(np.maximum([low, high], TINY))
+
+
+def _reach(freedom: int) -> tuple[float, float]:
+    """Return how far log noise_sd reaches below its mode and above, given the ratios."""
+    unit = 1 / np.sqrt(2 * freedom)
+    return NOISE_BELOW * unit, (NOISE_BELOW + NOISE_ABOVE / np.sqrt(freedom)) * unit
+
+
+def _rise(points: Points) -> FloatArray:
+    """Return by how much (M,) the logarithm of the noise may rise where priors pull at the linear parameters."""
+    return np.asarray(0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY)))
+
+
+def _masses(every: Sequence[Points]) -> list[FloatArray]:
+    """Return the masses of the points of several sets, within bounds at most, over the largest of all."""
+    logs = [points.log_weight + points.log_inside for points in every]
+    top = max(log_masses.max(initial=-np.inf) for log_masses in logs)
+    return [np.exp(log_masses - top) for log_masses in logs]
+
+
+def _least_that_matters(mass: FloatArray) -> float:
+    """Return the mass below which points hold next to nothing together."""
+    order = np.sort(mass)
+    return float(order[np.searchsorted(np.cumsum(order), LIGHT * order.sum())])
+
+
+@lru_cache(maxsize=64)
+def _noise_rule(freedom: int) -> tuple[FloatArray, FloatArray]:
+    """Return nodes, as log noise_sd from its mode, and weights of the Gauss rule whose weight is the likelihood.
+
+    Given the ratios it is noise_sd^-f exp(-misfit / (2 noise_sd^2)): the same shape about its mode whatever the misfit.
+    It is divided out of the weights again. By the Stieltjes procedure and the Jacobi matrix (Golub & Welsch 1969).
+    """
+    reach_below, reach_above = _reach(freedom)
+    grid, step = np.linspace(-reach_below, reach_above, 4001, retstep=True)
+    share = np.exp(_log_shape(grid, freedom))
+    diagonal, beside = np.zeros(NOISE_NODES), np.zeros(NOISE_NODES)
+    previous, current = np.zeros(len(grid)), np.full(len(grid), 1 / np.sqrt(share.sum()))
+    for k in range(NOISE_NODES):
+        diagonal[k] = (share * grid * current**2).sum()
+        following = (grid - diagonal[k]) * current - beside[k - 1] * previous
+        beside[k] = np.sqrt((share * following**2).sum())
+        previous, current = current, following / beside[k]
+    nodes, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1))
+    return nodes, step * share.sum() * vectors[0] ** 2 * np.exp(-_log_shape(nodes, freedom))
+
+
+def _log_shape(log_noise: FloatArray, freedom: int) -> FloatArray:
+    return np.asarray(-freedom * (log_noise + 0.5 * np.expm1(-2 * log_noise)))

@@ -1,0 +1,210 @@
+"""One energy discrepancy on one design: the linear parameters given the ratios of its amplitudes to the noise.
+
+What costs most, a decomposition for each ratio of the second block, depends on the stretches alone: it serves all data
+sets and all exponents of the material. The ratio of the first block and the noise enter by sums over few directions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.algebra import integrated
+from tissuq.model.discrepancy import Member, side_by_side
+
+__all__ = ["STEP", "Directions", "Lattice", "Reduced", "Rows"]
+
+FloatArray = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+STEP = 0.4
+"""Of log g. The posterior of an amplitude that r directions tell has an sd of about 1 / sqrt(2 r) in its logarithm."""
+SMALLEST, LARGEST = 1e-3, 1e6
+"""Ratios of the discrepancy's stress (root mean square) to the noise between which the lattice lies, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Measurements over their relative noise, with everything given but linear parameters, amplitudes and noise_sd.
+
+    Attributes
+    ----------
+    design : (n, p) array
+        Stresses of unit linear parameters.
+    stresses : (n, B) array
+        Of B data sets.
+    scale : (n,) array
+        Noise of every measurement over noise_sd; stresses are divided by it already.
+    count : int
+        How many measurements the rows stand for, n unless these are condensed.
+    """
+
+    design: FloatArray
+    stresses: FloatArray
+    scale: FloatArray
+    count: int
+
+    @property
+    def log_scale(self) -> float:
+        """Log of what division by the relative noise makes of a density."""
+        return float(np.log(self.scale).sum())
+
+
+class Reduced:
+    """The rows of B data sets and the features of one member, as a QR triangle.
+
+    Parameters
+    ----------
+    rows : Rows
+    features : list of (n, r) arrays
+        The stresses of each block's terms at the measurements.
+    """
+
+    def __init__(self, rows: Rows, features: list[FloatArray]) -> None:
+        self._parameters = rows.design.shape[1]
+        self._sizes = [block.shape[1] for block in features]
+        columns = np.hstack([rows.design, *(block / rows.scale[:, None] for block in features)])
+        basis, self._triangle = np.linalg.qr(columns)
+        self._data = basis.T @ rows.stresses
+
+    def everything(self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return means (M, q) and roots (M, q, q) of the material's parameters and the discrepancy's weights.
+
+        For any amplitudes (M, blocks) and noise (M,).
+        """
+        p, k, q = self._parameters, len(self._triangle), self._parameters + sum(self._sizes)
+        scale = np.ones((len(noise_sd), q))
+        scale[:, p:] = np.repeat(amplitudes, self._sizes, axis=1)
+        rows = np.zeros((len(noise_sd), k + q - p, q + 1))
+        rows[:, :k, :q] = self._triangle * (scale / noise_sd[:, None])[:, None]
+        rows[:, :k, q] = self._data[:, data_set] / noise_sd[:, None]
+        rows[:, k:, p:q] = np.eye(q - p)
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+        root = np.asarray(np.linalg.inv(triangle[:, :q, :q]), dtype=np.float64)
+        mean = (root @ triangle[:, :q, q:])[:, :, 0]
+        return mean * scale, root * scale[:, :, None]
+
+
+class Directions:
+    """One member on one design: directions in which its errors are independent, for every pair of ratios.
+
+    Parameters
+    ----------
+    member : Member
+    scale : (n,) array
+        Noise of every measurement over noise_sd.
+    features : list of (n, r) arrays
+        The stresses of each block's terms at the measurements.
+    count : int
+        How many measurements the rows stand for.
+    least : float
+        A stress that counts as that of a block without stress in this mode.
+    unlikely : list of float
+        For each block, a ratio g = c / noise_sd below which it is not likely to be before the data.
+    step, shift : float
+        Of log g: between points of the lattice, and from where it would begin.
+
+    Attributes
+    ----------
+    ratios : tuple of (G1,) and (G2,) arrays
+        Of the first and the second block; a block that is missing has the one ratio zero.
+    step : float
+    """
+
+    def __init__(
+        self,
+        member: Member,
+        scale: FloatArray,
+        features: list[FloatArray],
+        count: int,
+        least: float,
+        unlikely: list[float],
+        step: float = STEP,
+        shift: float = 0.0,
+    ) -> None:
+        self.member, self.step = member, step
+        features = [block / scale[:, None] for block in features]
+        sizes = (max(float(np.sqrt((block**2).sum() / count)), least) for block in features)
+        pairs = zip(sizes, unlikely, strict=True)
+        grids = [*(_grid(size, low, step, shift) for size, low in pairs), *[np.zeros(1)] * 2]
+        self.ratios = grids[0], grids[1]
+        self.basis, triangle = np.linalg.qr(side_by_side(features, len(scale)))
+        first_block, second_block = np.split(triangle, [features[0].shape[1] if features else 0], axis=1)
+        # White in the second block, for all of its ratios, and then in the first.
+        values, vectors = np.linalg.eigh(second_block @ second_block.T)
+        variance = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
+        left_vectors, singular, _ = np.linalg.svd((vectors.T @ first_block) / np.sqrt(variance)[:, :, None])
+        self.white = left_vectors.swapaxes(1, 2) @ (vectors.T / np.sqrt(variance)[:, :, None])
+        no_stress = np.zeros((len(singular), variance.shape[1] - singular.shape[1]))
+        self.variance = 1 + (self.ratios[0][:, None] * np.hstack([singular, no_stress])[:, None]) ** 2
+        self.log_size = 0.5 * (np.log(variance).sum(axis=1)[:, None] + np.log(self.variance).sum(axis=2))
+
+
+class Lattice:
+    """The posteriors of B data sets under one member, at every pair of ratios of its amplitudes to the noise.
+
+    Points of the lattice are addressed by the places of the second block's ratio and of the first one's, (M,) each.
+
+    Parameters
+    ----------
+    directions : Directions
+    rows : Rows
+
+    Attributes
+    ----------
+    parameters : int
+        Number of linear parameters.
+    freedom : int
+        Measurements less linear parameters.
+    misfit : (G2, G1, B) array, MPa^2
+        Sum of squares of the data given the ratios, in units of the noise.
+    log_size : (G2, G1) array
+        Half the log determinant of everything but the noise.
+    """
+
+    def __init__(self, directions: Directions, rows: Rows) -> None:
+        self.member, self.ratios, self.step = directions.member, directions.ratios, directions.step
+        self.parameters = rows.design.shape[1]
+        self.freedom = rows.count - self.parameters
+        # The material's part of the data and what it leaves, within the span of the features and outside.
+        basis, triangle = np.linalg.qr(rows.design)
+        self._inverse, self._fit = np.linalg.inv(triangle), basis.T @ rows.stresses
+        columns = np.hstack([basis, rows.stresses - basis @ self._fit])
+        inside = directions.basis.T @ columns
+        outside = columns - directions.basis @ inside
+        design_inside, data_inside = np.split(directions.white @ inside, [self.parameters], axis=2)
+        design_outside, data_outside = np.split(outside, [self.parameters], axis=1)
+        weight = 1 / directions.variance
+        weighted = weight[:, :, :, None] * design_inside[:, None]
+        precision = weighted.swapaxes(2, 3) @ design_inside[:, None] + design_outside.T @ design_outside
+        pull = weighted.swapaxes(2, 3) @ data_inside[:, None] + design_outside.T @ data_outside
+        size = weight @ data_inside**2 + (data_outside**2).sum(axis=0)
+        tiny = 1e-15 * np.trace(precision, axis1=2, axis2=3)[:, :, None, None] * np.eye(self.parameters)
+        gaussian = integrated(precision + tiny, pull, size)
+        self._root, self._scores = gaussian.root, gaussian.scores
+        self.misfit = np.maximum(gaussian.misfit, 0.0)
+        self.log_size = directions.log_size - gaussian.log_volume
+        self.log_size += np.log(np.abs(np.diag(triangle))).sum() + rows.log_scale
+
+    def log_likelihood(
+        self, data_set: int, second_index: Places, first_index: Places, noise_sd: FloatArray
+    ) -> FloatArray:
+        """Return log p(y | ratios, noise_sd) (M,), the linear parameters integrated with density one."""
+        exponent = 0.5 * self.misfit[second_index, first_index, data_set] / noise_sd**2
+        log_noise = np.log(noise_sd) + 0.5 * log(2 * pi)
+        return np.asarray(-self.freedom * log_noise - exponent - self.log_size[second_index, first_index])
+
+    def linear(self, data_set: int, second_index: Places, first_index: Places) -> tuple[FloatArray, FloatArray]:
+        """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise."""
+        root = self._root[second_index, first_index]
+        shift = (root @ self._scores[second_index, first_index, :, data_set][:, :, None])[:, :, 0]
+        return (self._fit[:, data_set] + shift) @ self._inverse.T, self._inverse @ root
+
+
+def _grid(size: float, unlikely: float, step: float, shift: float) -> FloatArray:
+    """Return the ratios of a block whose terms have a stress of some size (root mean square)."""
+    smallest, largest = min(SMALLEST / size, unlikely) * np.exp(shift), LARGEST / size
+    return np.asarray(smallest * np.exp(step * np.arange(int(log(largest / smallest) / step) + 1)))

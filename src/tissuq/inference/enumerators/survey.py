@@ -1,0 +1,204 @@
+"""Where the posteriors of the nonlinear parameters lie: modes, spreads and ridges, before any integration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.parameters.priors import Prior
+
+__all__ = ["REACH", "Survey", "log_prior_density", "survey"]
+
+FloatArray = NDArray[np.float64]
+LogDensity = Callable[[FloatArray], FloatArray]
+
+PROBES = 10
+"""Prior probabilities tried along each parameter: 2^-1, 2^-2, ... for positive ones, even ones for others."""
+LATTICE = {0: 1, 1: 10, 2: 7, 3: 5}
+"""Settings tried along each parameter of the structure, by their number."""
+ZOOMS = 8
+RELEVANT = 8.0
+"""Log of the mass relative to the best setting below which a setting is left outside the zoom."""
+NEWTON_STEPS = 25
+NEAR = 0.02
+"""Change of a coordinate at which the search for a mode ends."""
+STEP = 1e-3
+REACH = 20.0
+"""e-folds below the mode at which the logarithm of a parameter ends: about e^-20 of the mass lies below."""
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Means and covariances of d coordinates under B posteriors, roughly.
+
+    A coordinate is the logarithm of a parameter whose support is positive, and the parameter itself otherwise; the
+    first ``structure`` of them cost a factorisation to vary.
+    """
+
+    structure: int
+    is_log: NDArray[np.bool_]
+    lower: FloatArray
+    upper: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+
+
+def log_prior_density(priors: Sequence[Sequence[Prior]], h: FloatArray) -> FloatArray:
+    """Return the log prior density (B, N) of parameters (B, N, d) under the d priors of each data set."""
+    if all(own == priors[0] for own in priors):
+        columns = zip(priors[0], np.moveaxis(h, 2, 0), strict=True)
+        return np.asarray(sum(prior.log_density(column) for prior, column in columns))
+    return np.array([log_prior_density([own], row[None])[0] for own, row in zip(priors, h, strict=True)])
+
+
+def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: LogDensity) -> Survey:
+    """Find where B posteriors of d parameters lie.
+
+    The structure is tried on a lattice that zooms in on what holds mass; at every setting of it, the mode of the
+    other coordinates is found by damped Newton steps, and Laplace's approximation tells its mass. The law of
+    total covariance puts both together.
+
+    Parameters
+    ----------
+    priors : B sequences of d Prior
+        Those of the structure are the same for all data sets.
+    structure : int
+        Number of parameters, the first ones, that belong to the structure.
+    log_likelihood : callable
+        Maps parameters (B, N, d), with a structure shared by the data sets, to (B, N) values.
+    """
+    supports = np.array([[prior.support for prior in own] for own in priors])
+    is_log = np.asarray((supports[:, :, 0] >= 0).all(axis=0), dtype=np.bool_)
+    with np.errstate(divide="ignore"):
+        bounds = np.where(is_log[:, None], np.log(np.maximum(supports, 0.0)), supports)
+
+    def log_posterior(g: FloatArray) -> FloatArray:
+        h = np.where(is_log, np.exp(np.where(is_log, g, 0.0)), g)
+        value = log_likelihood(h) + log_prior_density(priors, h) + (g * is_log).sum(axis=2)
+        return np.where(np.isnan(value), -np.inf, value)
+
+    probes = [_probes(own, is_log) for own in priors]
+    probes_of_others = np.array([_grid(own[structure:]) for own in probes])
+    low, high = (np.array([end(line) for line in probes[0][:structure]]) for end in (min, max))
+    for _ in range(ZOOMS):
+        settings, spacing = _lattice(low, high)
+        modes, covariances, log_mass = _modes(log_posterior, settings, probes_of_others, bounds[:, structure:])
+        weights = np.exp(log_mass - log_mass.max(axis=1, keepdims=True))
+        seen = settings[(weights > np.exp(-RELEVANT)).any(axis=0)]
+        closer = np.maximum(seen.min(axis=0) - spacing, low), np.minimum(seen.max(axis=0) + spacing, high)
+        if not (closer[1] - closer[0] < 0.6 * (high - low)).any():
+            break
+        low, high = closer
+    weights /= weights.sum(axis=1, keepdims=True)
+    points = np.concatenate([np.broadcast_to(settings, (len(priors), *settings.shape)), modes], axis=2)
+    mean = np.einsum("bk,bkd->bd", weights, points)
+    away = points - mean[:, None]
+    covariance = np.einsum("bk,bki,bkj->bij", weights, away, away)
+    covariance[:, structure:, structure:] += np.einsum("bk,bkij->bij", weights, covariances)
+    own = np.arange(structure)
+    covariance[:, own, own] += np.maximum(spacing, 1e-6) ** 2 / 12
+    return Survey(structure, is_log, bounds[:, :, 0], bounds[:, :, 1], mean, covariance)
+
+
+def _probes(priors: Sequence[Prior], is_log: NDArray[np.bool_]) -> list[FloatArray]:
+    """Return coordinates to try along each parameter."""
+    powers, even = 0.5 ** np.arange(1, PROBES + 1), np.linspace(0.05, 0.95, PROBES)
+    return [
+        np.log(prior.quantile(np.append(1 - powers[3], powers))) if log else np.asarray(prior.quantile(even))
+        for prior, log in zip(priors, is_log, strict=True)
+    ]
+
+
+def _lattice(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    count = LATTICE[len(low)]
+    lines = [np.linspace(*ends, count) for ends in zip(low, high, strict=True)]
+    return _grid(lines), (high - low) / max(count - 1, 1)
+
+
+def _grid(lines: Sequence[FloatArray]) -> FloatArray:
+    """Return all combinations of values along each line, one a row."""
+    return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines)) if lines else np.zeros((1, 0))
+
+
+def _modes(
+    log_posterior: LogDensity, settings: FloatArray, probes: FloatArray, bounds: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the modes (B, K, t) of the other coordinates at K settings, their covariances, and log masses (B, K)."""
+    count, (data_sets, _, t) = len(settings), probes.shape
+
+    def at(points: FloatArray) -> FloatArray:
+        """Evaluate (B, K, P) at the other coordinates (B, K, P, t)."""
+        fixed = np.broadcast_to(settings[:, None], (*points.shape[:3], settings.shape[1]))
+        g = np.concatenate([fixed, points], axis=3)
+        return log_posterior(g.reshape(data_sets, -1, g.shape[3])).reshape(points.shape[:3])
+
+    tried = at(np.broadcast_to(probes[:, None], (data_sets, count, *probes.shape[1:])))
+    best = tried.argmax(axis=2)
+    if not t:
+        return np.zeros((data_sets, count, 0)), np.zeros((data_sets, count, 0, 0)), tried[:, :, 0]
+    start = np.take_along_axis(probes, best[:, :, None], axis=1)
+    inside = np.where(np.isfinite(bounds), bounds, np.sign(bounds) * 1e6)
+    margin = 1e-4 * np.minimum(inside[:, :, 1] - inside[:, :, 0], 1.0)
+    low, high = (inside[:, :, 0] + margin)[:, None], (inside[:, :, 1] - margin)[:, None]
+    point, value, curvature = _climb(at, np.clip(start, low, high), low, high)
+    covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
+    return point, covariance, value + 0.5 * np.linalg.slogdet(covariance)[1]
+
+
+def _climb(
+    at: LogDensity, point: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Climb to the modes, all at once, by damped Newton steps on finite differences."""
+    value, gradient, curvature = _derivatives(at, point)
+    damping = np.full(value.shape, 1e-2)
+    done = ~np.isfinite(value)
+    for _ in range(NEWTON_STEPS):
+        steep = curvature + damping[..., None, None] * np.eye(point.shape[-1])
+        step = np.linalg.solve(steep, gradient[..., None])[..., 0]
+        trial = np.clip(point + np.clip(step, -2.0, 2.0), low, high)
+        derivatives = _derivatives(at, trial)
+        better = (derivatives[0] > value) & ~done
+        moved = np.abs(trial - point).max(axis=-1)
+        point = np.where(better[..., None], trial, point)
+        value, gradient, curvature = (
+            np.where(better.reshape(better.shape + (1,) * (new.ndim - 2)), new, old)
+            for new, old in zip(derivatives, (value, gradient, curvature), strict=True)
+        )
+        damping = np.where(better, np.maximum(damping / 8, 1e-8), damping * 8)
+        done |= (moved < NEAR) | (damping > 1e8)
+        if done.all():
+            break
+    return point, value, curvature
+
+
+def _derivatives(at: LogDensity, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return values, gradients and negative Hessians, made positive, from finite differences."""
+    t = point.shape[-1]
+    pairs = [(i, j) for i in range(t) for j in range(i)]
+    eye = np.eye(t) * STEP
+    stencil = np.array([np.zeros(t), *eye, *-eye, *(eye[i] + eye[j] for i, j in pairs)])
+    values = at(point[..., None, :] + stencil)
+    centre, up, down, mixed = (
+        values[..., 0],
+        values[..., 1 : t + 1],
+        values[..., t + 1 : 2 * t + 1],
+        values[..., 2 * t + 1 :],
+    )
+    with np.errstate(invalid="ignore"):
+        bend = (up - 2 * centre[..., None] + down) / STEP**2
+        hessian = bend[..., None] * np.eye(t)
+        for index, (i, j) in enumerate(pairs):
+            cross = mixed[..., index] - centre - (up[..., i] - down[..., i] + up[..., j] - down[..., j]) / 2
+            hessian[..., i, j] = hessian[..., j, i] = cross / STEP**2 - 0.5 * (bend[..., i] + bend[..., j])
+        gradient = (up - down) / (2 * STEP)
+    return centre, np.nan_to_num(gradient, posinf=0, neginf=0), _positive(-hessian)
+
+
+def _positive(curvature: FloatArray) -> FloatArray:
+    """Return curvatures with eigenvalues of at least a twenty-fifth: no scale beyond five e-folds or units."""
+    is_finite = np.asarray(np.isfinite(curvature).all(axis=(-2, -1)))[..., None, None]
+    values, vectors = np.linalg.eigh(np.where(is_finite, curvature, np.eye(curvature.shape[-1])))
+    return np.asarray((vectors * np.maximum(values, 0.04)[..., None, :]) @ vectors.swapaxes(-1, -2))

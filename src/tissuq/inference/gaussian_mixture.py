@@ -1,0 +1,146 @@
+"""A distribution as weighted settings of the nonlinear parameters, the linear ones Gaussian given each setting."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.marginal import Marginal, marginal_of_mixture
+from tissuq.inference.resampling import systematic
+
+__all__ = ["CHAINS", "GaussianMixture"]
+
+FloatArray = NDArray[np.float64]
+
+CHAINS, DRAWS = 4, 1000
+"""Number of chains of draws from a mixture, and of draws in each chain."""
+NEGLIGIBLE_WEIGHT = 1e-7
+"""Share of the total weight that the components left out by `GaussianMixture.thinned` have together, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianMixture:
+    """M weighted settings of the nonlinear parameters, and a Gaussian of the linear ones given each.
+
+    Attributes
+    ----------
+    weights : (M,) array
+        Non-negative, sum one.
+    settings : (M, d) array
+        Values of the nonlinear parameters.
+    mean : (M, p) array
+        Means of the linear parameters.
+    root : (M, p, r) array
+        Roots of their covariances, R R'; zero where a component is a point. Square in posteriors.
+    member : (M,) array, optional
+        Where a discrepancy is an average, which of its members; its weights then follow the linear parameters.
+    """
+
+    weights: FloatArray
+    settings: FloatArray
+    mean: FloatArray
+    root: FloatArray
+    member: NDArray[np.intp] | None = None
+
+    @classmethod
+    def of_points(
+        cls, weights: FloatArray, settings: FloatArray, values: FloatArray, member: NDArray[np.intp] | None = None
+    ) -> GaussianMixture:
+        """Return points without extent: settings (M, d) and values (M, p) of the linear parameters."""
+        count, p = values.shape
+        return cls(weights, settings, values, np.broadcast_to(0.0, (count, p, p)), member)
+
+    @classmethod
+    def of_covariances(cls, weights: FloatArray, mean: FloatArray, covariance: FloatArray) -> GaussianMixture:
+        """Return Gaussians of linear parameters alone, of covariances (M, p, p), which may be singular."""
+        values, vectors = np.linalg.eigh(covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
+        return cls(weights, np.zeros((len(weights), 0)), mean, root)
+
+    def __getitem__(self, chosen: NDArray[Any] | slice) -> GaussianMixture:
+        member = None if self.member is None else self.member[chosen]
+        return GaussianMixture(
+            self.weights[chosen], self.settings[chosen], self.mean[chosen], self.root[chosen], member
+        )
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """The covariances (M, p, p) of the components."""
+        return np.asarray(self.root @ self.root.swapaxes(1, 2))
+
+    def moments(self) -> tuple[FloatArray, FloatArray]:
+        """Return the mean (p,) and the covariance (p, p) of the linear parameters."""
+        weights = self.weights / self.weights.sum()
+        mean = weights @ self.mean
+        spread = np.concatenate([self.root, (self.mean - mean)[:, :, None]], axis=2) * np.sqrt(weights)[:, None, None]
+        flat = spread.swapaxes(0, 1).reshape(len(mean), -1)
+        return mean, flat @ flat.T
+
+    def marginal(self, index: int) -> Marginal:
+        """Return the marginal of the linear parameter with an index; no component may be a point."""
+        sds = np.sqrt((self.root[:, index] ** 2).sum(axis=1))
+        return marginal_of_mixture(self.weights, self.mean[:, index], sds)
+
+    def joined(self, other: GaussianMixture) -> GaussianMixture:
+        """Return these components followed by others; the weights of both together must sum to one."""
+        is_average = self.member is not None and other.member is not None
+        names = ("weights", "settings", "mean", "root", *(["member"] if is_average else []))
+        return GaussianMixture(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def draw(self, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return the component (chains, draws) of every draw, and its linear parameters (chains, draws, p)."""
+        generator = np.random.default_rng(seed)
+        chosen = generator.choice(len(self.weights), size=(CHAINS, DRAWS), p=self.weights)
+        noise = generator.standard_normal((CHAINS, DRAWS, self.root.shape[2]))
+        return chosen, self.mean[chosen] + np.einsum("cdij,cdj->cdi", self.root[chosen], noise)
+
+    def weighted(self, weights: FloatArray) -> GaussianMixture:
+        """Return the same components with other weights (M,)."""
+        return replace(self, weights=weights)
+
+    def thinned(self, count: int) -> GaussianMixture:
+        """Return few components that stand for all, their weights summing to one.
+
+        The lightest, together less than 1e-7 of all, are left out; if more than ``count`` remain, systematic
+        resampling in their order, which keeps neighbours apart, picks equally weighted ones.
+        """
+        order = np.argsort(self.weights)
+        heavy = self[np.sort(order[np.cumsum(self.weights[order]) > NEGLIGIBLE_WEIGHT * self.weights.sum()])]
+        total = heavy.weights.sum()
+        if len(heavy.weights) <= count:
+            return heavy.weighted(heavy.weights / total)
+        picked = heavy.resampled(count)
+        return picked.weighted(picked.weights / total)
+
+    def resampled(self, count: int) -> GaussianMixture:
+        """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""
+        if len(self.weights) <= count:
+            return self
+        chosen = self[systematic(self.weights[None], count)[0]]
+        return chosen.weighted(np.full(count, self.weights.sum() / count))
+
+    def to_arrays(self) -> dict[str, tuple[tuple[str, ...], NDArray[Any]]]:
+        """Return its arrays by name, with their dimensions, without those that are empty."""
+        dims = {
+            "weights": ("component",),
+            "settings": ("component", "nonlinear"),
+            "mean": ("component", "linear"),
+            "root": ("component", "linear", "along"),
+            "member": ("component",),
+        }
+        arrays = {name: getattr(self, name) for name in dims}
+        return {name: (dims[name], array) for name, array in arrays.items() if array is not None and array.size}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> GaussianMixture:
+        """Return the mixture whose arrays `to_arrays` gave."""
+        empty = np.zeros((len(arrays["weights"]), 0))
+        settings, mean = (arrays.get(name, empty) for name in ("settings", "mean"))
+        return cls(arrays["weights"], settings, mean, arrays.get("root", empty[:, :, None]), arrays.get("member"))

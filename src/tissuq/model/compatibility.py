@@ -1,0 +1,122 @@
+"""Checks that material, discrepancy, noise and tolerances can be combined, with advice where they cannot."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import States
+from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics.stress import stresses_at
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.noise import Noise
+
+__all__ = ["check_linearity", "check_parts", "check_separable"]
+
+FloatArray = NDArray[np.float64]
+
+MAX_CONDITION_NUMBER = 1e10
+"""Largest condition number of columns of unit length whose parameters the data can separate."""
+
+
+def check_parts(
+    material: Material, discrepancy: Discrepancy, noise: Noise, tolerances: Tolerances, experiment: Experiment
+) -> None:
+    """Refuse parts that do not fit each other.
+
+    Raises
+    ------
+    ModelError
+        When the material does not deform as a mode says, it is no material by itself, the discrepancy has a parameter
+        of it, or discrepancy, noise and tolerances take up the same errors.
+    InputError
+        When there is not one known noise for each test, or the noise needs one test, with repeats.
+    """
+    _check_modes(material, experiment)
+    _check_parameters(material, discrepancy)
+    _check_errors(discrepancy, noise, tolerances, experiment)
+
+
+def _check_modes(material: Material, experiment: Experiment) -> None:
+    for curve in experiment.curves:
+        if problem := material.why_not(curve.path.moved(curve.points[:1], 0.0)):
+            raise ModelError(problem)
+
+
+def _check_parameters(material: Material, discrepancy: Discrepancy) -> None:
+    if material.needs_matrix:
+        raise ModelError(
+            f"material '{material.name}' consists of fibres only, without stiffness where they are not stretched: add "
+            f"a matrix, as in 'neo-hookean+{material.name}'."
+        )
+    shared = [p.symbol for p in discrepancy.parameters if p.symbol in [p.symbol for p in material.parameters]]
+    if shared:
+        raise ModelError(
+            f"discrepancy '{discrepancy.name}' adds {', '.join(shared)}, which material "
+            f"'{material.name}' has already: no data can separate the two. Choose another material or discrepancy."
+        )
+
+
+def _check_errors(discrepancy: Discrepancy, noise: Noise, tolerances: Tolerances, experiment: Experiment) -> None:
+    if not noise.parameters:
+        noise.of_tests(experiment)  # says where there is not one for each test
+    if noise.shares_discrepancy and len(experiment.curves) > 1:
+        raise InputError(f"noise '{noise}' is for one test: choose the noise 'unknown' for several.")
+    if noise.shares_discrepancy and len(np.unique(experiment.states.abscissa)) == experiment.size:
+        raise InputError(
+            f"experiment '{experiment.name}' has no two measurements at the same stretch, so the noise cannot be "
+            "determined from repeats: choose the noise 'unknown', or round the stretches to the steps of the test."
+        )
+    if noise.is_consecutive and discrepancy.is_correlated:
+        raise ModelError(
+            f"discrepancy '{discrepancy.name}' cannot be separated from autocorrelated noise: choose the noise "
+            "'unknown', or a discrepancy that is an energy, such as 'auto'."
+        )
+    if not tolerances:
+        return
+    if discrepancy.is_correlated:
+        raise ModelError(
+            f"discrepancy '{discrepancy.name}' takes up errors of a whole test itself: choose no tolerances, "
+            "or a discrepancy that is an energy, such as 'auto'."
+        )
+    if noise.depends_on_level or noise.shares_discrepancy:
+        raise ModelError(
+            f"noise '{noise}' and tolerances of whole tests do not go together: choose the noise 'unknown', "
+            "or tolerances=Tolerances(), which are none."
+        )
+
+
+def check_separable(triangle: FloatArray, name: str, symbols: tuple[str, ...]) -> None:
+    """Refuse columns, as their triangle (k, k), that the stretches of an experiment leave nearly dependent."""
+    lengths = np.linalg.norm(triangle, axis=0)
+    if not lengths.all() or np.linalg.cond(triangle / lengths) > MAX_CONDITION_NUMBER:
+        raise ModelError(
+            f"the stretches of experiment '{name}' cannot separate the parameters {', '.join(symbols)}: measure at "
+            "more or other stretches, or choose a simpler material or discrepancy."
+        )
+
+
+@lru_cache(maxsize=256)
+def check_linearity(material: Material, ends: States, bent: tuple[float, ...]) -> None:
+    """Refuse a material whose stress, between two states of a path, is not proportional to its linear parameters."""
+    low, high = ends.points[0]
+    states = ends.paths[0].at(np.linspace(low, high, 16))
+    is_linear = np.array([p.is_linear for p in material.parameters])
+    tried = np.empty((is_linear.sum() + 1, len(is_linear)))
+    tried[:, ~is_linear] = bent
+    tried[:, is_linear] = 0.3 + np.random.default_rng(0).random((len(tried), is_linear.sum()))
+    stress = stresses_at(material, states, tried)
+    expected = tried[:, is_linear] @ stress_basis(material, states, bent).T
+    rounding = 1e-12  # MPa, of parameters of about one; a law may have no stress at all along a path
+    if not np.allclose(stress, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max() + rounding):
+        linear = [p.symbol for p in material.parameters if p.is_linear]
+        raise ModelError(
+            f"the stress of material '{material.name}' is not proportional to its parameters ({', '.join(linear)}), "
+            "for example because one stands in an exponent: declare such a parameter with is_linear=False and a "
+            "relative_prior."
+        )

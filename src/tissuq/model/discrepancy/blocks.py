@@ -1,0 +1,299 @@
+"""Random strain energies without initial modulus, of which energy discrepancies are composed."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import States
+from tissuq.mechanics.invariants import invariant_rates, invariants
+from tissuq.model.discrepancy.processes import pinned_squared_exponential
+
+__all__ = [
+    "Coordinates",
+    "EnergyBlock",
+    "HenckyBlock",
+    "LogBlock",
+    "SecondInvariantBlock",
+    "SplineBlock",
+    "TaylorBlock",
+    "ValanisLandelBlock",
+    "ZeroModulusBlock",
+]
+
+FloatArray = NDArray[np.float64]
+
+MAX_EXPONENT = 200.0
+"""Largest exponent of a kernel; it is reached only far beyond the data."""
+GRID_POINTS = 400
+"""Number of points over the data's range among which the pivots of a process are chosen."""
+
+
+class Coordinates(NamedTuple):
+    """Values that belong to I1 - 3, to I2 - 3 and to the logarithms of the stretches."""
+
+    invariant_1: FloatArray
+    invariant_2: FloatArray
+    logarithm: FloatArray
+
+    def nothing(self, terms: int) -> Coordinates:
+        """Return zeros for so many terms at each of these coordinates."""
+        return Coordinates(*(np.zeros((len(values), terms)) for values in self))
+
+
+@dataclass(frozen=True)
+class EnergyBlock(ABC):
+    """A random strain energy dW = c sum_k u_k dW_k with independent standard normal weights u.
+
+    Energy, stress and shear modulus of every dW_k vanish at the reference, so that the initial modulus stays the
+    material's own. A block says what stress its terms have in any loading mode. Where it has a length scale, that
+    is a multiple of the range of the data, with equal prior probability for each of ``lengths``.
+    """
+
+    name: ClassVar[str]
+    formula: ClassVar[str]
+    lengths: ClassVar[tuple[float, ...]] = (1.0,)
+
+    @abstractmethod
+    def reach(self, states: States) -> tuple[float, float]:
+        """Return the range of the block's coordinate over states (n,); the reference, zero, is in it."""
+
+    @abstractmethod
+    def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        """Return the engineering stresses (n, r) of the terms dW_k (c = 1) at states (n,).
+
+        They are terms enough for states within the reach; `stress_variance` is that of all there are.
+        """
+
+    @abstractmethod
+    def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        """Return the variance (n,) of the stress for c = 1."""
+
+    @abstractmethod
+    def count(self, reach: tuple[float, float], length: float) -> int:
+        """Return the number r of the terms that serve the data."""
+
+    @abstractmethod
+    def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        """Return A'(x) (a, q), B'(y) (b, q) and w'(e) (c, q) of the terms dW_k = A(I1 - 3) + B(I2 - 3) + sum w(ln l_i).
+
+        For c = 1, at x = I1 - 3 (a,), y = I2 - 3 (b,) and e = ln l (c,). Where these lie beyond the reach, the r terms
+        that serve the data are followed by others, of which the data know nothing.
+        """
+
+
+class ZeroModulusBlock(EnergyBlock):
+    """dW = c u ((I2 - 3) - (I1 - 3)): the Mooney-Rivlin term with its initial modulus taken out."""
+
+    name = "zero-modulus"
+    formula = "c u (I2 - I1)"
+
+    def reach(self, states: States) -> tuple[float, float]:
+        return 0.0, 1.0
+
+    def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        rate_1, rate_2 = invariant_rates(states)
+        return (rate_2 - rate_1)[:, None]
+
+    def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        return self.stress_features(states, reach, length)[:, 0] ** 2
+
+    def count(self, reach: tuple[float, float], length: float) -> int:
+        return 1
+
+    def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        ones = [np.ones((len(values), 1)) for values in coordinates]
+        return Coordinates(-ones[0], ones[1], 0 * ones[2])
+
+
+class ProcessBlock(EnergyBlock):
+    """A block whose stress is sum_k q(z_k) v_k with a Gaussian process q of a coordinate z, zero at the reference.
+
+    It is reduced to the r directions that matter within the reach, by pivoted Cholesky.
+    """
+
+    tolerance: ClassVar[float] = 1e-11
+    """Largest truncated variance, relative to the largest one."""
+
+    @abstractmethod
+    def coordinates(self, states: States) -> tuple[FloatArray, FloatArray]:
+        """Return z and v, (n, m) each."""
+
+    @abstractmethod
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        """Return cov(q(z), q(z')) for c = 1; arrays broadcast."""
+
+    def reach(self, states: States) -> tuple[float, float]:
+        z, _ = self.coordinates(states)
+        return min(0.0, float(z.min())), max(0.0, float(z.max()))
+
+    def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        z, v = self.coordinates(states)
+        values = self.terms(z.ravel(), reach, length)
+        return np.asarray(np.einsum("nmr,nm->nr", values.reshape(*z.shape, -1), v))
+
+    def count(self, reach: tuple[float, float], length: float) -> int:
+        return len(_pivots(self, reach, length * (reach[1] - reach[0]))[0])
+
+    def terms(
+        self, z: FloatArray, reach: tuple[float, float], length: float, wider: tuple[float, float] | None = None
+    ) -> FloatArray:
+        """Return the directions (n, q) of the process at coordinates (n,): those within a wider reach come last."""
+        scale = length * (reach[1] - reach[0])
+        pivots, triangle = _pivots(self, reach, scale, wider)
+        return np.asarray(np.linalg.solve(triangle, self.covariance(pivots[:, None], z[None], scale)).T)
+
+    def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        z, v = self.coordinates(states)
+        with np.errstate(over="ignore"):
+            covariance = self.covariance(z[:, :, None], z[:, None, :], length * (reach[1] - reach[0]))
+        return np.asarray(np.einsum("nm,nmk,nk->n", v, covariance, v))
+
+
+@lru_cache(maxsize=256)
+def _pivots(
+    block: ProcessBlock, reach: tuple[float, float], scale: float, wider: tuple[float, float] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return q pivots and the lower triangle (q, q) of their covariance's Cholesky decomposition.
+
+    Those of the reach come first, where there is a wider one. Remembered, because every sum of which the block is a
+    part asks for the same.
+    """
+    inner_pivots, triangle = (np.zeros(0), np.zeros((0, 0))) if wider is None else _pivots(block, reach, scale)
+    low, high = wider or reach
+    grid = np.concatenate([inner_pivots, low + (high - low) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID_POINTS)))])
+    columns = np.linalg.solve(triangle, block.covariance(inner_pivots[:, None], grid[None], scale)).T
+    variance = block.covariance(grid, grid, scale)
+    remaining, smallest = variance - (columns**2).sum(axis=1), block.tolerance * variance.max()
+    remaining[: len(inner_pivots)] = 0.0
+    indices = list(range(len(inner_pivots)))
+    while (pivot := int(remaining.argmax())) not in indices and remaining[pivot] > smallest:
+        column = block.covariance(grid, grid[pivot], scale) - columns @ columns[pivot]
+        columns = np.column_stack([columns, column / np.sqrt(remaining[pivot])])
+        remaining = remaining - columns[:, -1] ** 2
+        indices.append(pivot)
+    return grid[indices], np.tril(columns[indices])
+
+
+class InvariantBlock(ProcessBlock):
+    """dW(I1), with W1 = dW/dI1 a process in a coordinate of x = I1 - 3."""
+
+    def coordinates(self, states: States) -> tuple[FloatArray, FloatArray]:
+        (x, _), (rate_1, _) = invariants(states), invariant_rates(states)
+        return self.coordinate(np.maximum(x, 0.0))[:, None], rate_1[:, None]
+
+    def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        z = self.coordinate(coordinates.invariant_1)
+        values = self.terms(z, reach, length, _joined(reach, z))
+        return coordinates.nothing(values.shape[1])._replace(invariant_1=values)
+
+    def coordinate(self, x: FloatArray) -> FloatArray:
+        """Return the coordinate of x = I1 - 3; here itself."""
+        return x
+
+
+class TaylorBlock(InvariantBlock):
+    """W1 = c g(x), cov(g, g') = exp(x x' / L^2) - 1: independent normal Taylor coefficients, an infinite Yeoh."""
+
+    name = "taylor"
+    formula = "W1 = c g(x), cov g = exp(x x' / L^2) - 1, x = I1 - 3"
+    lengths = (0.4, 0.8, 1.6, 3.2)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        return np.asarray(np.expm1(np.minimum(z * z_prime / length**2, MAX_EXPONENT)))
+
+
+class LogBlock(InvariantBlock):
+    """W1 = c g(t), t = log(1 + x): a squared exponential conditioned on g(0) = 0; fast change near the reference."""
+
+    name = "log"
+    formula = "W1 = c g(log(1 + x)), cov g squared exponential given g(0) = 0, x = I1 - 3"
+    lengths = (0.15, 0.36, 0.83, 2.0)
+
+    def coordinate(self, x: FloatArray) -> FloatArray:
+        return np.log1p(x)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        return np.asarray(pinned_squared_exponential(z / length, z_prime / length, 0))
+
+
+class SplineBlock(InvariantBlock):
+    """W1 = c g(x / L): an integrated Wiener process with a random slope, pinned at g(0) = 0."""
+
+    name = "spline"
+    formula = "W1 = c g(x), g an integrated Wiener process with g(0) = 0, x = I1 - 3"
+    tolerance = 1e-7
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        s, s_prime = z / length, z_prime / length
+        smaller = np.minimum(s, s_prime)
+        return np.asarray(s * s_prime + smaller**3 + 1.5 * np.abs(s - s_prime) * smaller**2)
+
+
+class SecondInvariantBlock(ProcessBlock):
+    """dW(I2), its initial modulus taken out by I1: W2 = c g(y), W1 = -c g(0) with independent Taylor coefficients of g.
+
+    The zero-modulus Mooney-Rivlin term is its limit for a large length scale.
+    """
+
+    name = "second-invariant"
+    formula = "W2 = c g(y), W1 = -c g(0), cov g = exp(y y' / L^2), y = I2 - 3"
+    lengths = (0.7, 1.6, 3.7)
+
+    def coordinates(self, states: States) -> tuple[FloatArray, FloatArray]:
+        (_, y), (rate_1, rate_2) = invariants(states), invariant_rates(states)
+        return np.stack([np.maximum(y, 0.0), np.zeros_like(y)], axis=1), np.stack([rate_2, -rate_1], axis=1)
+
+    def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        wider = _joined(reach, coordinates.invariant_2)
+        values, start = (self.terms(y, reach, length, wider) for y in (coordinates.invariant_2, np.zeros(1)))
+        nothing = coordinates.nothing(values.shape[1])
+        return nothing._replace(invariant_1=nothing.invariant_1 - start, invariant_2=values)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        return np.asarray(np.exp(np.minimum(z * z_prime / length**2, MAX_EXPONENT)))
+
+
+class SeparableBlock(ProcessBlock):
+    """dW = sum_k w(l_k) with l w'(l) = c q(ln l), where q(0) = q'(0) = 0."""
+
+    def coordinates(self, states: States) -> tuple[FloatArray, FloatArray]:
+        return states.log_stretches
+
+    def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
+        values = self.terms(coordinates.logarithm, reach, length, _joined(reach, coordinates.logarithm))
+        return coordinates.nothing(values.shape[1])._replace(logarithm=values)
+
+
+class HenckyBlock(SeparableBlock):
+    """q has independent normal Taylor coefficients in the logarithmic (Hencky) strain: an infinite Ogden."""
+
+    name = "hencky"
+    formula = "sum_k w(l_k), l w'(l) = c q(e), cov q = exp(e e' / L^2) - 1 - e e' / L^2, e = ln l"
+    lengths = (0.3, 0.65, 1.4)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        exponent = np.minimum(z * z_prime / length**2, MAX_EXPONENT)
+        series = exponent**2 / 2 * (1 + exponent / 3 * (1 + exponent / 4))  # keeps the digits of a small exponent
+        return np.asarray(np.where(np.abs(exponent) < 1e-3, series, np.expm1(exponent) - exponent))
+
+
+class ValanisLandelBlock(SeparableBlock):
+    """q is a squared exponential conditioned on q(0) = q'(0) = 0."""
+
+    name = "valanis-landel"
+    formula = "sum_k w(l_k), l w'(l) = c q(ln l), cov q squared exponential given q(0) = q'(0) = 0"
+    lengths = (0.2, 0.35, 0.6, 1.0, 1.7)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        return np.asarray(pinned_squared_exponential(z / length, z_prime / length, 1))
+
+
+def _joined(reach: tuple[float, float], z: FloatArray) -> tuple[float, float]:
+    """Return the range of a reach and of coordinates (n,) together."""
+    return min(reach[0], float(z.min())), max(reach[1], float(z.max()))

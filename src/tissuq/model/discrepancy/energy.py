@@ -1,0 +1,245 @@
+"""Discrepancies in the strain energy, single, summed and averaged, without effect on the initial shear modulus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import States
+from tissuq.mechanics.invariants import invariant_rates, invariants
+from tissuq.model.discrepancy.blocks import (
+    Coordinates,
+    EnergyBlock,
+    HenckyBlock,
+    LogBlock,
+    SecondInvariantBlock,
+    SplineBlock,
+    TaylorBlock,
+    ValanisLandelBlock,
+    ZeroModulusBlock,
+)
+from tissuq.model.discrepancy.discrepancy import Discrepancy
+from tissuq.parameters.parameter import Parameter
+from tissuq.parameters.priors import HalfCauchy
+
+__all__ = [
+    "Auto",
+    "AutoBalanced",
+    "AutoSharp",
+    "EnergyDiscrepancy",
+    "EnergySum",
+    "Member",
+    "side_by_side",
+]
+
+FloatArray = NDArray[np.float64]
+
+AMPLITUDES = tuple(
+    Parameter(symbol, f"amplitude of the {index} energy", "modulus", (0.0, float("inf")), False, HalfCauchy(1.0))
+    for symbol, index in (("c1", "first"), ("c2", "second"))
+)
+SOURCE = "tissuq (energy discrepancy)"
+
+
+class Sum(NamedTuple):
+    """Blocks in the order of the amplitudes, None where there is none with that amplitude, and the prior odds."""
+
+    blocks: tuple[EnergyBlock | None, ...]
+    odds: float = 1.0
+
+
+@dataclass(frozen=True)
+class Member:
+    """A sum of at most two blocks, each at one of its length scales, as measured over a range of stretches.
+
+    ``amplitude_indices`` are those of the blocks' amplitudes; ``probability`` is the prior one of the member.
+    """
+
+    blocks: tuple[EnergyBlock, ...]
+    amplitude_indices: tuple[int, ...]
+    lengths: tuple[float, ...]
+    reaches: tuple[tuple[float, float], ...]
+    probability: float
+
+    @property
+    def name(self) -> str:
+        """The blocks' names, joined."""
+        return "+".join(block.name for block in self.blocks) or "none"
+
+    @property
+    def scaled_blocks(self) -> list[tuple[EnergyBlock, tuple[float, float], float]]:
+        """Each block with its reach and its length scale."""
+        return list(zip(self.blocks, self.reaches, self.lengths, strict=True))
+
+    def stress_features(self, states: States) -> list[FloatArray]:
+        """Return the engineering stresses (n, r) of each block's terms."""
+        return [block.stress_features(states, reach, length) for block, reach, length in self.scaled_blocks]
+
+    def stress_variances(self, states: States) -> list[FloatArray]:
+        """Return the variance (n,) of the stress of each block at unit amplitude."""
+        return [block.stress_variance(states, reach, length) for block, reach, length in self.scaled_blocks]
+
+    def wide_features(self, states: States) -> list[tuple[FloatArray, int]]:
+        """Return of each block the stresses (n, q) of its terms at any states, and how many of them serve the data.
+
+        The latter come first and are the `stress_features`; the others are what beyond the data nothing is known of.
+        """
+        (rate_1, rate_2), (logs, rates) = invariant_rates(states), states.log_stretches
+        coordinates = Coordinates(*invariants(states), logs.ravel())
+        return [
+            (
+                slopes.invariant_1 * rate_1[:, None]
+                + slopes.invariant_2 * rate_2[:, None]
+                + np.einsum("nkq,nk->nq", slopes.logarithm.reshape(*logs.shape, -1), rates),
+                count,
+            )
+            for slopes, count in self.slopes(coordinates)
+        ]
+
+    def slopes(self, coordinates: Coordinates) -> list[tuple[Coordinates, int]]:
+        """Return of each block the slopes of its terms, as `EnergyBlock.slopes`, and how many serve the data."""
+        return [
+            (block.slopes(coordinates, reach, length), block.count(reach, length))
+            for block, reach, length in self.scaled_blocks
+        ]
+
+
+def side_by_side(features: list[FloatArray], count: int) -> FloatArray:
+    """Return the terms of all blocks of a member in one array (n, q) for n = ``count`` states; it may have none."""
+    return np.hstack([np.zeros((count, 0)), *features])
+
+
+@dataclass(frozen=True)
+class EnergyDiscrepancy(Discrepancy):
+    """A random strain energy of zero energy, stress and modulus at the reference, averaged over some sums of blocks.
+
+    Every length scale of a sum's blocks has the same prior probability; the posterior is the mixture that the evidence
+    weights. Each block has an amplitude, half-Cauchy with the data's pilot modulus as its scale.
+    """
+
+    source = SOURCE
+    is_energy = True
+    caution = (
+        "The initial shear modulus is the material's own; its other parameters (such as C20) share their meaning with "
+        "the discrepancy. It covers an error of the material, not of the test: a wrong area or gauge length scales all."
+    )
+    sums: ClassVar[tuple[Sum, ...]]
+
+    def members(self, states: States) -> list[Member]:
+        """Return every sum of blocks at every combination of their length scales, over the range of states (n,)."""
+        members, total = [], sum(energy_sum.odds for energy_sum in self.sums)
+        for blocks_by_amplitude, odds in self.sums:
+            amplitude_indices = tuple(index for index, block in enumerate(blocks_by_amplitude) if block is not None)
+            blocks = tuple(block for block in blocks_by_amplitude if block is not None)
+            reaches = tuple(block.reach(states) for block in blocks)
+            choices = list(product(*(block.lengths for block in blocks)))
+            probability = odds / total / len(choices)
+            members += [Member(blocks, amplitude_indices, lengths, reaches, probability) for lengths in choices]
+        return members
+
+
+class _Single(EnergyDiscrepancy):
+    """One block, whose name and formula it has."""
+
+    parameters = AMPLITUDES[:1]
+
+    def __init_subclass__(cls, block: EnergyBlock | None = None) -> None:
+        super().__init_subclass__()
+        if block is not None:
+            cls.name, cls.formula, cls.sums = block.name, block.formula, (Sum((block,)),)
+
+
+class Taylor(_Single, block=TaylorBlock()):
+    """An infinite Yeoh: independent normal Taylor coefficients in I1 - 3."""
+
+
+class Logarithmic(_Single, block=LogBlock()):
+    """A process in log(I1 - 2): fast change near the reference."""
+
+
+class Spline(_Single, block=SplineBlock()):
+    """An integrated Wiener process in I1 - 3."""
+
+
+class ZeroModulus(_Single, block=ZeroModulusBlock()):
+    """The Mooney-Rivlin term without its initial modulus."""
+
+
+class SecondInvariant(_Single, block=SecondInvariantBlock()):
+    """An infinite series in I2 - 3, its initial modulus taken out by I1."""
+
+
+class Hencky(_Single, block=HenckyBlock()):
+    """A separable function of the principal stretches: an infinite Ogden."""
+
+
+class ValanisLandel(_Single, block=ValanisLandelBlock()):
+    """A separable function of the principal stretches."""
+
+
+@dataclass(frozen=True)
+class EnergySum(EnergyDiscrepancy):
+    """The sum of two blocks."""
+
+    blocks: tuple[EnergyBlock, ...] = ()
+
+    parameters = AMPLITUDES
+
+    @property
+    def sums(self) -> tuple[Sum, ...]:  # type: ignore[override]  # of the object, not the class
+        """The one sum."""
+        return (Sum(self.blocks),)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """The blocks' names, joined."""
+        return "+".join(block.name for block in self.blocks)
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """The blocks' formulas, joined."""
+        return "; and ".join(block.formula for block in self.blocks)
+
+
+FIRST_BLOCKS, SECOND_BLOCKS = (TaylorBlock(), LogBlock()), (SecondInvariantBlock(), HenckyBlock())
+BLOCKS = (*FIRST_BLOCKS, *SECOND_BLOCKS, SplineBlock(), ZeroModulusBlock(), ValanisLandelBlock())
+"""Every block that a sum of two may have."""
+PAIRS = tuple(Sum(pair) for pair in product(FIRST_BLOCKS, SECOND_BLOCKS))
+SINGLES: tuple[tuple[EnergyBlock | None, ...], ...] = (
+    *((block, None) for block in FIRST_BLOCKS),
+    *((None, block) for block in SECOND_BLOCKS),
+)
+
+
+class Auto(EnergyDiscrepancy):
+    """The evidence decides: the average of {taylor, log} + {second-invariant, hencky}, and of their single blocks.
+
+    A single block has a quarter of the prior odds of a sum.
+    """
+
+    name = "auto"
+    formula = "average of {taylor, log} + {second-invariant, hencky} and, at a quarter of their odds, each one alone"
+    parameters = AMPLITUDES
+    sums = (*PAIRS, *(Sum(blocks, 0.25) for blocks in SINGLES))
+
+
+class AutoBalanced(EnergyDiscrepancy):
+    """The average of the same at equal odds: narrower, and more often wrong."""
+
+    name = "auto-balanced"
+    formula = "average of the sums and single blocks of auto at equal odds"
+    parameters = AMPLITUDES
+    sums = (*PAIRS, *map(Sum, SINGLES))
+
+
+class AutoSharp(EnergyDiscrepancy):
+    """The average of the same, and of no discrepancy: narrowest, and wrong where a small discrepancy hides in noise."""
+
+    name = "auto-sharp"
+    formula = "average of auto-balanced and no discrepancy"
+    parameters = AMPLITUDES
+    sums = (*AutoBalanced.sums, Sum(()))

@@ -1,0 +1,227 @@
+"""The measurement noise: independent and Gaussian, of a size that is known, unknown, or grows with the stress."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from numbers import Real
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.smoothing import scatter, smoothed
+from tissuq.parameters.parameter import Parameter
+from tissuq.parameters.priors import Uniform
+from tissuq.registry import find, plugins, variants
+
+__all__ = [
+    "AutoregressiveNoise",
+    "KnownNoise",
+    "KnownNoises",
+    "Noise",
+    "ProportionalNoise",
+    "RepeatNoise",
+    "UnknownNoise",
+    "noise_named",
+    "stress_level",
+]
+
+FloatArray = NDArray[np.float64]
+
+MIN_SD_MPA, MAX_SD_MPA = 1e-150, 1e150
+"""Known standard deviations whose squares can be computed lie between these."""
+NOISE_SD = Parameter.scale("noise_sd", "standard deviation of the measurement noise")
+NOISE_SHARE = Parameter(
+    "noise_share", "noise per measured stress", "number", (0.0, inf), is_linear=False, relative_prior=Uniform(0.0, 1.0)
+)
+MIN_RELATIVE_SCATTER = 0.005
+"""Smallest scatter over a test's root mean square stress: averaged and digitised curves are smooth but not exact."""
+LEVELS_MPA = np.append(0.0, np.logspace(-6, 3, 10))
+"""Stresses at which it is seen whether a noise depends on them."""
+MAX_LEVELS = 200
+"""Largest number of stress levels into which many measurements are sorted."""
+
+
+@dataclass(frozen=True)
+class Noise(ABC):
+    """Independent Gaussian errors of measurement.
+
+    A new noise is one subclass: its parameters and its standard deviation, which may depend on the level of the
+    stress. Arithmetic only, so that NumPy and JAX values both pass through.
+    """
+
+    entry_point_group: ClassVar[str] = "tissuq.noises"
+    name: ClassVar[str]
+    description: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    shares_discrepancy: ClassVar[bool] = False
+    """Whether measurements at one stretch share the independent part of the discrepancy (S), too."""
+    is_consecutive: ClassVar[bool] = False
+    """Whether the errors of consecutive measurements are correlated."""
+
+    @abstractmethod
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        """Return the standard deviation (MPa) for parameter values, at absolute stresses (MPa)."""
+
+    @property
+    def depends_on_level(self) -> bool:
+        """Whether the standard deviation changes with the level of the stress."""
+        return bool(np.ptp(self.sd({p.symbol: 1.0 for p in self.parameters}, LEVELS_MPA)) > 0)
+
+    def of_tests(self, experiment: Experiment) -> FloatArray:
+        """Return the noise (tests,) of each of several tests as known or about, MPa; their ratios are taken as known.
+
+        Here by the scatter of each test about a smooth curve.
+        """
+        return np.array([_scatter_of(test) for test in experiment.tests])
+
+
+@dataclass(frozen=True)
+class KnownNoise(Noise):
+    """The same known standard deviation everywhere."""
+
+    value: float
+
+    name = "known"
+    description = "known standard deviation"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.value, Real) or self.value is True or not MIN_SD_MPA < self.value < MAX_SD_MPA:
+            raise InputError(
+                f"noise_sd must be a positive number of MPa or 'unknown', not {self.value!r}. "
+                "Noise of zero would make every measurement exact; if it is not known, give 'unknown'."
+            )
+
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        return self.value
+
+    def of_tests(self, experiment: Experiment) -> FloatArray:
+        return np.full(len(experiment.tests), self.value)
+
+    def __str__(self) -> str:
+        return str(self.value)
+
+
+@dataclass(frozen=True)
+class KnownNoises(KnownNoise):
+    """Known standard deviations, one for each of several tests; ``value`` is their geometric mean."""
+
+    sds: tuple[float, ...] = ()
+
+    def of_tests(self, experiment: Experiment) -> FloatArray:
+        if len(self.sds) != len(experiment.tests):
+            raise InputError(
+                f"noise_sd has {len(self.sds)} values for {len(experiment.tests)} tests: give one for each, or one "
+                "number for all."
+            )
+        return np.array(self.sds)
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self.sds))
+
+
+class UnknownNoise(Noise):
+    """The same standard deviation everywhere, a parameter."""
+
+    name = "unknown"
+    description = "unknown standard deviation"
+    parameters: ClassVar[tuple[Parameter, ...]] = (NOISE_SD,)
+
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        return values["noise_sd"]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class ProportionalNoise(UnknownNoise):
+    """Standard deviation noise_sd + noise_share |stress|, both parameters.
+
+    The stress is that of a smoothing spline through the data, so that it is the same for every model and for
+    repeated measurements: a plug-in, which leaves the stress linear in its parameters.
+    """
+
+    name = "proportional"
+    description = "noise_sd + noise_share |stress|"
+    parameters = (NOISE_SD, NOISE_SHARE)
+
+    def sd(self, values: Mapping[str, Any], level: Any) -> Any:
+        return values["noise_sd"] + values["noise_share"] * level
+
+
+class RepeatNoise(UnknownNoise):
+    """Unknown standard deviation, determined by the scatter of repeated measurements at the same stretch.
+
+    The discrepancy is a function of the stretch (eq. 15), so repeated measurements share all of it, its
+    independent error S included: what differs between them is noise. It separates the two, which `unknown` cannot.
+    """
+
+    name = "repeats"
+    description = "unknown, determined by repeated measurements at the same stretch"
+    shares_discrepancy = True
+
+
+class AutoregressiveNoise(UnknownNoise):
+    """The same unknown standard deviation everywhere, the errors of consecutive measurements correlated.
+
+    Their correlation, that of first-order autoregression in the order of the measurements, is the one under which the
+    data are most probable, everything else integrated (`tissuq.fit` finds it): a plug-in.
+    """
+
+    name = "autoregressive"
+    description = "unknown, the errors of consecutive measurements correlated"
+    is_consecutive = True
+
+
+def noise_named(noise: float | Sequence[float] | str | Noise) -> Noise:
+    """Return the noise of that name, or of known standard deviation (MPa), or of one for each of several tests.
+
+    A noise is returned as it is.
+
+    Raises
+    ------
+    InputError
+        When no noise has that name, or the number is not positive.
+    """
+    if isinstance(noise, Noise):
+        return noise
+    if isinstance(noise, (Sequence, np.ndarray)) and not isinstance(noise, str):
+        sds = tuple(float(KnownNoise(sd).value) for sd in noise)
+        return KnownNoises(float(np.exp(np.log(sds).mean())), sds)
+    if not isinstance(noise, str):
+        return KnownNoise(noise)
+    options = [name for name, kind in variants(Noise).items() if not issubclass(kind, KnownNoise)]
+    if noise not in options and not plugins(Noise, noise):
+        raise InputError(f"noise must be a positive number of MPa or one of {', '.join(options)}; not '{noise}'.")
+    return find(Noise, "noise", noise, InputError)()
+
+
+def stress_level(experiment: Experiment) -> FloatArray:
+    """Return the size (n,) of the stress at every measurement, MPa: a smoothing spline through each test.
+
+    Many measurements are sorted into two hundred levels, half a percent of the range apart.
+    """
+    level = np.concatenate([_level_of(test) for test in experiment.tests])
+    if len(level) > MAX_LEVELS and np.ptp(level) > 0:
+        step = np.ptp(level) / MAX_LEVELS
+        level = level.min() + np.minimum((level - level.min()) // step, MAX_LEVELS - 1) * step + 0.5 * step
+    return np.asarray(level)
+
+
+def _level_of(test: Experiment) -> FloatArray:
+    if test.stretch.ndim > 1:
+        return np.asarray(np.abs(test.stress.T.ravel()))
+    return np.concatenate([np.abs(smoothed(curve.abscissa, curve.stress).stress) for curve in test.curves])
+
+
+def _scatter_of(test: Experiment) -> float:
+    """Return the scatter (MPa) of a test about a smooth curve, and half a percent of its stress at least."""
+    smallest = MIN_RELATIVE_SCATTER * float(np.sqrt((test.stress**2).mean()))
+    if test.stretch.ndim > 1:
+        return smallest
+    return max(smallest, *(scatter(curve.abscissa, curve.stress) or smallest for curve in test.curves))

@@ -1,0 +1,148 @@
+"""What makes measurements whose errors differ and hang together into ones of independent and equal errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.model.fitted_errors import FittedErrors
+from tissuq.model.measurement_errors import Tolerances, specimens_of
+
+__all__ = ["Whitening", "whitening"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """What turns measurements whose errors differ and hang together into ones of independent errors of sd noise_sd.
+
+    Their covariance is noise_sd^2 D A^-1 (I + U diag(spread) U') A^-T D with D = diag(size) and orthonormal U; A takes
+    from every error what the one before it lets expect, so that the errors before are those of first-order
+    autoregression with the variance D^2.
+
+    Attributes
+    ----------
+    size : (n,) array
+        Noise of each measurement over noise_sd.
+    lag : (n,) array
+        Correlation of its noise with that of the measurement before it; zero for the first of a curve.
+    along : (n, q) array
+        U.
+    spread : (q,) array
+    """
+
+    size: FloatArray
+    lag: FloatArray
+    along: FloatArray
+    spread: FloatArray
+
+    def __call__(self, columns: Any) -> Any:
+        """Return columns (n,) or (n, k) of the measurements, whitened."""
+        return self._stretched(self.unlagged((columns.T / self.size).T), 1 / np.sqrt(1 + self.spread))
+
+    def unlagged(self, columns: Any) -> Any:
+        """Return A times columns (n,) or (n, k)."""
+        if not self.lag.any():
+            return columns
+        preceding = columns.__array_namespace__().concat([columns[:1], columns[:-1]])
+        return ((columns.T - self.lag * preceding.T) / self._fresh).T
+
+    def transposed(self, columns: FloatArray) -> FloatArray:
+        """Return the transpose of the whitening times columns (n,) or (n, k)."""
+        scaled = self._stretched(columns, 1 / np.sqrt(1 + self.spread)).T / self._fresh
+        from_next = np.concatenate([scaled[..., 1:] * self.lag[1:], np.zeros_like(scaled[..., :1])], axis=-1)
+        return np.asarray(((scaled - from_next) / self.size).T)
+
+    def undone(self, columns: FloatArray) -> FloatArray:
+        """Return the columns (n,) or (n, k) that the whitening makes these of."""
+        errors = (self._stretched(columns, np.sqrt(1 + self.spread)).T * self._fresh).T
+        if self.lag.any():
+            for row in range(1, len(errors)):
+                errors[row] += self.lag[row] * errors[row - 1]
+        return np.asarray((errors.T * self.size).T)
+
+    @property
+    def _fresh(self) -> FloatArray:
+        """What of each error is new (n,), over its size."""
+        return np.sqrt(1 - self.lag**2)
+
+    def _stretched(self, columns: Any, factors: FloatArray) -> Any:
+        """Return columns with their parts along U times factors (q,)."""
+        return columns + self.along @ ((self.along.T @ columns).T * (factors - 1)).T
+
+    def precisions(self, white: FloatArray) -> FloatArray:
+        """Return the diagonals (m, n) of the inverse covariances of the measurements, given those of whitened ones.
+
+        Where errors hang together, whitened measurements must have one precision.
+        """
+        diagonal, off_diagonal = 1 / self._fresh, np.append((self.lag / self._fresh)[1:], 0.0)
+        along = diagonal[:, None] * self.along - off_diagonal[:, None] * np.vstack([self.along[1:], self.along[:1]])
+        lost = along**2 @ (self.spread / (1 + self.spread))
+        return np.asarray(white * (diagonal**2 + off_diagonal**2 - lost) / self.size**2)
+
+    @property
+    def log_determinant(self) -> float:
+        """The log of the absolute determinant of the whitening."""
+        return float(-np.log(self.size * self._fresh).sum() - 0.5 * np.log1p(self.spread).sum())
+
+
+def whitening(
+    experiment: Experiment,
+    noise_sd: FloatArray,
+    mean_sd: float,
+    tolerances: Tolerances,
+    errors: FittedErrors,
+) -> Whitening | None:
+    """Return the whitening of tests, or None where their errors are independent and equal as they are.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        One test, or several.
+    noise_sd : (tests,) array, MPa
+        Noise of each test, as known or about.
+    mean_sd : float, MPa
+        Their geometric mean, for which the parameter noise_sd stands.
+    tolerances : Tolerances
+    errors : FittedErrors
+        The curve along which whole tests err, the level of the independent errors where it is not noise_sd's, and the
+        correlation of the noise of consecutive measurements.
+    """
+    level, curve, lag = errors.level or mean_sd, errors.curve, errors.lag or 0.0
+    count = [test.size for test in experiment.tests]
+    size, shared = np.repeat(noise_sd / mean_sd, count), np.zeros((sum(count), 0))
+    if tolerances and curve is not None:
+        pairs = list(zip(experiment.tests, np.split(curve, np.cumsum(count)[:-1]), strict=True))
+        size = np.hypot(size, np.concatenate([tolerances.noise(*pair) for pair in pairs]) / level)
+        shared = _errors_of_tests(specimens_of(experiment), tolerances, pairs)
+    starts = np.cumsum([0, *(len(measured) for measured in experiment.curves[:-1])])
+    lags = np.where(np.isin(np.arange(len(size)), starts), 0.0, lag)
+    bare = Whitening(size, lags, np.zeros((len(size), 0)), np.zeros(0))
+    columns = bare(shared) / level
+    along, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    is_significant = singular > 1e-8 * singular.max(initial=0.0)
+    if not is_significant.any() and not lag and np.allclose(size, 1, rtol=1e-12):
+        return None
+    return Whitening(size, lags, along[:, is_significant], singular[is_significant] ** 2)
+
+
+def _errors_of_tests(
+    specimens: NDArray[np.bool_], tolerances: Tolerances, tests: Sequence[tuple[Experiment, FloatArray]]
+) -> FloatArray:
+    """Return what errors of whole specimens do to all measurements (n, q), for tests and their mean curves.
+
+    Of errors of the specimens only their differences from the specimens' mean.
+    """
+    shared = specimens.astype(np.float64)
+    deviations = shared - shared.mean(axis=1, keepdims=True)
+    rows = []
+    for (test, curve), deviation, specimen in zip(tests, deviations, shared, strict=True):
+        of_specimen, of_test = (tolerances.columns(test, curve, of_specimen=flag) for flag in (True, False))
+        rows.append(np.hstack([np.kron(of_specimen, deviation[None]), np.kron(of_test, specimen[None])]))
+    return np.concatenate(rows)

@@ -1,0 +1,306 @@
+"""The next test: the expected reduction of the uncertainty of targets by a candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.experiment import Experiment
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.resampling import systematic
+from tissuq.inference.solution import Solution
+from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, Tolerances, specimens_of
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.next_test.candidates import Candidate, farthest_range, reach_of
+from tissuq.next_test.expected_variance import expected_variances
+from tissuq.next_test.targets import Target
+from tissuq.prediction.joint_moments import joint_stresses, states_of
+
+__all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]
+
+FloatArray = NDArray[np.float64]
+Column = tuple[FloatArray, FloatArray]
+
+Specimen = Literal["same", "other"]
+"""Specimen of the next test: the one of the data, or another one."""
+BATCHES, COMPONENTS_PER_BATCH, LOG2_OUTCOMES = 8, 400, 7
+"""Number of independent batches, whose spread gives the error; components of each; base-2 logarithm of its outcomes."""
+MIN_EFFECTIVE_COMPONENTS = 10.0
+"""Smallest effective number of components after the test for which the expectation is reliable."""
+MAX_REACH = 2.0
+"""Largest I1 - 3 and I2 - 3 over those of the data for which an energy discrepancy has a known size."""
+MAX_POINTS = 400
+"""Largest number of measurements that are computed; of more, a subset with correspondingly less noise is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """Expectation for one candidate: standard deviations (t,) of the targets now and after the test.
+
+    ``sd_after`` is the root of the expected variance, ``error`` the standard error of ``sd_after / sd_now`` by
+    simulation, zero where all is in closed form. ``is_rough`` means that few components of the posterior would remain.
+    """
+
+    sd_now: FloatArray
+    sd_after: FloatArray
+    error: FloatArray
+    is_rough: bool
+
+    @property
+    def reduction(self) -> FloatArray:
+        """By what share the standard deviations fall."""
+        return 1 - self.sd_after / self.sd_now
+
+
+class NextTest:
+    """The expected gain of further tests, for one posterior.
+
+    Tests of the same specimen have the errors of single measurements that the model has: in the mode of the data they
+    are further measurements of the same test (`Posterior.update`), in another mode a test without separate errors. A
+    test of another specimen has separate errors of area, length and zero, by the `Tolerances` of the model, or the
+    usual ones between specimens.
+
+    Parameters
+    ----------
+    solution : Solution
+    targets : sequence of Target
+    specimen : str, optional
+        ``"same"`` or ``"other"``; that of the data unless these are of several specimens with errors of their own.
+    seed : int
+        Seed of the drawn outcomes of tests.
+
+    Raises
+    ------
+    InputError
+        When the model's errors do not determine those of a further test.
+    """
+
+    def __init__(
+        self, solution: Solution, targets: Sequence[Target], specimen: Specimen | None = None, seed: int = 0
+    ) -> None:
+        self.model, self.targets, self._seed = solution.model, targets, seed
+        self._components = solution.mixture
+        self.specimen: Specimen = specimen or ("other" if self.model.tolerances else "same")
+        _check_model(self.model, self.specimen)
+        for target in targets:
+            for mode, points in target.points:
+                self._check_candidate(Candidate(mode, points), f"target '{target.name}'")
+
+    def expected(self, candidate: Candidate) -> Expected:
+        """Return the expectation for a candidate.
+
+        Raises
+        ------
+        InputError, ModelError
+            When the discrepancy is unknown in its mode or range, or the material may lock or does not deform so.
+        """
+        self._check_candidate(candidate, f"test '{candidate.name}'")
+        ratios, effective = [], []
+        for number, components in enumerate(self._batches):
+            mixture, noise_sd = self._mixture(components, candidate)
+            variances = expected_variances(mixture, noise_sd, self._uniforms(number, mixture, noise_sd))
+            centre = (mixture.weights @ mixture.mean)[noise_sd.shape[1] :]
+            prior, expected = (
+                variance + self._common_error(self.errors_after) ** 2 * (variances.prior + centre**2)
+                for variance in (variances.prior, variances.expected)
+            )
+            ratios.append(expected / prior)
+            effective.append(variances.effective)
+        ratio, count = np.mean(ratios, axis=0), len(ratios)
+        spread = np.std(np.sqrt(ratios), axis=0, ddof=1) / np.sqrt(count) if count > 1 else np.zeros(len(ratio))
+        is_rough = count > 1 and float(np.mean(effective)) < MIN_EFFECTIVE_COMPONENTS
+        return Expected(self.sd_now, self.sd_now * np.sqrt(ratio), spread, is_rough)
+
+    @cached_property
+    def sd_now(self) -> FloatArray:
+        """The standard deviations (t,) of the targets before any further test."""
+        mean, root = self._targets(self._components, *self._stresses(self._components, []))
+        centre, covariance = GaussianMixture(self._components.weights, self._components.settings, mean, root).moments()
+        variance = np.diag(covariance)
+        return np.sqrt(variance + self._common_error(self.errors_now) ** 2 * (variance + centre**2))
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """The errors of a test of another specimen."""
+        return self.model.tolerances if self.model.tolerances.stress else BETWEEN_SPECIMENS
+
+    @property
+    def errors_now(self) -> float:
+        """The relative standard deviation of the error that all stresses have in common."""
+        if self.specimen == "same":
+            return self.model.common_error
+        return self.tolerances.in_common(self.model.experiment)
+
+    @property
+    def errors_after(self) -> float:
+        """The same after a further test."""
+        return self.errors_now if self.specimen == "same" else self.tolerances.stress / np.sqrt(self._specimens + 1)
+
+    @property
+    def _specimens(self) -> int:
+        return int(specimens_of(self.model.experiment).shape[1])
+
+    def _common_error(self, error: float) -> FloatArray:
+        """Return the error (t,) of each target that all stresses have in common."""
+        return error * np.array([target.is_stiffness(self.model) for target in self.targets])
+
+    @cached_property
+    def _batches(self) -> list[GaussianMixture]:
+        """Components that represent the posterior, drawn anew for every batch where there are many."""
+        components, count = self._components, len(self._components.weights)
+        if count == 1:
+            return [components]
+        if count <= COMPONENTS_PER_BATCH:
+            return [components.weighted(components.weights / components.weights.sum())] * BATCHES
+        offsets = (np.arange(BATCHES) + 0.5) / BATCHES
+        row_sets = [systematic(components.weights[None], COMPONENTS_PER_BATCH, offset)[0] for offset in offsets]
+        return [components[rows].weighted(np.full(COMPONENTS_PER_BATCH, 1 / COMPONENTS_PER_BATCH)) for rows in row_sets]
+
+    def _uniforms(self, number: int, mixture: GaussianMixture, noise_sd: FloatArray) -> FloatArray:
+        """Return points of the unit cube, the same for all candidates as far as these are alike."""
+        from scipy.stats import qmc
+
+        size = 1 + mixture.root.shape[2] + noise_sd.shape[1]
+        engine = qmc.Sobol(size, rng=np.random.default_rng([self._seed, 23, number]))
+        return np.asarray(engine.random_base2(LOG2_OUTCOMES))
+
+    def _stresses(self, components: GaussianMixture, tests: list[tuple[Candidate, FloatArray]]) -> Column:
+        """Return means and roots of the stresses of tests at points of them, and of the targets that are stresses."""
+        points_of_modes = [(test.mode, points) for test, points in tests]
+        points_of_modes += [mode_and_points for target in self.targets for mode_and_points in target.points]
+        if not points_of_modes:
+            return np.zeros((len(components.weights), 0)), np.zeros(
+                (len(components.weights), 0, components.root.shape[2])
+            )
+        return joint_stresses(self.model, components, states_of(self.model, points_of_modes))
+
+    def _targets(self, components: GaussianMixture, mean: FloatArray, root: FloatArray) -> Column:
+        """Return means (M, t) and roots (M, t, r) of the targets; stresses among them are the last ones given."""
+        width, columns = root.shape[2], []
+        scatter = _scatter(self.model, components)
+        column = mean.shape[1] - sum(1 for target in self.targets for _ in target.points)
+        for target in self.targets:
+            target_root, target_mean = np.zeros((len(mean), width + 1)), np.zeros(len(mean))
+            if any(True for _ in target.points):
+                target_mean, target_root[:, :width], target_root[:, width] = mean[:, column], root[:, column], scatter
+                column += 1
+            else:
+                target_mean, linear = target.moments(self.model, components)
+                target_root[:, : linear.shape[1]] = linear
+            columns.append((target_mean, target_root))
+        return np.stack([mean for mean, _ in columns], axis=1), np.stack([root for _, root in columns], axis=1)
+
+    def _mixture(self, components: GaussianMixture, candidate: Candidate) -> tuple[GaussianMixture, FloatArray]:
+        """Return the candidate's measurements followed by the targets, and the noise (M, n) of the former."""
+        points, share = _thinned(candidate.stretch)
+        mean, root = self._stresses(components, [(candidate, points)])
+        count = len(points) * len(candidate.mode.stresses)
+        target_mean, target_root = self._targets(components, mean, root)
+        mean, root = mean[:, :count], np.concatenate([root[:, :count], np.zeros((*mean[:, :count].shape, 1))], axis=2)
+        curve = components.weights @ mean / components.weights.sum()
+        noise_sd = self._noise(components, candidate, points, curve)
+        if self.specimen == "other":
+            kinds = len(candidate.mode.stresses)
+            stress = curve if kinds == 1 else curve.reshape(kinds, -1).T
+            test = Experiment(candidate.mode, points, stress)
+            columns = list(self._errors_of_specimen(test, curve, mean, target_mean))
+            root = np.concatenate([root, *(column[:, :, None] for column, _ in columns)], axis=2)
+            target_root = np.concatenate([target_root, *(column[:, :, None] for _, column in columns)], axis=2)
+            noise_sd = np.hypot(noise_sd, self.tolerances.noise(test, curve))
+        moments = np.concatenate([mean, target_mean], axis=1), np.concatenate([root, target_root], axis=1)
+        return GaussianMixture(components.weights, components.settings, *moments), noise_sd * np.sqrt(share)
+
+    def _noise(
+        self, components: GaussianMixture, candidate: Candidate, points: FloatArray, curve: FloatArray
+    ) -> FloatArray:
+        """Return the sd (M, n) of all that is independent from measurement to measurement."""
+        model = self.model
+        values = {
+            symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)
+        }
+        states = states_of(model, [(candidate.mode, points)])
+        variance = model.noise_variance(values, np.abs(curve)) * model.relative_noise(states) ** 2
+        total = variance + _scatter(model, components)[:, None] ** 2
+        return np.asarray(np.sqrt(np.broadcast_to(total, (len(components.weights), len(curve)))))
+
+    def _errors_of_specimen(
+        self, test: Experiment, curve: FloatArray, mean: FloatArray, target_mean: FloatArray
+    ) -> Iterator[Column]:
+        """Yield the effects of standard errors of a new specimen on its stresses (M, n) and on the targets (M, t).
+
+        With e the errors of stress of K + 1 specimens, the data determine the tissue's stress times 1 + the mean of K.
+        The new stress is that times 1 + d, d = e_new - mean of K, and the mean of K + 1 is that of K plus d / (K + 1).
+        """
+        sd, count = self.tolerances.stress * np.sqrt(1 + 1 / self._specimens), self._specimens + 1
+        yield mean * sd, target_mean * self._common_error(sd / count)
+        for column in self.tolerances.columns(test, curve, of_specimen=False).T:
+            if column.any():
+                yield np.broadcast_to(column, mean.shape), np.zeros_like(target_mean)
+
+    def _check_candidate(self, candidate: Candidate, label: str) -> None:
+        """Refuse a test or a stress that the posterior does not determine."""
+        model, data = self.model, self.model.experiment
+        for path in candidate.mode.paths:
+            if problem := model.material.why_not(path.moved(candidate.stretch[:1], 0.0)):
+                raise ModelError(problem)
+        if (not model.discrepancy.is_energy or model.is_correlated) and candidate.mode not in data.modes:
+            names = ", ".join(mode.name for mode in data.modes)
+            raise InputError(
+                f"{label}: discrepancy '{model.discrepancy.name}' is an error of the {names} stress and another, "
+                f"unknown one of the {candidate.mode.name} stress: choose mode {names}, or a posterior with an energy, "
+                "such as 'auto'."
+            )
+        reach = float(reach_of(data, candidate.mode, candidate.stretch).max())
+        if model.energy_symbols and reach > MAX_REACH:
+            low, high = farthest_range(data, candidate.mode, MAX_REACH)
+            raise InputError(
+                f"{label} reaches {reach:.2g} times as far as the data in I1 - 3 or I2 - 3; beyond {MAX_REACH:g} times "
+                f"the size of the discrepancy is unknown: choose a range within {low:g} to {high:g}."
+            )
+
+
+def _check_model(model: StatisticalModel, specimen: Specimen) -> None:
+    """Refuse a model whose errors do not determine those of a further test."""
+    if specimen not in get_args(Specimen):
+        raise InputError(f"specimen must be one of {', '.join(get_args(Specimen))}, not '{specimen}'.")
+    if model.fitted_errors.lag:
+        raise InputError(
+            "the errors of these data are autocorrelated, and those of a further test depend on its sampling: fit with "
+            "the noise 'unknown', or with fewer points."
+        )
+    is_plain = not (model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy)
+    if not model.discrepancy.is_energy and (specimen == "other" or len(model.experiment.curves) > 1):
+        raise InputError(
+            f"discrepancy '{model.discrepancy.name}' is a different, unknown error of the stress in each test: only "
+            "further points of a single test can be assessed. Fit with an energy, such as 'auto'."
+        )
+    if specimen == "other" and not is_plain:
+        raise InputError(
+            f"noise '{model.noise}' and discrepancy '{model.discrepancy.name}' cannot be combined with errors of whole "
+            "tests: fit with the noise 'unknown' and the discrepancy 'auto', or choose a test of the same specimen."
+        )
+    if specimen == "same" and model.tolerances:
+        raise InputError(
+            "the tests of this posterior have errors of area or length that a test of the same specimen would share: "
+            "choose one of another specimen, or fit without tolerances."
+        )
+
+
+def _scatter(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
+    """Return the sd (M,) of the discrepancy's share that is independent from point to point."""
+    values: Mapping[str, FloatArray] = dict(zip(model.nonlinear, components.settings.T, strict=True))
+    return np.asarray(np.sqrt(np.broadcast_to(model.independent_variance(values), len(components.weights))))
+
+
+def _thinned(points: FloatArray) -> tuple[FloatArray, float]:
+    """Return at most `MAX_POINTS` of the points, evenly thinned, and their number over that of all."""
+    if len(points) <= MAX_POINTS:
+        return points, 1.0
+    selected = np.sort(points)[((np.arange(MAX_POINTS) + 0.5) / MAX_POINTS * len(points)).astype(int)]
+    return selected, MAX_POINTS / len(points)

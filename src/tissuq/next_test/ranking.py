@@ -1,0 +1,155 @@
+"""Candidates for the next test, ranked by the expected reduction of the uncertainty of targets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stability
+from tissuq.errors import InputError, ModelError
+from tissuq.inference.solution import Solution
+from tissuq.next_test.candidates import Candidate, candidate_named, default_candidates, reach_of
+from tissuq.next_test.next_test import NextTest, Specimen
+from tissuq.next_test.targets import MODULUS, Target, target_named
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["rank_tests"]
+
+MAX_MEASURED_REACH = 1 + 1e-6
+"""Largest reach of a stretch whose invariants were measured."""
+FEW_COMPONENTS = "inaccurate: few components of the posterior would remain"
+
+
+def rank_tests(
+    solution: Solution,
+    candidates: Sequence[str | Candidate] = (),
+    targets: Sequence[str | Target] = (),
+    *,
+    points: Sequence[int] = (),
+    specimen: Specimen | None = None,
+    seed: int = 0,
+    step: Callable[[str], None] = lambda text: None,
+) -> pd.DataFrame:
+    """Return candidates for the next test, best first for each target.
+
+    Parameters
+    ----------
+    solution : Solution
+    candidates : sequence of str or Candidate
+        The usual ones (`usual_candidates`) where there are none; the tests of the data again are always among them.
+    targets : sequence of str or Target
+        The initial shear modulus where there are none.
+    points : sequence of int
+        Numbers of measurements of the default candidates; as many as the data have where there are none.
+    specimen : str, optional
+        ``"same"`` or ``"other"``: a test of the specimen of the data, or of another one whose stresses differ as the
+        posterior's tolerances state, or by 18 %. The same, unless the data are of several specimens.
+    seed : int
+        Seed of the drawn outcomes.
+    step : callable
+        Called with the name of each candidate before it is computed.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each target and candidate.
+
+        - target, unit (MPa or nothing), candidate, mode, low, high (the range of stretches), points.
+        - sd_now, sd_after: standard deviation of the target now, and the root of the expected variance after the test.
+        - reduction: 1 - sd_after / sd_now; error: its standard error by simulation, zero in closed form.
+        - beyond: share of the measurements at which I1 or I2 is larger than in the data.
+        - stable: probability that the material is stable over the range; nan where that is unknown.
+        - is_repeat: whether it repeats a test of the data; is_rough: whether few components of the posterior would
+          remain, so that the numbers are unreliable; note: all this in words, or why there are no numbers.
+
+    Raises
+    ------
+    InputError, ModelError
+        When the posterior does not determine a target or a test.
+    """
+    import pandas as pd
+
+    model = solution.model
+    if any(count < 1 for count in points):
+        raise InputError(f"a test has one measurement or more, not {min(points)}.")
+    targets_asked = list(dict.fromkeys(target_named(candidate, model) for candidate in targets or [MODULUS]))
+    next_test = NextTest(solution, targets_asked, specimen, seed)
+    is_energy = model.discrepancy.is_energy and not model.is_correlated
+    defaults = list(default_candidates(model.experiment, model.material, is_energy=is_energy, points=tuple(points)))
+    requested = [
+        candidate if isinstance(candidate, Candidate) else candidate_named(candidate) for candidate in candidates
+    ]
+    ranked = [*[candidate for candidate in defaults if candidate.is_repeat], *requested] if requested else defaults
+    stable = _stable(solution, ranked)
+    rows: list[dict[str, Any]] = []
+    for candidate, share in zip(ranked, stable, strict=True):
+        step(candidate.name)
+        rows += _rows(next_test, candidate, share, is_requested=candidate in requested)
+    table = pd.DataFrame(rows)
+    order = {target.name: position for position, target in enumerate(targets_asked)}
+    keys = pd.DataFrame({"target": table["target"].map(order), "gain": -table["reduction"]})
+    return table.loc[keys.sort_values(["target", "gain"], kind="stable").index].reset_index(drop=True)
+
+
+def _rows(next_test: NextTest, candidate: Candidate, stable: float, *, is_requested: bool) -> list[dict[str, Any]]:
+    """Return the rows of a candidate, one a target; without numbers where the material cannot be stretched so."""
+    try:
+        expected, problem = next_test.expected(candidate), ""
+    except ModelError as error:
+        if is_requested:
+            raise
+        expected, problem = None, str(error)
+    model = next_test.model
+    share_beyond = float((reach_of(model.experiment, candidate.mode, candidate.stretch) > MAX_MEASURED_REACH).mean())
+    notes = [f"{share_beyond:.0%} beyond the data"] * (share_beyond > 0)
+    notes += [f"stable up to there: {stable:.0%}"] * (stable < 1 - MIN_LOSS_PROBABILITY)
+    notes += [FEW_COMPONENTS] * (expected is not None and expected.is_rough) + [problem] * bool(problem)
+    rows = []
+    for column, target in enumerate(next_test.targets):
+        numbers = {
+            "sd_now": next_test.sd_now[column],
+            "sd_after": expected.sd_after[column] if expected else np.nan,
+            "reduction": expected.reduction[column] if expected else np.nan,
+            "error": expected.error[column] if expected else np.nan,
+        }
+        rows.append(
+            {
+                "target": target.name,
+                "unit": target.unit(model),
+                "candidate": candidate.name,
+                "mode": candidate.mode.name,
+                "low": float(candidate.stretch.min()),
+                "high": float(candidate.stretch.max()),
+                "points": len(candidate.stretch),
+                **{name: float(value) for name, value in numbers.items()},
+                "beyond": share_beyond,
+                "stable": stable,
+                "is_repeat": candidate.is_repeat,
+                "is_rough": bool(expected and expected.is_rough),
+                "note": "; ".join(notes),
+            }
+        )
+    return rows
+
+
+def _stable(solution: Solution, candidates: Sequence[Candidate]) -> list[float]:
+    """Return the probability that the material is stable over the range of each candidate; nan where it is unknown."""
+    probabilities = dict.fromkeys(range(len(candidates)), np.nan)
+    for mode in dict.fromkeys(candidate.mode for candidate in candidates):
+        indices = [index for index, candidate in enumerate(candidates) if candidate.mode == mode]
+        if len(mode.stresses) > 1:
+            continue
+        ends = np.unique([end for index in indices for end in _ends(candidates[index])])
+        with suppress(ModelError):
+            shares = dict(zip(ends, stability(solution, mode, ends).stable, strict=True))
+            probabilities |= {index: min(float(shares[end]) for end in _ends(candidates[index])) for index in indices}
+    return list(probabilities.values())
+
+
+def _ends(candidate: Candidate) -> tuple[float, float]:
+    return float(candidate.stretch.min()), float(candidate.stretch.max())

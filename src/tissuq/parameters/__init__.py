@@ -1,0 +1,1 @@
+"""The parameters of materials, discrepancies and noise, and their prior distributions."""

@@ -1,0 +1,321 @@
+"""Draws of a posterior as complete hyperelastic materials, discrepancy included: what other programs can compute with.
+
+Their energy is that of the material, of a discrepancy's further terms, and of a discrepancy that is an energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, Literal, get_args, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment.stability import calibrated_range, stable_draws
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode, Path, States, loading_modes
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.solution import Solution
+from tissuq.mechanics import Material, StretchMaterial, stress_basis
+from tissuq.mechanics.complex_step import MOST_VALUES
+from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
+from tissuq.mechanics.pieces import PiecewiseEnergy, pieces
+from tissuq.model.discrepancy.blocks import Coordinates
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.seeds import check_seed
+from tissuq.prediction.moments import values_of
+
+__all__ = ["EnergyDraw", "Ensemble", "Sampling", "drawn_ensemble"]
+
+FloatArray = NDArray[np.float64]
+
+Sampling = Literal["sobol", "latin", "random"]
+"""How draws spread: a scrambled Sobol sequence, Latin hypercubes, or independently."""
+KNOTS = 1001
+"""Of a discrepancy's functions: 25 or more in the shortest length scale."""
+MOST_TRIES = 64
+"""Draws tried for each admissible one that is wanted."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyDraw(StretchMaterial):
+    """One draw of a posterior as a material without free parameters.
+
+    Beyond the range of the data its discrepancy keeps the slopes dW/dI1, dW/dI2 and l dw/dl that it has at the end.
+
+    Attributes
+    ----------
+    number : int
+        Its place in the ensemble, from zero.
+    parts : tuple of (Material, tuple of float)
+        The material, and further terms of the discrepancy where it has some, with their parameters.
+    discrepancy : PiecewiseEnergy or None
+        The energy of a discrepancy that is one.
+    """
+
+    number: int
+    parts: tuple[tuple[Material, tuple[float, ...]], ...]
+    discrepancy: PiecewiseEnergy | None
+
+    parameters = ()
+    source = "tissuq"
+    __eq__ = object.__eq__  # what is remembered of one draw is not true of another
+    __hash__ = object.__hash__
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """The material's name and the draw's number."""
+        return f"{self.parts[0][0].name}, draw {self.number}"
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """The formulas of the parts, joined."""
+        terms = [material.formula for material, _ in self.parts]
+        return " + ".join([*terms, "discrepancy"] if self.discrepancy else terms)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The parameters of the material by their symbols."""
+        material, values = self.parts[0]
+        return {parameter.symbol: value for parameter, value in zip(material.parameters, values, strict=True)}
+
+    def energy(self, stretches: tuple[Any, Any, Any], values: Any = ()) -> Any:
+        energy = sum(material.energy(stretches, parameters) for material, parameters in self.parts)
+        return energy if self.discrepancy is None else energy + self.discrepancy(stretches)
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble(Sequence[EnergyDraw]):
+    """Equally probable draws of a posterior as complete materials.
+
+    Attributes
+    ----------
+    draws : tuple of EnergyDraw
+    model : StatisticalModel
+        What was fitted.
+    admissible_in : tuple of str
+        Loading modes in which every draw is stable over the range in which both invariants were measured; empty where
+        none was left out.
+    tried : int
+        Draws among which the admissible ones were found.
+    ranges : mapping of str to (float, float)
+        Stretches of each loading mode of one stretch between which both invariants were measured.
+    """
+
+    draws: tuple[EnergyDraw, ...]
+    model: StatisticalModel
+    admissible_in: tuple[str, ...]
+    tried: int
+    ranges: Mapping[str, tuple[float, float]]
+
+    @overload
+    def __getitem__(self, index: int) -> EnergyDraw: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[EnergyDraw]: ...
+    def __getitem__(self, index: int | slice) -> EnergyDraw | Sequence[EnergyDraw]:
+        return self.draws[index]
+
+    def __len__(self) -> int:
+        return len(self.draws)
+
+    def __iter__(self) -> Iterator[EnergyDraw]:
+        return iter(self.draws)
+
+    @property
+    def admissible_share(self) -> float:
+        """The share of the posterior that is admissible, as far as the tried draws tell."""
+        return len(self.draws) / self.tried
+
+    @property
+    def alone(self) -> Ensemble:
+        """The same draws of the material's parameters, without any discrepancy."""
+        return replace(self, draws=tuple(replace(draw, parts=draw.parts[:1], discrepancy=None) for draw in self.draws))
+
+    def stress(self, mode: LoadingMode | Path, stretch: FloatArray) -> FloatArray:
+        """Return the engineering stresses (N, n), MPa, of all draws at points (n,) of a mode of one stress."""
+        return self.stresses_at(mode.at(stretch))
+
+    def stresses_at(self, states: States) -> FloatArray:
+        """Return the engineering stresses (N, n), MPa, of all draws at states (n,)."""
+        return _stress(self.draws, states)
+
+    @cached_property
+    def most(self) -> tuple[float, float]:
+        """The largest I1 - 3 and I2 - 3 that were measured."""
+        return largest_invariants(self.model.experiment.states)
+
+
+def drawn_ensemble(
+    solution: Solution, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True
+) -> Ensemble:
+    """Return draws of a posterior as materials.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of an isotropic material, and a discrepancy that is an energy, has none, or adds the terms of another material.
+    count : int
+    seed : int
+        From which the draws follow.
+    sampling : str
+        ``"sobol"``, ``"latin"`` or ``"random"``: how they spread over the posterior (before any is left out).
+    admissible : bool
+        Leave out draws that are not stable in every loading mode over the range that was measured.
+
+    Raises
+    ------
+    InputError, ModelError
+        When the posterior is not one of energies, or hardly any draw is admissible.
+    """
+    model = solution.model
+    _check(model, count, seed, sampling)
+    modes, draws, tried = _curve_modes(), list[EnergyDraw](), 0
+    while len(draws) < count:
+        if tried >= MOST_TRIES * count:
+            raise ModelError(
+                f"only {len(draws)} of {tried} draws are stable over the measured range of every loading mode, and "
+                f"{count} are wanted: fit with stable_in='all', choose another material, or take all draws."
+            )
+        batch = _materials(solution, count, [seed, tried // count], sampling)
+        stable = np.ones(count, dtype=bool)
+        if admissible:
+            stable = stable_draws(partial(_curves, batch), count, model.experiment, modes)
+        accepted = np.flatnonzero(stable)[: count - len(draws)]
+        draws += [batch[index] for index in accepted]
+        tried += int(accepted[-1]) + 1 if len(draws) == count else count
+    ranges = {mode.name: calibrated_range(model.experiment, mode) for mode in modes}
+    numbered = tuple(replace(draw, number=number) for number, draw in enumerate(draws))
+    return Ensemble(numbered, model, tuple(mode.name for mode in modes) if admissible else (), tried, ranges)
+
+
+def _stress(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
+    """Return the stresses (N, n) of draws at states (n,)."""
+    stresses = np.zeros((len(draws), len(states)))
+    for term, (material, _) in enumerate(draws[0].parts):
+        stresses += _of_material(material, np.array([draw.parts[term][1] for draw in draws]), states)
+    rates, (logs, log_rates) = invariant_rates(states), states.log_stretches
+    I1, I2 = invariants(states)
+    for row, energy in zip(stresses, (draw.discrepancy for draw in draws), strict=True):
+        if energy is not None:
+            row += energy.first.slope(I1) * rates[0] + energy.second.slope(I2) * rates[1]
+            row += (energy.logarithm.slope(logs) * log_rates).sum(axis=1)
+    return stresses
+
+
+def _of_material(material: Material, values: FloatArray, states: States) -> FloatArray:
+    """Return the stresses (N, n) of a material with parameters (N, k), a few at a time, as derivatives like them."""
+    is_linear = np.array([parameter.is_linear for parameter in material.parameters])
+    if is_linear.all():
+        return np.asarray(values @ stress_basis(material, states).T)
+    count = max(1, MOST_VALUES // (len(states) * int(is_linear.sum())))
+    blocks = [values[start : start + count] for start in range(0, len(values), count)]
+    bases = (stress_basis(material, states, block[:, ~is_linear]) for block in blocks)
+    pairs = zip(bases, blocks, strict=True)
+    return np.concatenate([np.einsum("nsk,nk->ns", basis, block[:, is_linear]) for basis, block in pairs])
+
+
+def _curves(draws: Sequence[EnergyDraw], indices: NDArray[np.intp]) -> Callable[[States], FloatArray]:
+    """Return the function that gives the stresses of some of the draws."""
+    selected = [draws[index] for index in indices]
+
+    def stresses(states: States) -> FloatArray:
+        try:
+            return _stress(selected, states)
+        except TypeError as error:
+            raise ModelError(
+                f"the stability of material '{selected[0].parts[0][0].name}' is not known, because its energy is not "
+                "plain arithmetic of arrays: take exp, log and the like from tissuq.mechanics.arithmetic instead of "
+                "jax.numpy, write no branches, or take all draws (tissuq export --all-draws)."
+            ) from error
+
+    return stresses
+
+
+def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> None:
+    if count < 1:
+        raise InputError(f"an ensemble has one draw or more, not {count}.")
+    check_seed(seed)
+    if sampling not in get_args(Sampling):
+        raise InputError(f"sampling must be one of {', '.join(get_args(Sampling))}, not '{sampling}'.")
+    if not model.material.is_isotropic:
+        raise ModelError(f"material '{model.material.name}' has fibres; draws as materials are of isotropic ones only.")
+    if not model.discrepancy.is_energy:
+        raise ModelError(
+            f"discrepancy '{model.discrepancy.name}' is an error of the measured stress and no material: fit with one "
+            "that is an energy, such as 'auto', or with 'none'."
+        )
+
+
+def _points(solution: Solution, count: int, seed: list[int], sampling: Sampling) -> tuple[GaussianMixture, FloatArray]:
+    """Return draws as mixture without width, and the factor (count,) of the error that all tests have in common."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    mixture, generator = solution.mixture, np.random.default_rng(seed)
+    size = mixture.mean.shape[1] + 2
+    if sampling == "random":
+        uniform = generator.random((count, size))
+    else:
+        engine = {"sobol": qmc.Sobol, "latin": qmc.LatinHypercube}[sampling](size, rng=generator)
+        uniform = engine.random_base2((count - 1).bit_length())[:count] if sampling == "sobol" else engine.random(count)
+    uniform = np.clip(uniform, 1e-12, 1 - 1e-12)
+    headline, _ = values_of(solution.model, mixture, [solution.model.headline])
+    order = np.argsort(headline[:, 0], kind="stable")  # neighbours are alike, so that an even spread is one over them
+    cumulative = np.cumsum(mixture.weights[order])
+    selected = mixture[order[np.searchsorted(cumulative, uniform[:, 0] * mixture.weights.sum())]]
+    mean = selected.mean + np.einsum("mpq,mq->mp", selected.root, ndtri(uniform[:, 2:]))
+    points = replace(selected, mean=mean, root=np.zeros_like(selected.root), weights=np.full(count, 1 / count))
+    return points, np.asarray(1 + solution.model.common_error * ndtri(uniform[:, 1]))
+
+
+def _materials(solution: Solution, count: int, seed: list[int], sampling: Sampling) -> list[EnergyDraw]:
+    """Return so many draws of a posterior as materials."""
+    model = solution.model
+    points, factor = _points(solution, count, seed, sampling)
+    values, _ = values_of(model, points, model.symbols)
+    values = values * np.where(np.isin(model.symbols, model.column_symbols), factor[:, None], 1.0)
+    energies = _energies(model, points, factor, seed) if model.energy_symbols else [None] * count
+    draws = []
+    for number, (row, energy) in enumerate(zip(values, energies, strict=True)):
+        parameters = dict(zip(model.symbols, map(float, row), strict=True))
+        extra_term = model.discrepancy.material_part(parameters)
+        base_term = model.material, tuple(parameters[symbol] for symbol in model.material_symbols)
+        draws.append(EnergyDraw(number, (base_term, extra_term) if extra_term else (base_term,), energy))
+    return draws
+
+
+def _energies(
+    model: StatisticalModel, points: GaussianMixture, factor: FloatArray, seed: list[int]
+) -> list[PiecewiseEnergy]:
+    """Return the discrepancies of draws, over the states whose invariants were measured."""
+    generator, start = np.random.default_rng([*seed, 1]), len(model.linear)
+    grid = Coordinates(*(np.linspace(*ends, KNOTS) for ends in _ends(model.experiment)))
+    slopes = [np.zeros((KNOTS, len(factor))) for _ in grid]
+    assert points.member is not None  # noqa: S101 (an energy discrepancy has members)
+    for number in np.unique(points.member):
+        rows, member, column = np.flatnonzero(points.member == number), model.energy_members[number], start
+        for block, (terms, count) in zip(member.amplitude_indices, member.slopes(grid), strict=True):
+            amplitude = points.settings[rows, model.nonlinear.index(model.energy_symbols[block])]
+            drawn = generator.standard_normal((len(rows), terms.invariant_1.shape[1] - count)) * amplitude[:, None]
+            weights = np.hstack([points.mean[rows, column : column + count], drawn]) * factor[rows, None]
+            column += count
+            for slope, features in zip(slopes, terms, strict=True):
+                slope[:, rows] += features @ weights.T
+    functions = (pieces(knots, values) for knots, values in zip(grid, slopes, strict=True))
+    return [PiecewiseEnergy(*terms) for terms in zip(*functions, strict=True)]
+
+
+def _ends(data: Experiment) -> Iterator[tuple[float, float]]:
+    """Return the ranges of I1 - 3, I2 - 3 and the logarithms of stretches in states whose invariants were measured."""
+    ranges = [data.states, *(mode.at(calibrated_range(data, mode)) for mode in _curve_modes())]
+    logs = [states.log_stretches[0] for states in ranges]
+    for values in zip(*map(largest_invariants, ranges), strict=True):
+        yield 0.0, max(values)
+    yield min(float(values.min()) for values in logs), max(float(values.max()) for values in logs)
+
+
+def _curve_modes() -> list[LoadingMode]:
+    return [mode for mode in (kind() for kind in loading_modes().values()) if mode.is_curve]

@@ -1,0 +1,179 @@
+"""The main calls: from experiments to the posterior of a material's parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from tissuq.assessment.stable_posterior import modes_named
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import States
+from tissuq.mechanics import Material, material_named
+from tissuq.model.discrepancy import Discrepancy, discrepancy_named
+from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.noise import Noise, noise_named
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Prior
+from tissuq.parameters.seeds import check_seed
+from tissuq.posterior.posterior import Posterior
+from tissuq.posterior.solver import METHODS, Method, Solver
+
+__all__ = ["fit", "fit_many"]
+
+
+def fit(
+    data: Experiment | Sequence[Experiment],
+    *,
+    discrepancy: str | Discrepancy = "auto",
+    material: str | Material = "neo-hookean",
+    noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
+    noise: str | Noise | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    tolerances: Tolerances | None = None,
+    method: Method = "auto",
+    stable_in: str | Sequence[str] = (),
+    seed: int = 0,
+) -> Posterior:
+    """Identify the parameters of a material from an experiment, with a model discrepancy and noise.
+
+    Parameters
+    ----------
+    data : Experiment or sequence of Experiment
+        The measurements: of one test, or of several in any modes, which share one material. A discrepancy that is an
+        energy acts in all of them; one in stress is another in each test, of the same size.
+    discrepancy : str or Discrepancy
+        What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object; ``"auto"`` is
+        an average of strain energies that leave the initial shear modulus alone, by the evidence.
+    material : str or Material
+        The material whose parameters are wanted.
+    noise_sd : float or "unknown"
+        Standard deviation of the measurement noise in MPa; unknown, as when nothing is said, makes it a parameter. For
+        several tests a sequence of numbers, one for each, is taken, too; where it is unknown, its ratios between the
+        tests are those of their scatter about smooth curves, and noise_sd is its geometric mean.
+    noise : str or Noise
+        Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), ``"repeats"`` (told
+        by repeated measurements at the same stretch), or ``"autoregressive"`` (errors of consecutive measurements
+        correlated).
+    priors : mapping of str to Prior
+        Priors in MPa (psi in stretch) that replace the defaults, by parameter.
+    tolerances : Tolerances
+        By how much whole tests may be off, such as ``Tolerances(stress=0.1, length=0.02)``; by default tests of
+        different specimens agree to 18 % in stress (four or more tell by themselves how far they are apart), and a
+        single test has no such errors.
+    method : str
+        ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
+        ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
+        ``"smc"``: the same with tempered sequential Monte Carlo, which gives the evidence, too.
+        ``"joint"``: the no-U-turn sampler over all parameters, nothing integrated, as in the paper.
+        ``"auto"``: exact where it applies and reaches its tolerance; else nuts, with the evidence from smc.
+        The posterior's ``method`` and ``how`` say what was done and why.
+    stable_in : str or sequence of str
+        Loading modes, or ``"all"``, in which material and energy discrepancy must be stable over the range that was
+        measured: the prior leaves out what is not, and the posterior is known by those of its draws that are.
+    seed : int
+        Of the draws.
+
+    Raises
+    ------
+    InputError
+        When data, noise or priors cannot be used.
+    ModelError
+        When the parts do not fit each other, or the method does not apply, or hardly any of the posterior is stable
+        where that is asked for.
+    ConvergenceError
+        When the method was asked for by name and cannot reach its tolerance.
+
+    References
+    ----------
+    Zeraatpisheh, Bordas & Beex (2021), eq. 15 to 26.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> truth = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
+    >>> stretch = [0.5, 0.75, 1.25, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]
+    >>> data = tq.simulate("yeoh", truth, stretch, noise_sd=0.1, seed=1)
+    >>> posterior = tq.fit(data, material="neo-hookean", discrepancy="yeoh", noise_sd=0.1)
+    >>> low, high = posterior.summary().loc["C10", ["hdi_low", "hdi_high"]]
+    >>> bool(low < 1.2 < high)
+    True
+    """
+    return fit_many(
+        [data],
+        discrepancy=discrepancy,
+        material=material,
+        noise_sd=noise_sd,
+        noise=noise,
+        priors=priors,
+        tolerances=tolerances,
+        method=method,
+        stable_in=stable_in,
+        seed=seed,
+    )[0]
+
+
+def fit_many(
+    datasets: Sequence[Experiment | Sequence[Experiment]],
+    *,
+    discrepancy: str | Discrepancy = "auto",
+    material: str | Material = "neo-hookean",
+    noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
+    noise: str | Noise | None = None,
+    priors: Mapping[str, Prior] | None = None,
+    tolerances: Tolerances | None = None,
+    method: Method = "auto",
+    stable_in: str | Sequence[str] = (),
+    seed: int = 0,
+) -> list[Posterior]:
+    """Fit many experiments with the same model, each by itself; the parameters are those of `fit`.
+
+    Experiments on the same stretches in the same loading mode (replicates, specimens, synthetic data) share all
+    factorisations and are integrated together, which takes a small part of the time of as many calls of `fit` and gives
+    the same posteriors to the accuracy of the integration.
+
+    Parameters
+    ----------
+    datasets : sequence of Experiment, or of sequences of them
+        Several tests that belong together count as one data set.
+
+    Returns
+    -------
+    list of Posterior
+        In the order of the experiments.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4]
+    >>> specimens = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.05, seed=s) for s in range(20)]
+    >>> posteriors = tq.fit_many(specimens, discrepancy="none", noise_sd=0.05)
+    >>> held = [0.5 > p.summary().loc["C10", "hdi_low"] for p in posteriors]
+    >>> len(held)
+    20
+    """
+    if tolerances is not None and not isinstance(tolerances, Tolerances):
+        raise InputError(f"tolerances must be such as tissuq.Tolerances(stress=0.1), not {tolerances!r}.")
+    if method not in METHODS:
+        raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
+    check_seed(seed)
+    if noise_sd is not None and noise is not None:
+        raise InputError(f"give noise_sd or noise, not both (noise_sd is {noise_sd!r}, noise is {noise!r}).")
+    noise_model = noise_named(noise if noise is not None else "unknown" if noise_sd is None else noise_sd)
+    options = material_named(material), discrepancy_named(discrepancy), noise_model, dict(priors or {})
+    solver = Solver(method, modes_named(stable_in), int(seed))
+
+    def model_of(data: Experiment) -> StatisticalModel:
+        model = StatisticalModel(data, *options, tolerances or Tolerances())
+        return model if tolerances is not None else solver.with_default_tolerances(model)
+
+    experiments = [Experiment.of(data) for data in datasets]
+    groups: dict[tuple[States, int], list[int]] = {}
+    for number, data in enumerate(experiments):
+        is_shared = len(data.tests) == 1 and not tolerances and not noise_model.is_consecutive
+        groups.setdefault((data.states, 0 if is_shared else number), []).append(number)
+    posteriors: dict[int, Posterior] = {}
+    for numbers in groups.values():
+        solutions = solver.solve([model_of(experiments[number]) for number in numbers])
+        posteriors |= {number: Posterior(solution, solver) for number, solution in zip(numbers, solutions, strict=True)}
+    return [posteriors[number] for number in range(len(datasets))]

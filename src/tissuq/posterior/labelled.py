@@ -1,0 +1,139 @@
+"""A posterior as labelled arrays, which ArviZ and xarray read."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment import known_evidence_changes
+from tissuq.errors import InputError
+from tissuq.inference.solution import Solution
+from tissuq.posterior.netcdf import LabelledGroup
+from tissuq.prediction.densities import leave_one_out
+from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["labelled_arrays", "labels_of", "summary_table"]
+
+
+def labelled_arrays(solution: Solution, seed: int) -> dict[str, LabelledGroup]:
+    """Return draws, replicated data, densities and measurements; the groups are those of `Posterior.data`."""
+    experiment = solution.model.experiment
+    point = {"measurement": np.arange(experiment.size)}
+    chains, draws = (np.arange(size) for size in solution.shape)
+    sample = {"chain": chains, "draw": draws}
+    thinned_sample = {"chain": chains, "draw": draws[:: stride(solution)]}
+    parameters = {parameter.symbol: parameter for parameter in solution.model.parameters}
+    in_mpa = {"units": "MPa"}
+    coordinates = {"stretch": ("measurement", experiment.states.abscissa, {"units": "1"})}
+    if len(experiment.tests) > 1:
+        coordinates["test"] = (
+            "measurement",
+            [curve.name for curve in experiment.curves for _ in range(len(curve))],
+            {},
+        )
+    groups = {
+        "posterior": LabelledGroup(
+            {
+                symbol: (("chain", "draw"), values, {"units": parameters[symbol].unit or "1"})
+                for symbol, values in _draws(solution, seed).items()
+            },
+            sample,
+        ),
+        "observed_data": LabelledGroup({"stress": ("measurement", experiment.measured, in_mpa)}, point),
+        "constant_data": LabelledGroup(coordinates, point),
+    }
+    if not solution.is_of_data:
+        return groups
+    stress, left_out = ("chain", "draw", "measurement"), leave_one_out(solution)
+    groups |= {
+        "posterior_predictive": LabelledGroup(
+            {"stress": (stress, replicate_data(solution, seed), in_mpa)}, thinned_sample | point
+        ),
+        "log_likelihood": LabelledGroup(
+            {"stress": (stress, pointwise_log_likelihood(solution))}, thinned_sample | point
+        ),
+        "leave_one_out": LabelledGroup(
+            {
+                "log_density": ("measurement", left_out.log_density),
+                "is_rough": ("measurement", left_out.is_rough.astype(np.int8)),
+            },
+            point,
+        ),
+    }
+    return groups
+
+
+def labels_of(solution: Solution, seed: int, headline: Mapping[Hashable, float]) -> dict[str, str | float]:
+    """Return what was fitted, how, and what came out, in short: the attributes of the arrays.
+
+    ``headline`` is the row of the headline parameter in the summary.
+    """
+    model = solution.model
+    labels: dict[str, str | float] = {
+        "inference_library": "tissuq",
+        "experiment": model.experiment.name,
+        "loading_mode": ", ".join(mode.name for mode in model.experiment.modes),
+        "material": model.material.name,
+        "discrepancy": model.discrepancy.name,
+        "noise": str(model.noise),
+        "method": solution.route,
+        "method_reason": solution.reason,
+        "seed": seed,
+    }
+    labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
+    labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
+    labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
+    labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
+    if solution.stable_in:
+        labels["stable_in"] = ", ".join(solution.stable_in)
+    if solution.diagnostics is not None:
+        diagnostics = solution.diagnostics
+        labels |= {"converged": str(diagnostics.converged), "verdict": diagnostics.verdict}
+        labels |= {} if diagnostics.divergences is None else {"divergences": diagnostics.divergences}
+        labels |= {} if diagnostics.least_bfmi is None else {"least_bfmi": diagnostics.least_bfmi}
+    evidence = {"log_evidence": solution.log_evidence, "log_evidence_error": solution.log_evidence_error}
+    return labels | {name: value for name, value in evidence.items() if value is not None}
+
+
+def summary_table(solution: Solution, prob: float, parameters: Sequence[str] | None) -> pd.DataFrame:
+    """Return mean, sd, median and interval of the parameters that are asked for; `Posterior.summary` describes it."""
+    import pandas as pd
+
+    model = solution.model
+    if not 0 < prob < 1:
+        raise InputError(f"prob must be between 0 and 1, not {prob}.")
+    wanted = model.symbols if parameters is None else tuple(parameters)
+    unknown = [symbol for symbol in wanted if symbol not in model.symbols]
+    if unknown:
+        raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(model.symbols)}.")
+    index, names = pd.Index(wanted, name="parameter"), ["mean", "sd", "median", "hdi_low", "hdi_high"]
+    table = pd.DataFrame([_numbers(solution, symbol, prob) for symbol in wanted], index, names)
+    diagnostics = solution.diagnostics
+    if diagnostics is not None:
+        table["ess"] = [min(diagnostics.ess_bulk[symbol], diagnostics.ess_tail[symbol]) for symbol in table.index]
+        table["rhat"] = [diagnostics.rhat[symbol] for symbol in table.index]
+    return table
+
+
+def _numbers(solution: Solution, symbol: str, prob: float) -> tuple[float, ...]:
+    """Return mean and sd (nan where there may be none), median and the ends of the interval of a parameter."""
+    marginal, model = solution.marginals[symbol], solution.model
+    has_moments = symbol not in model.energy_symbols or model.priors[symbol].has_moments
+    moments = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
+    return (*moments, float(marginal.quantile(0.5)), *marginal.hdi(prob))
+
+
+def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:
+    """Return the draws of every parameter, those of stresses with the error that all tests have in common."""
+    model, drawn = solution.model, solution.draws
+    if not model.common_error:
+        return drawn
+    score = np.random.default_rng([seed, 19]).standard_normal(solution.shape)
+    factor = 1 + model.common_error * score
+    return {symbol: values * (factor if symbol in model.column_symbols else 1.0) for symbol, values in drawn.items()}

@@ -1,0 +1,107 @@
+"""Labelled arrays as groups of a NetCDF file, which ArviZ and xarray open.
+
+Not through xarray, whose import takes longer than a fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Group", "LabelledGroup", "read_groups", "save_groups"]
+
+COMPRESSED_SIZE = 1000
+"""Number of values in an array from which it is compressed."""
+COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+
+
+class Group(NamedTuple):
+    """What was read of a group of a file: arrays by name, and texts and numbers."""
+
+    arrays: dict[str, NDArray[Any]]
+    attrs: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class LabelledGroup:
+    """Arrays with names of their dimensions, and their coordinates.
+
+    Attributes
+    ----------
+    arrays, coordinates : dict of str to tuple
+        Dimensions, values and, where there are some, attributes; values alone for the coordinate of a dimension.
+    attrs : dict of str to str or number
+    """
+
+    arrays: dict[str, Any] = field(default_factory=dict)
+    coordinates: dict[str, Any] = field(default_factory=dict)
+    attrs: dict[str, Any] = field(default_factory=dict)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return the same as a data set of xarray."""
+        import xarray as xr
+
+        return xr.Dataset(self.arrays, self.coordinates, self.attrs)
+
+    def write(self, file: Any) -> None:
+        """Write everything into a group of an open file of h5netcdf."""
+        import h5py
+
+        _write_attributes(file, self.attrs)
+        scattered: dict[str, set[str]] = {}
+        for name, described in (self.coordinates | self.arrays).items():
+            along, values, *attributes = described if isinstance(described, tuple) else (name, described)
+            dims, array = (along,) if isinstance(along, str) else tuple(along), np.asarray(values)
+            for dim, size in zip(dims, array.shape, strict=True):
+                if dim not in file.dimensions:
+                    file.dimensions[dim] = size
+            array = array.astype(h5py.string_dtype()) if array.dtype.kind == "U" else array
+            packed = COMPRESSION if array.size > COMPRESSED_SIZE else {}
+            variable = file.create_variable(name, dims, array.dtype, array, **packed)
+            _write_attributes(variable, *attributes)
+            if name not in self.coordinates:
+                beside = [key for key, labels in scattered.items() if labels <= set(dims)]
+                _write_attributes(variable, {"coordinates": " ".join(beside)} if beside else {})
+            elif dims != (name,):
+                scattered[name] = set(dims)
+
+
+def _write_attributes(file: Any, attributes: Mapping[str, str | float] | None = None) -> None:
+    for name, value in (attributes or {}).items():
+        file.attrs[name] = value if isinstance(value, str) else np.atleast_1d(value)
+
+
+def save_groups(groups: Mapping[str, LabelledGroup], path: Path) -> None:
+    """Write groups by name, the root's ``"/"``, as one NetCDF file."""
+    import h5netcdf
+
+    content = BytesIO()  # the HDF5 library must not meet a full disk itself: it fails where no one can catch it
+    with h5netcdf.File(content, "w") as file:
+        for name, group in groups.items():
+            group.write(file if name == "/" else file.create_group(name))
+    path.write_bytes(content.getbuffer())
+
+
+def read_groups(path: Path, root: str) -> dict[str, Group]:
+    """Read a group of a file and all within it, by name; none where there is no such group."""
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        return dict(_nested(file.groups[root], root, root)) if root in file.groups else {}
+
+
+def _nested(group: Any, name: str, root: str) -> Iterator[tuple[str, Group]]:
+    """Yield a group of a file and all within it, by name."""
+    arrays = {str(key): variable[...] for key, variable in group.variables.items()}
+    yield name.removeprefix(f"{root}/"), Group(arrays, dict(group.attrs))
+    for key, inner in group.groups.items():
+        yield from _nested(inner, f"{name}/{key}", root)

@@ -1,0 +1,443 @@
+"""The posterior as a user meets it: a table, predictions, labelled draws for ArviZ, a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tissuq.assessment import Assessment, assess
+from tissuq.assessment.comparison import scores_of
+from tissuq.assessment.modulus import modulus
+from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
+from tissuq.inference.marginal import Marginal
+from tissuq.inference.solution import Diagnostics, Solution
+from tissuq.mechanics import Material
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.next_test import Candidate, rank_tests
+from tissuq.posterior.archive import read_solution, solution_groups
+from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
+from tissuq.posterior.labelled import labelled_arrays, labels_of, summary_table
+from tissuq.posterior.netcdf import LabelledGroup, save_groups
+from tissuq.posterior.solver import Solver
+from tissuq.posterior.warnings import warnings_about
+from tissuq.prediction.bands import predict_band, share_inside, stress_ratio
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+__all__ = ["Posterior"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Posterior:
+    """What `tissuq.fit` returns.
+
+    Attributes
+    ----------
+    solution : Solution
+        Marginals, mixture and draws.
+    solver : Solver
+        How it was solved, which solves other models likewise.
+    """
+
+    solution: Solution
+    solver: Solver
+
+    @property
+    def seed(self) -> int:
+        """The seed from which the draws follow."""
+        return self.solver.seed
+
+    @property
+    def model(self) -> StatisticalModel:
+        """The model that was fitted, with its data and priors."""
+        return self.solution.model
+
+    @property
+    def marginals(self) -> Mapping[str, Marginal]:
+        """The marginal posterior of every parameter: mean, sd, density, quantiles, HDI."""
+        return self.solution.marginals
+
+    @property
+    def initial_shear_modulus(self) -> Marginal:
+        """The marginal posterior of the material's initial shear modulus, MPa: what an energy discrepancy leaves alone.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> truth = {"C10": 0.5, "C01": 0.1}
+        >>> data = tq.simulate("mooney-rivlin", truth, stretch, noise_sd=0.02, seed=1)
+        >>> low, high = tq.fit(data, material="mooney-rivlin", noise_sd=0.02).initial_shear_modulus.hdi()
+        >>> bool(low < 2 * (0.5 + 0.1) < high)
+        True
+        """
+        return modulus(self.solution)
+
+    @property
+    def log_evidence(self) -> float | None:
+        """Log of p(data), data in MPa, priors normalised (uniform densities included).
+
+        None where the method gives none (nuts and joint when asked for by name), or a prior is flat and improper.
+        """
+        return self.solution.log_evidence
+
+    @property
+    def log_evidence_error(self) -> float | None:
+        """Estimated error of `log_evidence`."""
+        return self.solution.log_evidence_error
+
+    @property
+    def method(self) -> str:
+        """The method that gave it; `how` says why it was taken and what it did."""
+        return self.solution.route
+
+    @property
+    def how(self) -> str:
+        """How it was computed and why so: what was integrated, and which errors were estimated and taken as known.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+        >>> tq.fit(data, discrepancy="none", noise_sd=0.02).how
+        'C10 integrated in closed form; nothing left to integrate'
+        """
+        return "; ".join(filter(None, (self.solution.reason, self.model.fitted_errors.account)))
+
+    @property
+    def diagnostics(self) -> Diagnostics | None:
+        """R-hat, effective sample sizes, divergences, BFMI and a verdict; None where nothing was sampled."""
+        return self.solution.diagnostics
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of this posterior must know, in sentences."""
+        return tuple(warnings_about(self.solution, self.stable_ranges))
+
+    def assess(self) -> Assessment:
+        """Return to what extent the data need the discrepancy, and what it does to the parameters.
+
+        The same data are fitted without discrepancy and, unless that would need a sampler, with other prior scales of
+        what sets the discrepancy's size.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, stretch, noise_sd=0.02, seed=1)
+        >>> found = tq.fit(data, discrepancy="auto", noise_sd=0.02).assess()
+        >>> found.share[0] > 0.2, abs(found.initial_share[0]) < 1e-6, found.probability_of_none < 0.01
+        (True, True, True)
+        """
+        return self._assessment
+
+    @cached_property
+    def _assessment(self) -> Assessment:
+        return assess(self.solution, self.solver.solve, self.stable_ranges)
+
+    def stability(
+        self, mode: str | LoadingMode | None = None, stretch: ArrayLike | None = None, points: int = 41
+    ) -> pd.DataFrame:
+        """Return how probable it is that the material, with an energy discrepancy, is stable.
+
+        Parameters
+        ----------
+        mode : str or LoadingMode, optional
+            That of the data unless another is given.
+        stretch : (g,) array, optional
+            Unless given, ``points`` stretches over the range in which both invariants were measured.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns stretch; baker_ericksen, drucker, rising, the shares of draws for which each criterion holds there;
+            and stable, the share for which all hold from the reference up to there.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, stretch, noise_sd=0.02, seed=1)
+        >>> table = tq.fit(data, discrepancy="none", noise_sd=0.02).stability("equibiaxial")
+        >>> float(table["stable"].min())
+        1.0
+        """
+        import pandas as pd
+
+        table = stability_over(self.solution, mode, stretch, points)
+        return pd.DataFrame({name: value for name, value in vars(table).items() if name != "mode"})
+
+    @cached_property
+    def stable_ranges(self) -> Mapping[str, StableRange]:
+        """How far from the reference it is stable, with what probability, and where it ceases to be, by loading mode.
+
+        Over the range in which both invariants were measured; empty where the material's energy does not tell.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.datasets.load("rubber-treloar-uniaxial")
+        >>> found = tq.fit(data, material="mooney-rivlin", discrepancy="none").stable_ranges["uniaxial"]
+        >>> found.probability < 0.05, found.loss_above.median  # it has a negative modulus: lost at the reference
+        (True, 1.0)
+        """
+        return stable_ranges(self.solution)
+
+    def design(
+        self, candidates: Sequence[str | Candidate] = (), target: str | Sequence[str] = (), **options: Any
+    ) -> pd.DataFrame:
+        """Rank tests that could be made next by how much less uncertain they are expected to make a target.
+
+        The columns, and the ``options`` points, specimen and seed, are those of `tissuq.assessment.rank_tests`.
+
+        Parameters
+        ----------
+        candidates : sequence of str or Candidate
+            Such as ``"planar 1:1.5 20"``; usual ones in all modes, unless given.
+        target : str or sequence of str
+            ``"modulus"`` (the initial shear modulus, unless given), a parameter, or a stress such as ``"planar:1.5"``.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.02, seed=1)
+        >>> posterior = tq.fit(data, discrepancy="none", noise_sd=0.02)
+        >>> posterior.design(["uniaxial 0.9:1.1 4", "uniaxial 0.7:1.3 4"]).query("not is_repeat")["low"].tolist()
+        [0.7, 0.9]
+        """
+        targets = [target] if isinstance(target, str) else target
+        return rank_tests(self.solution, candidates, targets, **options)
+
+    def update(self, more: Experiment) -> Posterior:
+        """Return the posterior after further measurements, as if all had been fitted at once.
+
+        Where noise and discrepancy are independent from point to point and the stress is linear in its parameters, the
+        measurements so far enter by their sufficient statistics, and only the new ones are read.
+
+        Raises
+        ------
+        InputError
+            When the measurements are in another loading mode.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> first = tq.simulate("neo-hookean", {"C10": 0.5}, [0.8, 0.9, 1.1, 1.2], noise_sd=0.05, seed=1)
+        >>> more = tq.simulate("neo-hookean", {"C10": 0.5}, [0.7, 1.3], noise_sd=0.05, seed=2)
+        >>> before = tq.fit(first, discrepancy="none", noise_sd=0.05)
+        >>> after = before.update(more)
+        >>> bool(after.summary().loc["C10", "sd"] < before.summary().loc["C10", "sd"])
+        True
+        """
+        return Posterior(self.solver.solve([self.model.with_more(more)])[0], self.solver)
+
+    def summary(self, prob: float = 0.95, parameters: Sequence[str] | None = None) -> pd.DataFrame:
+        """Return mean, sd, median and the highest-density interval of every parameter (MPa; psi in stretch).
+
+        Amplitudes of an energy discrepancy whose prior has no mean (the default, half-Cauchy) have a median and an
+        interval only: few directions of the data tell them, so that their posterior may have its prior's tail.
+
+        Parameters
+        ----------
+        parameters : sequence of str, optional
+            Only these; what is not asked for is not computed.
+        prob : float
+            Probability inside the interval; 0.95 gives the paper's 95 % HPD.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
+            when the posterior was sampled.
+        """
+        return summary_table(self.solution, prob, parameters)
+
+    def predict(
+        self,
+        stretch: ArrayLike,
+        *,
+        discrepancy: bool = True,
+        noise: bool = True,
+        prob: float = 0.95,
+        mode: str | LoadingMode | None = None,
+        channel: int = 0,
+        stress_type: str = "engineering",
+    ) -> pd.DataFrame:
+        """Return the predicted stress at new stretches.
+
+        Parameters
+        ----------
+        stretch : (g,) array, or (g, c) for a mode with c controls, dimensionless
+        discrepancy : bool
+            With the discrepancy's share (eq. 27), or the model alone (eq. 28).
+        noise : bool
+            For a new measurement, or for the stress itself.
+        prob : float
+            Probability between low and high, equal tails.
+        mode : str or LoadingMode, optional
+            Another loading mode than that of the data: for the material alone, or a discrepancy that is an energy.
+        channel : int
+            Which of the mode's stresses, from 0, where it has several.
+        stress_type : str
+            ``"engineering"``, or ``"cauchy"``: times the stretch along the axis of the stress (a shear stress is both).
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns stretch, mean, low, high; MPa.
+        """
+        import pandas as pd
+
+        options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
+        ratio = stress_ratio(stress_type, mode or self.model.experiment.modes[0], channel)
+        table = pd.DataFrame(vars(predict_band(self.solution, stretch, **options, channel=channel)))
+        factor = ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
+        table[["mean", "low", "high"]] *= np.asarray(factor)[:, None]
+        return table
+
+    def scores(
+        self, test: Experiment, *, discrepancy: bool = True, prob: float = 0.95, stress_type: str = "engineering"
+    ) -> pd.DataFrame:
+        """Return how well a test that the posterior has not seen is predicted, in any loading mode.
+
+        Parameters
+        ----------
+        test : Experiment
+            Its measurements without stress are left out: at rest it is zero by definition.
+        discrepancy, prob, stress_type
+            As of `predict`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            For every stress of the test a row with all measurements and, where some lie beyond the range in which both
+            invariants were measured, one with those in the ``range`` (``"calibrated"``) and one with those
+            ``"beyond"``: how many (``count``), and what `tissuq.prediction.scores.Judged.summary` describes: inside,
+            half_width, error, crps and interval_score.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data, other = (tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.02, mode=m, seed=1)
+        ...                for m in ("uniaxial", "planar"))
+        >>> found = tq.fit(data, noise_sd=0.02).scores(other)
+        >>> bool(found["inside"][0] > 0.7), bool(found["crps"][0] < 0.03)
+        (True, True)
+        """
+        return scores_of(self.solution, test, discrepancy=discrepancy, prob=prob, stress_type=stress_type)
+
+    def ensemble(self, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True) -> Ensemble:
+        """Return equally probable draws as complete materials, with the discrepancy in their energy.
+
+        They are for other programs and other loading modes: finite elements, material cards. Over all states whose
+        invariants were measured they carry the posterior's whole uncertainty; beyond, a discrepancy that is an energy
+        keeps the slopes dW/dI1, dW/dI2 and l dw/dl that it has at the end. Scatter of the stress (S, noise) is no
+        energy, and left out.
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        seed : int
+            From which the draws follow.
+        sampling : str
+            How they spread over the posterior: ``"sobol"`` (quasi-random), ``"latin"`` (Latin hypercube) or
+            ``"random"``.
+        admissible : bool
+            Leave out draws that are not stable in every loading mode over the range that was measured.
+
+        Raises
+        ------
+        InputError, ModelError
+            When the material has fibres, the discrepancy is an error of the stress, or hardly any draw is stable.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> stretch = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0]
+        >>> data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.1, "C30": 0.0}, stretch, noise_sd=0.02, seed=1)
+        >>> draws = tq.fit(data, noise_sd=0.02).ensemble(8)
+        >>> planar = tq.loading_modes()["planar"]()
+        >>> draws.stress(planar, [1.5]).shape
+        (8, 1)
+        >>> bool(abs(tq.engineering_stress(draws[0], planar, [1.5], ()) - draws.stress(planar, [1.5])[0])[0] < 1e-9)
+        True
+        """
+        return drawn_ensemble(self.solution, count, seed, sampling, admissible=admissible)
+
+    def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
+        """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""
+        key = (discrepancy, prob)
+        if key not in self._coverage:
+            self._coverage[key] = share_inside(self.solution, discrepancy=discrepancy, prob=prob)
+        return self._coverage[key]
+
+    @cached_property
+    def _coverage(self) -> dict[tuple[bool, float], float]:
+        return {}
+
+    @cached_property
+    def data(self) -> xr.DataTree:
+        """Everything as labelled arrays that ArviZ reads.
+
+        Groups posterior, posterior_predictive, log_likelihood (dimensions chain, draw and, for the latter two,
+        measurement), leave_one_out, observed_data and constant_data. With very many measurements the former two hold
+        only some of the draws. The log likelihood of a draw is that of each measurement given the draw's parameters
+        and, under a process, the other measurements; leave_one_out has each measurement's density given the others,
+        everything integrated, which is what `tissuq.compare` takes. Parameters in the posterior have the error that all
+        tests have in common; what is said of the measurements has not. On the
+        exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the quadrature's points: for
+        their intervals and densities use `summary` and ``solution.marginals``.
+        """
+        import xarray as xr
+
+        return xr.DataTree.from_dict({name: group.to_dataset() for name, group in self._groups.items()})
+
+    @cached_property
+    def _groups(self) -> dict[str, LabelledGroup]:
+        headline = self.summary(parameters=[self.model.headline]).to_dict("records")[0]
+        labels = labels_of(self.solution, self.seed, headline)
+        return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed)
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole posterior as NetCDF: `data`, which ArviZ and xarray open, and what `load` needs."""
+        save_groups(self._groups | solution_groups(self.solution, self.solver), Path(path))
+
+    @classmethod
+    def load(
+        cls, path: str | Path, material: Material | None = None, discrepancy: Discrepancy | None = None
+    ) -> Posterior:
+        """Return the posterior that `save` wrote: nothing is fitted again, and no code of the file is run.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        material, discrepancy
+            Those of the posterior, where they are classes or functions of your own.
+
+        Raises
+        ------
+        InputError
+            When the file holds no posterior or is damaged, or material or discrepancy must be given.
+        """
+        return cls(*read_solution(Path(path), material, discrepancy))
+
+    def __repr__(self) -> str:
+        model = self.model
+        return (
+            f"<Posterior of {', '.join(model.symbols)}: {model.material.name}, discrepancy {model.discrepancy.name}, "
+            f"{model.experiment.size} measurements, {self.solution.route}>"
+        )

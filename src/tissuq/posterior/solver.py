@@ -1,0 +1,106 @@
+"""How models are solved: which enumerator, what is estimated before and plugged in, and what is left out after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from tissuq.assessment.stable_posterior import stable_part
+from tissuq.errors import ConvergenceError, ModelError
+from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
+from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
+from tissuq.inference.enumerators.enumerator import Enumerator
+from tissuq.inference.solution import Solution
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.posterior.plug_in import ErrorEstimates
+
+__all__ = ["METHODS", "Method", "Solver"]
+
+Method = Literal["auto", "exact", "nuts", "smc", "joint"]
+FACTORISED = 3
+"""Parameters of the structure from which `auto` samples."""
+METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
+
+
+@dataclass(frozen=True)
+class Solver:
+    """What gives the posterior of a model: the same for every model, and enough to solve another one likewise.
+
+    Parameters
+    ----------
+    method : str
+        As of `tissuq.fit`.
+    stable_in : tuple of str
+        Loading modes in which what is not stable is left out.
+    seed : int
+        Of the draws.
+    """
+
+    method: Method = "auto"
+    stable_in: tuple[str, ...] = ()
+    seed: int = 0
+
+    def solve(self, models: Sequence[StatisticalModel]) -> list[Solution]:
+        """Return the posteriors of models on the same stretches."""
+        solutions = self._solve([self._error_estimates().of(model) for model in models])
+        if self.stable_in:
+            solutions = [stable_part(solution, self.stable_in, self.seed) for solution in solutions]
+        return list(solutions)
+
+    def with_default_tolerances(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model with the tolerances that hold where the user gives none."""
+        return self._error_estimates().with_default_tolerances(model, has_evidence=self._is_integrated(model))
+
+    def _error_estimates(self) -> ErrorEstimates:
+        return ErrorEstimates(lambda model: self._solve([model])[0])
+
+    def _is_integrated(self, model: StatisticalModel) -> bool:
+        """Return whether there is an evidence without sampling."""
+        return self.method in ("auto", "exact") and (bool(model.energy_symbols) or not AdaptiveCells().why_not(model))
+
+    def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
+        """Solve models on the same stretches: together by one enumerator, or each by NUTS where that does not serve."""
+        enumerator = self._enumerator(models[0])
+        try:
+            return enumerator.solve(models, self.seed)
+        except ConvergenceError as error:
+            if self.method != "auto" or not isinstance(enumerator, AdaptiveCells):
+                raise
+            if len(models) > 1:
+                return [solution for model in models for solution in self._solve([model])]
+            return _sampler("nuts", str(error)).solve(models, self.seed)
+
+    def _enumerator(self, model: StatisticalModel) -> Enumerator:
+        """Return what enumerates the nonlinear parameters of a model by the method that was chosen.
+
+        Raises
+        ------
+        ModelError
+            When it does not serve this model.
+        """
+        if model.energy_symbols and self.method in ("auto", "exact"):
+            return AmplitudeLattice()
+        if self.method == "auto":
+            refusal = AdaptiveCells().why_not(model) or _why_not_soon(model)
+            return _sampler("nuts", refusal) if refusal else AdaptiveCells()
+        if self.method == "exact":
+            return AdaptiveCells()
+        sampler = _sampler(self.method)
+        if reason := sampler.why_not(model):
+            raise ModelError(f"the method '{self.method}' does not apply: {reason}.")
+        return sampler
+
+
+def _sampler(method: Method, refusal: str = "") -> Enumerator:
+    """Return a sampler, which needs JAX; ``refusal`` says why another enumerator was not taken."""
+    from tissuq.inference.enumerators.sampled import JointNuts, Nuts, TemperedSmc
+
+    return {"nuts": Nuts(refusal), "smc": TemperedSmc(), "joint": JointNuts()}[method]
+
+
+def _why_not_soon(model: StatisticalModel) -> str:
+    """Return why the exact route, which applies, would take minutes; or nothing."""
+    if len(model.structure) < FACTORISED:
+        return ""
+    return f"each of {', '.join(model.structure)} costs a factorisation to vary, which would take minutes"

@@ -1,0 +1,148 @@
+"""Warnings that a posterior carries: what to know before using it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import isfinite
+
+import numpy as np
+
+from tissuq.assessment.extent import has_energy
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
+from tissuq.inference.solution import Solution
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.prediction.moments import mean_curve
+
+__all__ = ["warnings_about"]
+
+PRIOR_BOUND_REACHED = "the posterior is truncated by a prior bound"
+"""Start of the warning about a posterior that a bound of a prior cuts off."""
+
+MIN_VARIANCE_SHARE = 0.1
+"""Share of the joint variance below which noise or discrepancy may vanish (at the 5 % quantiles of the draws)."""
+MAX_LOG_EVIDENCE_ERROR = 0.1
+"""Error of the log evidence, by integration, above which the posterior is not accurate."""
+MAX_RELATIVE_WIDTH = 1.0
+"""Width of the headline parameter's 95 % interval, over its median, above which it is poorly determined."""
+MIN_STABLE_PROBABILITY = 0.5
+"""Probability of stability over the measured range below which a simulation is likely to fail."""
+MAX_DENSITY_AT_BOUND = 0.1
+"""Marginal density at a prior bound, over its largest value, above which the bound determines the result."""
+
+MAX_COMPONENTS, MAX_ARRAY_VALUES = 200, 4_000_000
+"""Posterior components that the residuals are averaged over; array values (components x measurements) for them."""
+MIN_MEASUREMENTS = 12
+"""Number of measurements from which a correlation of residuals is estimated."""
+MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS = 0.3, 4.0
+"""Lag-1 correlation of residuals that is reported, and by how many standard errors (1 / sqrt(n)) it must exceed 0."""
+
+
+def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Iterator[str]:
+    """Yield the warnings that a posterior carries, the most severe first."""
+    if solution.is_approximate and solution.diagnostics is not None:
+        yield solution.diagnostics.verdict
+    if ranges and min(stable_range.probability for stable_range in ranges.values()) < MIN_STABLE_PROBABILITY:
+        yield _instability(solution, min(ranges.values(), key=lambda stable_range: stable_range.probability))
+    if not solution.is_of_data:
+        return
+    if solution.stable_share < MIN_LOSS_PROBABILITY:
+        yield (
+            "the data contradict the stability constraint (stable_in): without it, only a fraction of "
+            f"{solution.stable_share:.1g} of the posterior is stable. The constrained posterior describes the data "
+            "less well."
+        )
+    if solution.model.discrepancy.is_best_fit:
+        yield solution.model.discrepancy.caution
+    if _is_sum_of_variances(solution.model):
+        yield (
+            "noise_sd and S are both unknown, but the data determine only noise_sd^2 + S^2: do not interpret either "
+            "one alone, or give the noise (repeated measurements at one stretch determine it: noise 'repeats')."
+        )
+    elif _noise_is_inseparable(solution):
+        yield (
+            "the data cannot separate noise from discrepancy: the larger one is, the smaller the other. Do not "
+            "interpret either one alone, or give the noise (repeated measurements at one stretch determine it)."
+        )
+    error = solution.log_evidence_error
+    if error is not None and not error <= MAX_LOG_EVIDENCE_ERROR and solution.diagnostics is None:
+        size = f"about {error:.1g}" if isfinite(error) else "unknown"
+        yield (
+            f"numerical integration is inaccurate (error of the log evidence: {size}). This happens when the given "
+            "noise is far smaller than the scatter of the data: give a larger noise, or leave it unknown."
+        )
+    lag1 = _lag1_correlation(solution)
+    if lag1 is not None:
+        yield (
+            f"residuals are autocorrelated (lag-1 correlation {lag1:.2f}): the measurements are not independent and "
+            "the intervals are too narrow. Fit with the noise 'autoregressive', or with fewer points."
+        )
+    headline = solution.model.headline
+    low, high = solution.marginals[headline].hdi()
+    if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
+        yield (
+            f"the data determine {headline} poorly: its 95 % interval is wider than its median. Measure more points, "
+            "nearer to stretch 1, or with less noise."
+        )
+    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
+    if cut:
+        yield (
+            f"{PRIOR_BOUND_REACHED} of {', '.join(cut)}: there the bound, not the data, determines the result. Give a "
+            "wider prior, unless the bound is intended."
+        )
+
+
+def _instability(solution: Solution, stable_range: StableRange) -> str:
+    """Return the warning for a material that is rarely stable, in the loading mode in which it is least stable."""
+    what = "material and discrepancy together are" if has_energy(solution.model) else "the material is"
+    how = "rarely stable" if stable_range.probability < MIN_LOSS_PROBABILITY else "unstable more often than stable"
+    at_rest = " (already at rest: the initial shear modulus is negative)" if stable_range.loss.median == 1 else ""
+    return (
+        f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: measure in more "
+        "loading modes, choose another material, or restrict the fit to stable materials (stable_in)."
+    )
+
+
+def _is_sum_of_variances(model: StatisticalModel) -> bool:
+    """Return whether only the sum of noise and discrepancy variance is in the data, whatever they are."""
+    is_one_level = not model.noise.depends_on_level and not model.noise.shares_discrepancy
+    return bool(model.noise.parameters) and is_one_level and model.discrepancy.is_scattered
+
+
+def _noise_is_inseparable(solution: Solution) -> bool:
+    """Return whether noise could be nearly all or nearly none of the joint variance of noise and discrepancy."""
+    model = solution.model
+    is_free = any(parameter.symbol in model.nonlinear for parameter in model.discrepancy.parameters)
+    if not model.noise.parameters or not is_free:
+        return False
+    values = {symbol: drawn.ravel() for symbol, drawn in solution.draws.items()}
+    noise = model.noise_variance(values, float(model.levels.mean()) if model.noise.depends_on_level else 0.0)
+    discrepancy = model.discrepancy.independent_variance(values) + model.discrepancy.correlated_variance(values)
+    low, high = np.quantile(noise / (noise + discrepancy), [0.05, 0.95])
+    return bool(low < MIN_VARIANCE_SHARE and high > 1 - MIN_VARIANCE_SHARE)
+
+
+def _lag1_correlation(solution: Solution) -> float | None:
+    """Return the lag-1 correlation of the whitened residuals where it is significant, else None."""
+    model, curves = solution.model, []
+    if model.is_correlated or model.experiment.size < MIN_MEASUREMENTS:
+        return None
+    component_count = int(np.clip(MAX_ARRAY_VALUES // len(model.states), 1, MAX_COMPONENTS))
+    residual = np.asarray(model.white(model.experiment.measured - mean_curve(solution, thinned=component_count)))
+    start = 0
+    for count in map(len, model.experiment.curves):
+        curves.append(residual[start : start + count])
+        start += count
+    size = sum(float(curve @ curve) for curve in curves)
+    lag1 = sum(float(curve[1:] @ curve[:-1]) for curve in curves) / size if size else 0.0
+    return lag1 if lag1 > max(MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS / np.sqrt(len(residual))) else None
+
+
+def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:
+    """Yield the parameters whose posterior density is high at a bound that only the prior sets, and which bound."""
+    for parameter in solution.model.parameters:
+        marginal = solution.marginals[parameter.symbol]
+        ends = zip(("lower", "upper"), solution.model.priors[parameter.symbol].support, parameter.support, strict=True)
+        for name, bound, natural in ends:
+            inside = bound + (1e-3 if name == "lower" else -1e-3) * marginal.sd
+            if bound != natural and marginal.pdf(inside) > MAX_DENSITY_AT_BOUND * marginal.density.max():
+                yield parameter.symbol, name

@@ -1,6 +1,0 @@
-"""The study of section 5 of Zeraatpisheh, Bordas & Beex (2021), with each claim of the paper checked."""
-
-from tissuq.studies.paper.settings import FORMULATIONS, PaperSettings
-from tissuq.studies.paper.study import PaperStudy, run_paper
-
-__all__ = ["FORMULATIONS", "PaperSettings", "PaperStudy", "run_paper"]

@@ -1,0 +1,186 @@
+"""The study of a case of finite elements with the posterior of a run: many draws at a time, and none done twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, fields
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.finite_elements.case import Case
+from tissuq.finite_elements.response import BULK_RATIO
+from tissuq.finite_elements.simulation import Simulation, simulate
+from tissuq.finite_elements.solver import felupe
+from tissuq.finite_elements.tasks import Solve, solved
+from tissuq.finite_elements.warnings import simulation_warnings
+from tissuq.mechanics import Material
+from tissuq.model.discrepancy import NoDiscrepancy
+from tissuq.parameters.seeds import MAX_SEED
+from tissuq.posterior.posterior import Posterior
+from tissuq.registry import find
+from tissuq.studies.earlier_run import load, load_without_discrepancy
+from tissuq.studies.stream import Step, run_tasks, silent
+
+__all__ = ["Posteriors", "SimulationSettings", "SimulationStudy", "load_posteriors", "run_simulation"]
+
+
+class SimulationSettings(BaseModel):
+    """Everything that a simulation depends on.
+
+    ``sizes`` are fields of the case (mm); ``force_noise`` is in N.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    run: str
+    case: str = "indentation"
+    discrepancy: str | None = None
+    sizes: dict[str, float | str] = Field(default_factory=dict)
+    draws: int = Field(64, ge=2)
+    steps: int = Field(8, ge=1)
+    seed: int = Field(0, ge=0, le=MAX_SEED)
+    force_noise: float | None = Field(None, ge=0, lt=inf)
+    bulk_ratio: float = Field(BULK_RATIO, gt=0, lt=inf)
+
+    def sized_case(self) -> Case:
+        """Return the case with its sizes.
+
+        Raises
+        ------
+        InputError
+            When there is no such case or size, or a size is not possible.
+        """
+        kind = find(Case, "case", self.case, InputError)
+        sizes = {field.name: field.default for field in fields(kind)}
+        for name, value in self.sizes.items():
+            if name not in sizes:
+                defaults = ", ".join(f"{size}={default}" for size, default in sizes.items())
+                raise InputError(f"case '{self.case}' has no size '{name}'; its sizes are {defaults}.")
+            if isinstance(value, str) != isinstance(sizes[name], str):
+                wanted = "a word" if isinstance(sizes[name], str) else "a number"
+                raise InputError(f"case '{self.case}': {name} must be {wanted} like {sizes[name]}, not '{value}'.")
+        return kind(**self.sizes)
+
+
+@dataclass(frozen=True)
+class Posteriors:
+    """The posteriors that a simulation starts from.
+
+    Attributes
+    ----------
+    fitted : Posterior
+        Of the run.
+    without : Posterior or None
+        Of the same measurements, fitted without discrepancy; None where the run's is without one, or this failed.
+    reason : str
+        Why it failed.
+    """
+
+    fitted: Posterior
+    without: Posterior | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class SimulationStudy:
+    """Results of a simulation."""
+
+    settings: SimulationSettings
+    posteriors: Posteriors
+    simulation: Simulation
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the result."""
+        return simulation_warnings(self.simulation) + [self.posteriors.reason] * bool(self.posteriors.reason)
+
+
+def load_posteriors(
+    settings: SimulationSettings,
+    beside: Path = Path(),
+    law: Material | None = None,
+    step: Callable[[str], None] = lambda text: None,
+) -> Posteriors:
+    """Return the posterior of the run, and that of the same measurements without discrepancy.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    beside : Path
+        Where the run folder lies, unless it is absolute.
+    law : Material, optional
+        The material, where the run's is a law in a file.
+    step : callable
+        Told what is being done.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When the run cannot be used.
+    """
+    run = beside / settings.run
+    step("loading the run")
+    fitted = load(run, settings.discrepancy, law)
+    if fitted.model.discrepancy.name == NoDiscrepancy.name:
+        return Posteriors(fitted)
+    step("the posterior without discrepancy")
+    try:
+        return Posteriors(fitted, load_without_discrepancy(run, law))
+    except (ConvergenceError, ModelError) as error:
+        return Posteriors(fitted, reason=f"The run's measurements cannot be fitted without discrepancy: {error}")
+
+
+def run_simulation(
+    settings: SimulationSettings,
+    posteriors: Posteriors,
+    folder: Path,
+    *,
+    prepare: Callable[[], None] = lambda: None,
+    pool: Executor | None = None,
+    progress: Callable[[int], AbstractContextManager[Step]] = lambda total: nullcontext(silent),
+) -> SimulationStudy:
+    """Compute the case with draws of a posterior; those in ``folder`` are not computed again.
+
+    Parameters
+    ----------
+    settings : SimulationSettings
+    posteriors : Posteriors
+    folder : Path
+        Exists, or `prepare` makes it; holds the results so far, if any.
+    prepare : callable
+        Called when it is certain that there is something to compute.
+    pool : Executor, optional
+        From `tissuq.studies.workers.open_pool`.
+    progress : callable
+        Gives, for a number of tasks, a context with the function that is told of each.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When the settings cannot be used, FElupe is not installed, or hardly any draw gets anywhere.
+    """
+    felupe()
+
+    def carried_out(tasks: Sequence[Solve]) -> Sequence[dict[str, Any]]:
+        prepare()
+        with progress(len(tasks)) as step:
+            return run_tasks(tasks, solved, folder, pool=pool, step=step)
+
+    simulation = simulate(
+        posteriors.fitted,
+        settings.sized_case(),
+        settings.draws,
+        without=posteriors.without,
+        steps=settings.steps,
+        seed=settings.seed,
+        force_noise=settings.force_noise,
+        bulk_ratio=settings.bulk_ratio,
+        run=carried_out,
+    )
+    return SimulationStudy(settings, posteriors, simulation)

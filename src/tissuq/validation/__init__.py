@@ -1,0 +1,1 @@
+"""Campaigns that show how far the intervals can be trusted: the paper, coverage, calibration by simulation."""

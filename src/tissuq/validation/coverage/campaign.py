@@ -1,0 +1,163 @@
+"""A campaign as many small tasks: intervals, and predictions of new measurements and of other modes."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment import Average
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.mechanics.invariants import farthest_stretch, largest_invariants
+from tissuq.posterior.posterior import Posterior
+from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.validation.coverage.fitted import fit_all
+from tissuq.validation.coverage.settings import BLOCK, CoverageSettings
+from tissuq.validation.coverage.truths import TRUTHS, Truth, draw_truth
+
+__all__ = ["Task", "carry_out", "run_campaign", "share_of_new", "stress_unseen", "tasks_of", "unseen_stretches"]
+
+FloatArray = NDArray[np.float64]
+
+POINTS = 12
+"""Stretches of a loading mode that was not measured."""
+
+
+def share_of_new(fit: Posterior | Average, data: Experiment, truth: Truth, noise_sd: float, prob: float) -> float:
+    """Return the share of new measurements, at the measured stretches, that the predictive band holds on average."""
+    from scipy.special import ndtr
+
+    band = fit.predict(data.stretch, prob=prob)
+    low, high = ((band[end] - truth.stress(data.mode, data.stretch)) / noise_sd for end in ("low", "high"))
+    return float(np.mean(ndtr(high) - ndtr(low)))
+
+
+def stress_unseen(
+    fit: Posterior | Average, data: Experiment, truth: Truth, mode: LoadingMode, prob: float
+) -> tuple[float, float]:
+    """Return the share of the true stress inside the band of the stress itself, and the error of its mean.
+
+    The error is the root mean square over the stretches, relative to that of the true stress. A discrepancy that is an
+    energy is part of the prediction; any other is left out, because it says nothing about another loading mode.
+    """
+    stretch = unseen_stretches(data.mode, data.stretch, mode)
+    is_energy = isinstance(fit, Posterior) and fit.model.discrepancy.is_energy
+    band = fit.predict(stretch, discrepancy=is_energy, noise=False, prob=prob, mode=mode)
+    stress = truth.stress(mode, stretch)
+    share = np.mean((band["low"] <= stress) & (stress <= band["high"]))
+    return float(share), float(np.linalg.norm(band["mean"] - stress) / np.linalg.norm(stress))
+
+
+def unseen_stretches(measured: LoadingMode, stretch: FloatArray, mode: LoadingMode) -> FloatArray:
+    """Return stretches above one in a mode, up to where I1 or I2 leaves the range that was measured in another."""
+    largest = largest_invariants(measured.at(stretch))
+    return np.linspace(1.0, farthest_stretch(mode, largest, 1), POINTS + 1)[1:]
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some replicates of one family on one design, with one formulation; all by their indices in the settings."""
+
+    design: int
+    strength: int
+    noise: int
+    family: int
+    formulation: int
+    start: int
+    count: int
+    label: str
+
+    @property
+    def key(self) -> str:
+        """What tells it from every other task of the campaign."""
+        return "-".join(map(str, self.indices.values()))
+
+    @property
+    def indices(self) -> dict[str, int]:
+        """Everything but its label."""
+        return {name: value for name, value in asdict(self).items() if name != "label"}
+
+
+def tasks_of(settings: CoverageSettings) -> list[Task]:
+    """Return all tasks of a campaign, in their order."""
+    blocks = [(start, min(BLOCK, settings.replicates - start)) for start in range(0, settings.replicates, BLOCK)]
+    return [
+        Task(design, strength, noise, family, formulation, *block, settings.formulations[formulation])
+        for design, strength, noise, block, family, formulation in product(
+            range(len(settings.designs)),
+            range(len(settings.strengths)),
+            range(len(settings.noise)),
+            blocks,
+            range(len(settings.families)),
+            range(len(settings.formulations)),
+        )
+    ]
+
+
+def run_campaign(
+    settings: CoverageSettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
+) -> list[dict[str, Any]]:
+    """Carry out what is not done yet of a campaign, and return the results of all tasks, in their order.
+
+    Parameters
+    ----------
+    settings : CoverageSettings
+    folder : Path
+        Exists; holds the results so far, if any.
+    pool : Executor, optional
+        Workers from `tissuq.studies.workers.open_pool`.
+    step : callable
+        Told of every task that is done: its label, and whether it was done now or before.
+    """
+    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
+
+
+def carry_out(settings: CoverageSettings, task: Task) -> dict[str, Any]:
+    """Return truths, intervals and moments of C10 in every replicate of a task; null where a fit failed.
+
+    The oracle, which knows everything but C10, has the standard deviation noise_sd / ||stress of C10 = 1||.
+    """
+    design, formulation = settings.designs[task.design], settings.formulations[task.formulation]
+    mode, stretch = loading_mode(design.mode), design.stretch
+    family = settings.families[task.family]
+    family_seed = TRUTHS.index(family)
+    truths: list[Truth] = []
+    data, noise_sd = [], []
+    for replicate in range(task.start, task.start + task.count):
+        drawn = draw_truth(family, (settings.seed, 1, family_seed, replicate), settings.scale)
+        truth = drawn.nearer(settings.strengths[task.strength])
+        sd = design.noise_sd * (truth.C10 if settings.scale else 1.0)
+        generator = np.random.default_rng((settings.seed, 2, family_seed, replicate, task.design))
+        truths.append(truth)
+        noise_sd.append(sd)
+        data.append(
+            Experiment(mode, stretch, truth.stress(mode, stretch) + sd * generator.standard_normal(len(stretch)))
+        )
+    assumed_noise = noise_sd if settings.noise[task.noise] == "known" else ["unknown"] * len(data)
+    names = ("fits", *(["predictive"] if settings.predictive else []), *settings.unseen)
+    rows: dict[str, list[Any]] = {name: [None] * len(data) for name in names}
+    for index, fit in fit_all(data, formulation, assumed_noise, settings.chosen_priors):
+        if fit is None:
+            continue
+        rows["fits"][index] = _interval(fit, settings.prob)
+        if settings.predictive:
+            rows["predictive"][index] = share_of_new(fit, data[index], truths[index], noise_sd[index], settings.prob)
+        for name in settings.unseen:
+            rows[name][index] = stress_unseen(fit, data[index], truths[index], loading_mode(name), settings.prob)
+    oracle_sd = [
+        sd / float(np.linalg.norm(truth.law(mode, stretch))) for sd, truth in zip(noise_sd, truths, strict=True)
+    ]
+    return task.indices | {"truth": [truth.C10 for truth in truths], "oracle_sd": oracle_sd, **rows}
+
+
+def _interval(fit: Posterior | Average, prob: float) -> list[float]:
+    """Return ends, mean and sd of C10."""
+    marginal = fit.marginals["C10"]
+    return [*marginal.hdi(prob), marginal.mean, marginal.sd]

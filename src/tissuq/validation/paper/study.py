@@ -1,0 +1,192 @@
+"""The study: seven formulations on synthetic data, the claims, and how they depend on range and priors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Literal
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.parameters.priors import Uniform
+from tissuq.posterior.fitting import fit, fit_many
+from tissuq.posterior.posterior import Posterior
+from tissuq.prediction.bands import Band, predict_band
+from tissuq.validation.paper.claims import Finding, Findings, Verdict, find, judge
+from tissuq.validation.paper.settings import FORMULATIONS, PaperSettings
+
+__all__ = [
+    "AMPLITUDE_BOUNDS",
+    "RANGES",
+    "Cell",
+    "Fitted",
+    "PaperStudy",
+    "ranges_of",
+    "run_paper",
+    "sensitivity",
+    "steps_of",
+]
+
+RANGES = ((0.5, 4.25), (0.5, 3.0), (0.6, 2.0), (1.0, 4.25))
+AMPLITUDE_BOUNDS = (1.0, 10.0)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """How often the interval of one formulation held the true C10, for one stretch range."""
+
+    stretch_low: float
+    stretch_high: float
+    formulation: str
+    amplitude_bound: float | None
+    held: int
+    data_sets: int
+
+
+def sensitivity(
+    settings: PaperSettings, findings_in_range: Sequence[Findings], step: Callable[[str], None]
+) -> list[Cell]:
+    """Return a cell for every range and formulation, the GP once for each amplitude bound (MPa).
+
+    Every cell uses as many data sets as the study has replicates, with the same seeds; ``own`` are the findings on
+    the study's own range, which are not computed again.
+    """
+    cells = []
+    study_range = (settings.stretch_low, settings.stretch_high)
+    for low, high in ranges_of(settings):
+        step(f"stretch range {low:g} to {high:g}")
+        varied = settings.model_copy(update={"stretch_low": low, "stretch_high": high})
+        for formulation in FORMULATIONS:
+            if formulation == "gp":
+                cells += [_fitted(varied, formulation, bound) for bound in AMPLITUDE_BOUNDS]
+            elif (low, high) == study_range:
+                held = [findings[formulation].holds_truth for findings in findings_in_range]
+                cells.append(Cell(low, high, formulation, None, sum(held), len(held)))
+            else:
+                cells.append(_fitted(varied, formulation, None))
+    return cells
+
+
+def ranges_of(settings: PaperSettings) -> list[tuple[float, float]]:
+    """Return the stretch ranges of the table: the study's own, and the others."""
+    return list(dict.fromkeys(((settings.stretch_low, settings.stretch_high), *RANGES)))
+
+
+def _fitted(settings: PaperSettings, formulation: str, bound: float | None) -> Cell:
+    priors = settings.priors_of(formulation) | ({} if bound is None else {"c": Uniform(0, bound)})
+    posteriors = fit_many(
+        [settings.experiment(replicate) for replicate in range(settings.replicates)],
+        discrepancy=formulation,
+        noise_sd=settings.noise_sd,
+        priors=priors,
+        method="exact",
+    )
+    intervals = [posterior.solution.marginals["C10"].hdi() for posterior in posteriors]
+    held = sum(low <= settings.truth["C10"] <= high for low, high in intervals)
+    return Cell(settings.stretch_low, settings.stretch_high, formulation, bound, held, settings.replicates)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One formulation fitted to the run's own data set, with its wall time."""
+
+    formulation: str
+    posterior: Posterior
+    finding: Finding
+    seconds: float
+
+
+@dataclass(frozen=True)
+class PaperStudy:
+    """Everything that a run found. ``main`` is the exact route unless only NUTS was asked for."""
+
+    settings: PaperSettings
+    experiment: Experiment
+    main: dict[str, Fitted]
+    sampled: dict[str, Fitted]
+    verdicts: list[Verdict]
+    cells: list[Cell]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the fits."""
+        fits = [*self.main.values(), *self.sampled.values()]
+        return list(dict.fromkeys(f"{fit.formulation}: {text}" for fit in fits for text in fit.posterior.warnings))
+
+    @property
+    def not_converged(self) -> list[str]:
+        """Formulations whose sampling has not converged."""
+        fits = {**self.main, **self.sampled}
+        return [name for name, fitted in fits.items() if fitted.posterior.solution.is_approximate]
+
+
+def steps_of(settings: PaperSettings) -> int:
+    """Return how many steps a run announces."""
+    fits = len(FORMULATIONS) * (2 if settings.sampler == "both" else 1)
+    more = len(FORMULATIONS) if settings.replicates > 1 else 0
+    return fits + more + len(ranges_of(settings)) + 1
+
+
+def run_paper(settings: PaperSettings, step: Callable[[str], None] = lambda text: None) -> PaperStudy:
+    """Carry out the study.
+
+    Parameters
+    ----------
+    settings : PaperSettings
+    step : callable
+        Called with a few words before each step, for a progress display.
+    """
+    experiment = settings.experiment()
+    main = _fit_all(settings, experiment, "nuts" if settings.sampler == "nuts" else "exact", step)
+    sampled = _fit_all(settings, experiment, "nuts", step) if settings.sampler == "both" else {}
+    data_sets: list[Findings] = [{name: fitted.finding for name, fitted in main.items()}]
+    if settings.replicates > 1:
+        data_sets += _find_in_replicates(settings, step)
+    return PaperStudy(settings, experiment, main, sampled, judge(data_sets), sensitivity(settings, data_sets, step))
+
+
+def _find_in_replicates(settings: PaperSettings, step: Callable[[str], None]) -> list[dict[str, Finding]]:
+    """Return the findings for every further data set, fitted together formulation by formulation."""
+    experiments = [settings.experiment(replicate) for replicate in range(1, settings.replicates)]
+    findings_by_data_set: list[dict[str, Finding]] = [{} for _ in experiments]
+    bases: list[Band] = []
+    for name in FORMULATIONS:
+        step(f"{settings.replicates - 1} more data sets: {name}")
+        posteriors = fit_many(
+            experiments,
+            discrepancy=name,
+            noise_sd=settings.noise_sd,
+            priors=settings.priors_of(name),
+            method="exact",
+            seed=settings.seed,
+        )
+        if not bases:
+            bases = [predict_band(fit.solution, fit.model.experiment.stretch) for fit in posteriors]
+        for findings, posterior, base in zip(findings_by_data_set, posteriors, bases, strict=True):
+            findings[name] = find(posterior, settings.truth["C10"], base)
+    return findings_by_data_set
+
+
+def _fit_all(
+    settings: PaperSettings,
+    experiment: Experiment,
+    sampler: Literal["exact", "nuts"],
+    step: Callable[[str], None],
+) -> dict[str, Fitted]:
+    fitted: dict[str, Fitted] = {}
+    base: Band | None = None
+    for name in FORMULATIONS:
+        step(f"{name} ({sampler})")
+        start = perf_counter()
+        posterior = fit(
+            experiment,
+            discrepancy=name,
+            noise_sd=settings.noise_sd,
+            priors=settings.priors_of(name),
+            method="joint" if sampler == "nuts" else "exact",
+            seed=settings.seed,
+        )
+        seconds = perf_counter() - start
+        base = base or predict_band(posterior.solution, experiment.stretch)
+        fitted[name] = Fitted(name, posterior, find(posterior, settings.truth["C10"], base), seconds)
+    return fitted

@@ -1,0 +1,122 @@
+"""``tissuq structure``: its folder, how it goes on, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+
+import pytest
+
+from .conftest import command, write_specimen
+
+pytest.importorskip("felupe", reason="FElupe is not installed")
+
+SMALL = ["--case", "bar", "--draws", 3, "--steps", 2, "--size", "fineness=0.5", "--workers", 1]
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """The run folder of a fit."""
+    folder = tmp_path_factory.mktemp("fitted")
+    write_specimen(folder / "specimen.csv")
+    said = command("fit", "specimen.csv", "--noise-sd", 1, "--no-figures", "--out", "run", folder=folder)
+    assert said.status == 0, said.err
+    return folder / "run"
+
+
+@pytest.fixture
+def run(fitted, here, specimen):
+    """A copy of it in the current folder."""
+    shutil.copytree(fitted, here / "run")
+
+
+@pytest.mark.finite_elements
+def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
+    import xarray as xr
+
+    said = cli("structure", "run", *SMALL)
+    folder = here / "runs" / "run-bar"
+    assert said.status == 0, said.err
+    assert "Case 'bar' with 3 draws" in said.out
+    assert str(folder.relative_to(here) / "report.html") in said.out
+    rows = list(csv.DictReader((folder / "forces.csv").open(encoding="utf-8")))
+    assert [float(row["elongation_mm"]) for row in rows] == [0.5, 1.0]
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["complete_draws"] == 3
+    assert summary["last_step"]["mean"] == pytest.approx(float(rows[-1]["mean"]))
+    with xr.open_dataset(folder / "curves.nc") as curves:
+        assert curves["force_complete"].shape == (3, 2)
+        assert curves["force_without"].mean("draw_without").values[-1] == pytest.approx(float(rows[-1]["without_mean"]))
+    for name in ("fields.vtu", "middle_draw.pvd", "steps/step_02.vtu", "figures/forces.svg", "figures/shares.png"):
+        assert (folder / name).stat().st_size > 200, name
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "too few for a 95 % band" in page
+    assert page.count("data:image/svg+xml") == 3
+
+
+@pytest.mark.finite_elements
+def test_the_same_command_goes_on_and_the_recipe_repeats_it(cli, here, run):
+    assert cli("structure", "run", *SMALL, "--no-figures", "--out", "one").status == 0
+    results = (here / "one" / "tasks.jsonl").read_text(encoding="utf-8").splitlines()
+    (here / "one" / "tasks.jsonl").write_text("\n".join(results[:2]) + "\n" + results[2][:50], encoding="utf-8")
+    assert cli("structure", "run", *SMALL, "--no-figures", "--out", "one").status == 0
+    assert cli("structure", "--config", "one/run.toml", "--no-figures", "--out", "two", "--workers", 1).status == 0
+    first, again = ((here / name / "forces.csv").read_text(encoding="utf-8") for name in ("one", "two"))
+    assert first == again
+    kept = (here / "one" / "tasks.jsonl").read_text(encoding="utf-8").splitlines()
+    assert kept[:2] == results[:2]
+
+
+@pytest.mark.finite_elements
+def test_a_folder_of_something_else_is_refused(cli, here, run):
+    assert cli("structure", "run", *SMALL, "--no-figures", "--out", "one").status == 0
+    said = cli("structure", "run", *SMALL, "--seed", 3, "--out", "one")
+    assert (said.status, "other settings" in said.err) == (2, True)
+    assert cli("fit", "specimen.csv", "--noise-sd", 2, "--no-figures", "--out", "another").status == 0
+    said = cli("structure", "another", *SMALL, "--out", "one")
+    assert (said.status, "another run" in said.err) == (2, True)
+    said = cli("structure", "run", *SMALL, "--out", "run")
+    assert said.status == 2
+    assert not (here / "run" / "tasks.jsonl").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], ["give the RUN folder of a fit"]),
+        (["nowhere"], ["no run folder 'nowhere'"]),
+        (["run", "--case", "beam"], ["no case named 'beam'", "bar, indentation"]),
+        (["run", "--size", "width=3"], ["no size 'width'", "punch_radius=0.75"]),
+        (["run", "--size", "depth"], ["'depth' is not a size", "NAME=VALUE"]),
+        (["run", "--size", "depth=deep"], ["depth must be a number", "deep"]),
+        (["run", "--size", "depth=7"], ["must be less than the height"]),
+        (["run", "--size", "depth=0.1", "--size", "depth=0.2"], ["given twice for 'depth'"]),
+        (["run", "--draws", "1"], ["draws", "greater than or equal to 2"]),
+        (["run", "--discrepancy", "gp"], ["no discrepancy 'gp'", "auto"]),
+    ],
+)
+def test_what_cannot_be_used_gets_one_message_and_leaves_nothing(cli, here, run, arguments, words):
+    said = cli("structure", *arguments, "--out", "out")
+    assert said.status == 2, said.out
+    assert "Traceback" not in said.err
+    assert all(word in said.err for word in words), said.err
+    assert not (here / "out").exists()
+
+
+def test_a_discrepancy_that_is_no_energy_is_refused_before_anything_is_written(cli, here, specimen):
+    assert (
+        cli("fit", specimen, "--noise-sd", 1, "--discrepancy", "constant", "--no-figures", "--out", "run").status == 0
+    )
+    said = cli("structure", "run", *SMALL, "--out", "out")
+    assert said.status == 2
+    assert "no material" in said.err
+    assert not (here / "out").exists()
+
+
+def test_without_felupe_a_message_says_what_to_install(cli, here, run, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "felupe", None)
+    said = cli("structure", "run", *SMALL, "--out", "out")
+    assert said.status == 2
+    assert "its extra 'fe'" in said.err
+    assert not (here / "out").exists()

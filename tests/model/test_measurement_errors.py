@@ -1,0 +1,75 @@
+"""Errors of a test: each is one class, and its size a tolerance."""
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.experiments.modes import SimpleShear, Uniaxial
+from tissuq.model.measurement_errors import ErrorPoints, MeasurementError, Tolerances
+from tissuq.registry import variants
+
+STRETCH = np.linspace(1.02, 1.3, 15)
+
+
+class Drift(MeasurementError):
+    """A load cell that drifts in proportion to the place in the test."""
+
+    name = "drift"
+    description = "of drift over the test"
+    is_stress = True
+
+    def effect(self, points):
+        return np.linspace(0.0, 1.0, len(points.stretch)) * np.ones_like(points.stress)
+
+
+@pytest.mark.parametrize(
+    ("mode", "stretch"), [(Uniaxial(), 1 + 1e-3 * np.arange(4)), (SimpleShear(), 0.1 * np.arange(4))]
+)
+def test_each_error_is_the_difference_that_a_small_one_makes(mode, stretch):
+    def stress(at):
+        return at**3 - 1.0
+
+    def slope(at):
+        return 3 * at**2
+
+    step, reference = 1e-6, mode.reference
+    truth = {
+        "stress": (1 + step) * stress(stretch),
+        "length": stress(reference + (1 + step) * (stretch - reference)),
+        "slack": stress(stretch * (1 + step) if reference else stretch + step),
+        "zero": stress(stretch) + step,
+        "stretch": stress(stretch + step),
+    }
+    points = ErrorPoints(mode, stretch, stress(stretch), slope(stretch))
+    for name, moved in truth.items():
+        error = variants(MeasurementError)[name]()
+        assert np.allclose(error.effect(points), (moved - stress(stretch)) / step, rtol=1e-4, atol=1e-4), name
+
+
+def test_an_error_of_ones_own_is_integrated_like_the_others():
+    drifted = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
+    data = tq.Experiment("uniaxial", STRETCH, drifted.stress + 0.2 * np.linspace(0, 1, len(STRETCH)))
+    blind = tq.fit(data, discrepancy="none", noise_sd=0.002).marginals["C10"]
+    aware = tq.fit(data, discrepancy="none", noise_sd=0.002, tolerances=Tolerances(drift=0.2)).marginals["C10"]
+    assert abs(blind.mean - 0.5) > 10 * blind.sd
+    # generalised least squares with the error's covariance written out
+    basis = 2 * (STRETCH - STRETCH**-2)
+    course = np.linspace(0, 1, len(STRETCH))
+    precision = np.linalg.inv(0.002**2 * np.eye(len(STRETCH)) + 0.2**2 * np.outer(course, course))
+    sd = (basis @ precision @ basis) ** -0.5
+    assert aware.mean == pytest.approx(sd**2 * (basis @ precision @ data.stress), rel=1e-6)
+    assert aware.sd == pytest.approx(sd, rel=1e-6)
+    assert abs(aware.mean - 0.5) < 3 * aware.sd
+
+
+def test_an_error_that_does_not_exist_is_refused_by_name():
+    with pytest.raises(tq.InputError, match=r"there is no error of a test named 'stres'\. Did you mean 'stress'"):
+        Tolerances(stres=0.1)
+    with pytest.raises(tq.InputError, match="tolerance of the zero must be a number, zero or more"):
+        Tolerances(zero=-1.0)
+
+
+def test_sizes_of_zero_are_no_errors():
+    assert not Tolerances(stress=0.0)
+    assert Tolerances(stress=0.1, zero=0.0) == Tolerances(stress=0.1)
+    assert Tolerances(stress=0.1).with_sizes(stress=0.0, slack=0.01) == Tolerances(slack=0.01)

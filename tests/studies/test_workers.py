@@ -1,0 +1,130 @@
+"""Worker processes: they end with the process that started them, and are replaced when they are killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+from threading import Timer
+
+import pytest
+
+from tissuq.errors import InputError
+from tissuq.studies.stream import RESULTS, run_tasks
+from tissuq.studies.workers import open_pool
+from worker_tasks import Number, doubled
+
+TESTS = Path(__file__).parents[1]
+PATIENCE_S = 60.0
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
+
+
+def wait_until(is_so):
+    deadline = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_workers_end_with_the_process_that_started_them(tmp_path, sign):
+    main = subprocess.Popen(
+        [sys.executable, TESTS / "worker_tasks.py", tmp_path],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    workers: list[int] = []
+    try:
+        wait_until(lambda: all((file := tmp_path / f"process-{n}").exists() and file.read_text() for n in (0, 1)))
+        workers = [int((tmp_path / f"process-{number}").read_text()) for number in (0, 1)]
+        if sign == signal.SIGINT:  # a terminal sends it to all of them
+            os.killpg(main.pid, sign)
+        else:
+            main.send_signal(sign)
+        _, said = main.communicate(timeout=PATIENCE_S)
+        wait_until(lambda: not any(map(is_running, workers)))
+    finally:
+        for pid in filter(is_running, [main.pid, *workers]):
+            os.kill(pid, signal.SIGKILL)
+    assert said.count("Traceback") == (sign == signal.SIGINT)  # that of the script itself, and none of a worker
+
+
+def test_an_interrupt_while_workers_start_ends_them_without_a_word(tmp_path):
+    main = subprocess.Popen(
+        [sys.executable, TESTS / "worker_tasks.py", tmp_path],
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    children = Path(f"/proc/{main.pid}/task/{main.pid}/children")
+    try:
+        wait_until(lambda: len(children.read_text().split()) >= 3)
+        started = [int(pid) for pid in children.read_text().split()]
+        os.killpg(main.pid, signal.SIGINT)
+        _, said = main.communicate(timeout=PATIENCE_S)
+        wait_until(lambda: not any(map(is_running, started)))
+    finally:
+        if is_running(main.pid):
+            os.killpg(main.pid, signal.SIGKILL)
+    assert said.count("Traceback") == 1
+    assert "run_tasks" in said
+
+
+def test_a_worker_that_is_killed_is_replaced_and_its_task_done(tmp_path):
+    tasks = [Number(number) for number in range(4)]
+    with open_pool(2) as pool:
+        results = run_tasks(tasks, partial(doubled, folder=tmp_path, deaths=2), tmp_path, pool=pool)
+    assert [result["twice"] for result in results] == [0, 2, 4, 6]
+    assert len(list(tmp_path.glob("death-*"))) == 2
+
+
+def test_workers_that_are_killed_again_and_again_end_in_one_message(tmp_path):
+    carry_out = partial(doubled, folder=tmp_path, deaths=99)
+    with pytest.raises(InputError, match=r"killed 3 times in a row.*What is done is kept"), open_pool(2) as pool:
+        run_tasks([Number(1)], carry_out, tmp_path, pool=pool)
+
+
+def test_a_dask_scheduler_that_is_lost_is_one_message(tmp_path):
+    pytest.importorskip("distributed")
+    address = tmp_path / "scheduler.json"
+    scheduler = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard",
+         "--scheduler-file", address],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+
+    def run_while_it_is_lost(pool):
+        Timer(0.5, scheduler.kill).start()  # there is no worker that could have done the task by then
+        run_tasks([Number(0)], partial(doubled, folder=tmp_path, deaths=0), tmp_path, pool=pool)
+
+    try:
+        wait_until(address.exists)
+        url = json.loads(address.read_text())["address"]
+        with pytest.raises(InputError, match="is kept: the same command goes on"), open_pool(scheduler=url) as pool:
+            run_while_it_is_lost(pool)
+    finally:
+        scheduler.kill()
+        scheduler.wait()
+
+
+def test_a_task_whose_line_is_damaged_is_carried_out_again(tmp_path):
+    carry_out = partial(doubled, folder=tmp_path, deaths=0)
+    tasks = [Number(0), Number(2), Number(3)]
+    expected = run_tasks(tasks, carry_out, tmp_path)
+    first, _, last = (tmp_path / RESULTS).read_bytes().splitlines(keepends=True)
+    for damaged in (b'{"key": "2", "twi\n', b"\xff\xfe\n", b"null\n", b"[1]\n", b'{"twice": 4}\n', b"\n"):
+        (tmp_path / RESULTS).write_bytes(first + damaged + last)
+        told = []
+        assert run_tasks(tasks, carry_out, tmp_path, step=lambda *each: told.append(each)) == expected  # noqa: B023
+        assert told == [("task 0", False), ("task 3", False), ("task 2", True)]

@@ -1,0 +1,80 @@
+"""Other packages add variants of every kind through entry points, and those that cannot be used are named."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import EntryPoint, EntryPoints
+from types import ModuleType
+
+import pytest
+
+import tissuq as tq
+from tissuq import registry
+from tissuq.experiments.modes import loading_mode
+from tissuq.experiments.modes.one_stretch import Uniaxial
+from tissuq.export.cards import CardFormat, card_format
+from tissuq.finite_elements import Case, ClampedBar
+from tissuq.model.discrepancy import Constant, discrepancy_named
+from tissuq.model.noise import noise_named
+from tissuq.parameters.priors import prior_from
+
+BASES = [tq.Material, tq.LoadingMode, tq.Discrepancy, tq.Noise, tq.Prior, CardFormat, Case]
+
+
+@pytest.fixture
+def package(monkeypatch):
+    """Return a module of another package, whose classes are entry points of the group of their base class."""
+    module = ModuleType("another_package")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+
+    def select(**wanted):
+        points = [
+            EntryPoint(name, f"another_package:{name}", base.entry_point_group)
+            for name, kind in vars(module).items()
+            for base in BASES
+            if not name.startswith("_") and (kind is None or issubclass(kind, base))
+        ]
+        return EntryPoints(points).select(**wanted)
+
+    monkeypatch.setattr(registry, "entry_points", select)
+    return module
+
+
+def test_every_base_class_has_a_group_of_its_own():
+    groups = [base.entry_point_group for base in BASES]
+    assert len(set(groups)) == len(groups)
+    assert all(group.startswith("tissuq.") for group in groups)
+
+
+def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(package):
+    kinds = {
+        "offset": type("Offset", (Constant,), {"__module__": package.__name__}),
+        "loud": type("Loud", (tq.UnknownNoise,), {"__module__": package.__name__}),
+        "upright": type("Upright", (Uniaxial,), {"__module__": package.__name__}),
+        "box": type("Box", (tq.Uniform,), {"__module__": package.__name__}),
+        "pulled": type("Pulled", (ClampedBar,), {"__module__": package.__name__}),
+        "plain": type("Plain", (CardFormat,), {"__module__": package.__name__, "cards": lambda *arguments: None}),
+    }
+    vars(package).update(kinds)
+    assert type(discrepancy_named("offset")) is kinds["offset"]
+    assert type(noise_named("loud")) is kinds["loud"]
+    assert type(loading_mode("upright")) is kinds["upright"]
+    assert type(prior_from({"distribution": "box", "low": 0, "high": 1})) is kinds["box"]
+    assert type(card_format("plain")) is kinds["plain"]
+    assert registry.find(Case, "case", "pulled", tq.InputError) is kinds["pulled"]
+    assert [registry.plugins(base) for base in (tq.LoadingMode, Case)] == [[kinds["upright"]], [kinds["pulled"]]]
+
+
+def test_a_broken_entry_point_is_refused_with_its_name_and_package(package):
+    package.broken = None
+    with pytest.raises(tq.ModelError, match=r"'broken' of another package \(tissuq\.modes: another_package:broken\)"):
+        loading_mode("broken")
+    with pytest.raises(tq.ModelError, match=r"is not a subclass of .*Discrepancy"):
+        discrepancy_named("broken")
+
+
+def test_an_unknown_name_is_still_refused_by_the_kind_that_was_meant(package):
+    with pytest.raises(tq.InputError, match="noise must be a positive number of MPa or one of"):
+        noise_named("unkown")
+    with pytest.raises(tq.ModelError, match="there is no discrepancy named 'constnt'"):
+        discrepancy_named("constnt")
