@@ -95,7 +95,7 @@ def test_a_run_is_repeated_from_its_own_folder_when_the_model_is_named(calibrate
         (["punch.csv", "--forward", "force.py:force", "--runs", 8], "give the --prior of every parameter"),
         (["punch.csv", "--forward", "force.py:force", *PRIORS, "--runs", 2], "runs or more, and 2 are requested"),
         (["punch.csv", "--forward", "force.py:wrong", *USUAL], "shape (2,)"),
-        (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "depth"], "say which one"),
+        (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "depth"], "name the column of the control"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "x", "--measured", "2"], "no column 'x'"),
         (["punch.csv", "--forward", "force.py:force", *USUAL, "--control", "2", "--measured", "2"], "the same column"),
         (["punch.csv", "--forward", "force.py:force", *PRIORS, "--noise-sd", "loud"], "--noise-sd"),

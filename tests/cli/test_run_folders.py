@@ -20,7 +20,7 @@ def test_an_existing_run_is_refused_without_force_and_left_as_it_was(cli, here, 
     before = tree(here)
     said = cli("fit", specimen, *ALONE, "--seed", 9)
     assert said.status == 2
-    assert "run folder 'runs/specimen' exists" in said.err
+    assert "run folder 'runs/specimen' already exists" in said.err
     assert "--force" in said.err
     assert tree(here) == before
 

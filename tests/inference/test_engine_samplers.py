@@ -20,9 +20,9 @@ def test_samplers_draw_the_linear_parameters_within_several_bounds():
     kinds = tq.materials()["neo-hookean"](), tq.discrepancies()["yeoh"]()
     priors = uniform_priors(linear, {"S": Axis(0, 3, 0.01)})
     model = StatisticalModel(tq.Experiment("uniaxial", stretch, stress), *kinds, 0.02, priors)
-    drawn = _Given(model, *given_density(model), np.full((4, 125, 1), 0.06)).draws(seed=1)
+    _, drawn = _Given(model, *given_density(model), np.full((4, 125, 1), 0.06)).mixture_and_draws(seed=1)
     # S = 0.06 beside a noise of 0.02 is a noise of their root sum of squares without S.
     problem = problem_of("yeoh", stretch, stress, linear, {}, float(np.hypot(0.02, 0.06)))
-    for symbol in linear:
+    for index, symbol in enumerate(model.linear):
         truth = integrate(problem, symbol)
-        assert abs(drawn[symbol].mean() - truth.mean) < 5 * truth.sd / np.sqrt(500)
+        assert abs(drawn[..., index].mean() - truth.mean) < 5 * truth.sd / np.sqrt(500)

@@ -48,7 +48,7 @@ def test_the_file_holds_every_group_and_arviz_reads_it(posterior, tmp_path):
     posterior.save(tmp_path / "gp.nc")
     with xr.open_datatree(tmp_path / "gp.nc", engine="h5netcdf") as tree:
         groups = {"posterior", "posterior_predictive", "log_likelihood"}
-        groups |= {"leave_one_out", "observed_data", "constant_data"}
+        groups |= {"leave_one_out", "observed_data", "constant_data", "fit"}
         assert groups == set(tree.children)
         assert tree["posterior"]["C10"].dims == ("chain", "draw")
         assert tree["posterior_predictive"]["stress"].shape == (4, 1000, 14)

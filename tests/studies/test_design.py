@@ -30,7 +30,7 @@ def test_a_run_is_taken_up_and_tests_of_any_stretches_are_ranked(run):
     settings = DesignSettings(run="run", discrepancy="none", candidates=tests, targets=("C10", "modulus"))
     announced = []
     study = run_design(settings, run, announced.append)
-    assert announced[0] == "fitting the run again"
+    assert announced[0] == "loading the run"
     assert set(announced[1:]) == set(study.table["candidate"])
     own = study.table.set_index(["target", "candidate"])
     x = 2 * (np.linspace(0.8, 1.3, 12) - np.linspace(0.8, 1.3, 12) ** -2)

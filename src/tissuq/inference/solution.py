@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from tissuq.model.statistical_model import StatisticalModel
 __all__ = ["Diagnostics", "Marginals", "Solution", "shares_of_members"]
 
 FloatArray = NDArray[np.float64]
+
+NO_ERROR: Mapping[str, float] = {}
 
 
 @dataclass(frozen=True)
@@ -33,24 +36,28 @@ class Diagnostics:
 
 
 class Marginals(Mapping[str, Marginal]):
-    """The marginal posterior of every parameter, each computed when it is first asked for."""
+    """The marginal posterior of every parameter, each computed when it is first asked for.
 
-    def __init__(self, symbols: tuple[str, ...], compute: Callable[[str], Marginal]) -> None:
-        self._symbols, self._compute = symbols, compute
-        self._known: dict[str, Marginal] = {}
+    Those of some are widened by an ``error`` (standard deviation, in the parameter's unit).
+    """
+
+    def __init__(
+        self, symbols: tuple[str, ...], compute: Callable[[str], Marginal], error: Mapping[str, float] = NO_ERROR
+    ) -> None:
+        self._symbols, self._compute, self._error = symbols, compute, error
+        self._computed: dict[str, Marginal] = {}
 
     @classmethod
     def of(cls, model: StatisticalModel, compute: Callable[[str], Marginal]) -> Marginals:
         """Return those of a model's parameters; of stresses with the error that all tests have in common."""
-        error = dict.fromkeys(model.column_symbols, model.common_error)
-        return cls(model.symbols, lambda symbol: widened(compute(symbol), error.get(symbol, 0.0)))
+        return cls(model.symbols, compute, dict.fromkeys(model.column_symbols, model.common_error))
 
     def __getitem__(self, symbol: str) -> Marginal:
         if symbol not in self._symbols:
             raise KeyError(symbol)
-        if symbol not in self._known:
-            self._known[symbol] = self._compute(symbol)
-        return self._known[symbol]
+        if symbol not in self._computed:
+            self._computed[symbol] = widened(self._compute(symbol), self._error.get(symbol, 0.0))
+        return self._computed[symbol]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._symbols)
@@ -113,6 +120,12 @@ class Solution:
     stable_share: float = 1.0
     stable_prior_share: float | None = None
     is_of_data: bool = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is computed in place of what computes it, so that the posterior can go to another process."""
+        tails = None if self.represent_tails is None else partial(_same, self.wide_mixture)
+        computed = {"represent": partial(_same, self.mixture), "represent_tails": tails}
+        return self.__dict__ | computed | {"marginals": dict(self.marginals)}
 
     @cached_property
     def mixture(self) -> GaussianMixture:
@@ -178,6 +191,10 @@ class Solution:
         """The number of chains, and of draws in each."""
         chains, draws = self.component_of_draw.shape
         return chains, draws
+
+
+def _same(mixture: GaussianMixture) -> GaussianMixture:
+    return mixture
 
 
 def shares_of_members(model: StatisticalModel, members: NDArray[np.intp], weights: FloatArray) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
 
@@ -88,10 +88,10 @@ class Table:
         """
         if self.block is not None and max(columns) < self.block.shape[1]:
             return [np.ascontiguousarray(self.block[:, column]) for column in columns]
-        for converter in (None, _from_decimal_comma):
+        for rows, converter in self._readings():
             try:
                 block = np.loadtxt(
-                    self.rows,
+                    rows,
                     delimiter=None if self.separator == WHITESPACE else self.separator,
                     usecols=columns,
                     quotechar='"',
@@ -104,6 +104,13 @@ class Table:
             if np.isfinite(block).all():
                 return list(block.T)
         raise self._bad_cell(columns)
+
+    def _readings(self) -> Iterator[tuple[list[str], Callable[[str], float] | None]]:
+        """Yield the rows and what converts their cells, the fastest first: points, commas alone, commas in some columns."""
+        yield self.rows, None
+        if self.separator != "," and not any("." in row for row in self.rows):
+            yield [row.replace(",", ".") for row in self.rows], None
+        yield self.rows, _from_decimal_comma
 
     def _bad_cell(self, columns: Sequence[int]) -> InputError:
         marks: dict[str, str] = {}
@@ -190,7 +197,7 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
     """Return the table of any file, looking at every line."""
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
-    content = [(line, text) for line, text in filled if not is_comment(text)]
+    content = [(line, text) for line, text in filled if "#" not in text or not is_comment(text)]
     texts = [text for _, text in content]
     layout = find_layout(texts, separator)
     if layout is None:
