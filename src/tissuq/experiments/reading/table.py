@@ -106,7 +106,7 @@ class Table:
         raise self._bad_cell(columns)
 
     def _readings(self) -> Iterator[tuple[list[str], Callable[[str], float] | None]]:
-        """Yield the rows and what converts their cells, the fastest first: points, commas alone, commas in some columns."""
+        """Yield the rows and what converts their cells, the fastest first: points, commas, both by column."""
         yield self.rows, None
         if self.separator != "," and not any("." in row for row in self.rows):
             yield [row.replace(",", ".") for row in self.rows], None
