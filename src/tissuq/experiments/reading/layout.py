@@ -8,13 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tissuq.experiments.reading.units import looks_like_unit
+from tissuq.experiments.reading.units import NUMBER, looks_like_unit
 
-__all__ = ["NUMBER", "WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
+__all__ = ["WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
 
 WHITESPACE = " "
 SEPARATORS = ("\t", ";", ",", WHITESPACE)
-NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 SPREADSHEET_ERRORS = frozenset(
     ["#n/a", "#nv", "#ref!", "#bezug!", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#name?", "#null!", "#calc!",
      "#spill!", "#field!", "#getting_data"]
