@@ -207,9 +207,11 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
             'stress or force, as in columns={"strain": "Strain"} or --column strain=Strain.'
         )
     for roles in (DEFORMATIONS, LOADS):
-        both = [role for role in roles if role in mapping]
-        if len(both) > 1:
-            raise InputError(f"{table.file}: columns are given for both {' and '.join(both)}; give only one of them.")
+        chosen_roles = [role for role in roles if role in mapping]
+        if len(chosen_roles) > 1:
+            raise InputError(
+                f"{table.file}: columns are given for both {' and '.join(chosen_roles)}; give only one of them."
+            )
     unfit = (set(DEFORMATIONS) - {"shear"} if is_shear else {"shear"}) & set(mapping)
     if unfit:
         deformation = "an amount of shear" if is_shear else "a stretch, strain or displacement"

@@ -118,7 +118,7 @@ def _cycle_labels(table: Table) -> list[str]:
 
 def _turning_points(stretch: Column) -> list[int]:
     """Return the rows where the test turns back by a notable share of its range."""
-    least = REVERSAL * float(np.ptp(stretch))
+    reversal = REVERSAL * float(np.ptp(stretch))
     turns: list[int] = []
     low = high = direction = 0
     values = stretch.tolist()
@@ -128,7 +128,7 @@ def _turning_points(stretch: Column) -> list[int]:
         value = values[row]
         high = row if value > values[high] else high
         low = row if value < values[low] else low
-        rises, falls = value - values[low] > least, values[high] - value > least
+        rises, falls = value - values[low] > reversal, values[high] - value > reversal
         if direction == 0:
             direction = rises - falls
         elif falls if direction > 0 else rises:

@@ -203,8 +203,8 @@ def _turned(dimensions: Dimensions) -> Dimensions:
     )
 
 
-def _agree(size: Dimension, other: Dimension) -> bool:
-    return isclose(size.value, other.value, rel_tol=CONTRADICTION)
+def _agree(size: Dimension, alternative: Dimension) -> bool:
+    return isclose(size.value, alternative.value, rel_tol=CONTRADICTION)
 
 
 def _sections(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:

@@ -67,9 +67,9 @@ class Inspection:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used, unit = self.reading.table, self.reading.used, stress_unit(self.reading.experiment.stress_unit)
-        above = f"{len(table.above)} lines above them" if len(table.above) != 1 else "1 line above them"
+        head = f"{len(table.above)} lines above them" if len(table.above) != 1 else "1 line above them"
         cells = SEPARATORS[table.separator]
-        yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {above}"
+        yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {head}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])

@@ -157,7 +157,7 @@ class _TautStart:
 
     row: int
     stretch: float
-    where: str
+    place_in_words: str
 
     @classmethod
     def of(cls, measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int) -> _TautStart:
@@ -178,15 +178,15 @@ class _TautStart:
             reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
             start = cls(row, float(reference), f"between lines {table.lines[row - 1]} and {table.lines[row]}")
         else:
-            where = f"in line {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
-            start = cls(0, float(stretch[0]), where)
+            words = f"in line {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
+            start = cls(0, float(stretch[0]), words)
         if start.stretch <= 0:
             raise InputError(
-                f"{table.file}: where the preload {preload} is reached ({start.where}), the stretch is "
+                f"{table.file}: where the preload {preload} is reached ({start.place_in_words}), the stretch is "
                 f"{start.stretch:g}, not positive. Check the length of the specimen and the column of displacements."
             )
         return start
 
     def sentence(self, preload: str) -> str:
         """Return the sentence about this step."""
-        return f"stretch counted from {self.stretch:.6g}, where the preload {preload} is reached {self.where}"
+        return f"stretch counted from {self.stretch:.6g}, where the preload {preload} is reached {self.place_in_words}"

@@ -135,14 +135,14 @@ def _check_signs(
 ) -> None:
     row = _wrong_sign(stretch, stress, stretch < 1)
     if row is not None:
-        place = f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g}"
+        cell = f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g}"
         if compression_positive:
             raise InputError(
-                f"{place} the stress is already negative in the file. Leave out compression_positive=True "
+                f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
                 "(--compression-positive)."
             )
         raise InputError(
-            f"{place} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
+            f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
             "counts compression as positive, give compression_positive=True (--compression-positive); if the "
             "column of stretches holds strain, give it as strain."
         )

@@ -238,10 +238,8 @@ def _no_table(file: str, content: Lines) -> InputError:
 
 def _comment_above(filled: Lines, first_line: int) -> tuple[int, str]:
     """Return the comment just above the data as a candidate for the names: numpy.savetxt writes them so."""
-    above = [(line, text) for line, text in filled if line < first_line]
-    if above and is_comment(above[-1][1]):
-        return above[-1][0], above[-1][1].lstrip("# \t")
-    return 0, ""
+    line, text = next(((line, text) for line, text in reversed(filled) if line < first_line), (0, ""))
+    return (line, text.lstrip("# \t")) if is_comment(text) else (0, "")
 
 
 def _padded(cells: list[str], width: int) -> tuple[str, ...]:
