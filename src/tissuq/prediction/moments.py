@@ -14,6 +14,7 @@ from tissuq.inference.algebra import SpectralCovariance
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.lowrank import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
+from tissuq.inference.threads import one_thread
 from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -175,7 +176,7 @@ def stress_moments(
         extra += model.independent_variance(values)
     if noise:
         extra += model.noise_variance(values, level) * model.relative_noise(states) ** 2
-    return mean, extra + (root**2).sum(axis=2)
+    return mean, extra + np.einsum("mgp,mgp->mg", root, root)
 
 
 def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
@@ -213,8 +214,9 @@ def drawn_curves(
     is_material = np.isin(model.column_symbols, model.material_symbols)
     material_stress, discrepancy_stress = terms[..., is_material].sum(axis=2), terms[..., ~is_material].sum(axis=2)
     if components.member is not None:
-        for shift, rows in _drawn_energies(model, linear, components, states):
-            discrepancy_stress[rows] += shift
+        with one_thread():
+            for shift, rows in _drawn_energies(model, linear, components, states):
+                discrepancy_stress[rows] += shift
     if model.is_correlated and states.is_measured:
         for group in correlated_groups(model, settings):
             shift, covariance = conditioned_jointly(model, group, states, drawn[group.components])
