@@ -128,6 +128,7 @@ def test_arviz_summarises_and_cross_validates_every_posterior(paper_run, name):
             "leave_one_out",
             "observed_data",
             "constant_data",
+            "fit",
         }
         assert set(data.children) == groups
         row = next(row for row in rows_of(folder / "summary.csv") if row["formulation"] == name)

@@ -43,8 +43,8 @@ class Boxes:
     lower: FloatArray
     upper: FloatArray
 
-    def __getitem__(self, chosen: Any) -> Boxes:
-        return Boxes(self.lower[chosen], self.upper[chosen])
+    def __getitem__(self, index: Any) -> Boxes:
+        return Boxes(self.lower[index], self.upper[index])
 
     def repeated(self, count: int) -> Boxes:
         """Return the bounds of the first data set for each of some Gaussians."""
@@ -73,20 +73,19 @@ class Boxes:
         Stat. 1:141).
         """
         low, high = self._scores(mean, root)
-        beyond = _beyond(low, high)
-        outside = beyond.sum(axis=1)
+        mass_beyond = _beyond(low, high)
+        outside = mass_beyond.sum(axis=1)
         log_mass, error = np.log1p(-np.minimum(outside, 0.5)), np.minimum(outside, SMALL)
-        active = beyond > TOUCHED
-        alone = active.sum(axis=1) == 1
-        if alone.any():
-            only = active[alone].argmax(axis=1)[:, None]
-            log_mass[alone] = log_interval(*(np.take_along_axis(s[alone], only, 1)[:, 0] for s in (low, high)))
-            error[alone] = 0.0
+        active = mass_beyond > TOUCHED
+        is_single = active.sum(axis=1) == 1
+        if is_single.any():
+            only = active[is_single].argmax(axis=1)[:, None]
+            log_mass[is_single] = log_interval(*(np.take_along_axis(s[is_single], only, 1)[:, 0] for s in (low, high)))
+            error[is_single] = 0.0
         several = (active.sum(axis=1) > 1) & (outside > SMALL)
-        for kept, crossed in _by_pattern(active, several):
-            part = Boxes(self.lower[crossed][:, kept], self.upper[crossed][:, kept])
-            found = part._log_mass(mean[crossed][:, kept], root[crossed][:, kept])
-            log_mass[crossed], error[crossed] = found
+        for parameters, crossed in _by_pattern(active, several):
+            crossing = np.ix_(crossed, parameters)
+            log_mass[crossed], error[crossed] = self[crossing]._log_mass(mean[crossing], root[crossing])
         return log_mass, error
 
     def draws(self, mean: FloatArray, root: FloatArray, uniforms: FloatArray) -> FloatArray:
@@ -98,21 +97,20 @@ class Boxes:
 
         values = np.empty(uniforms.shape)
         active = self.beyond(mean, root) > TOUCHED
-        for kept, rows in _by_pattern(active, np.ones(len(mean), dtype=bool)):
-            every, k = self[rows], len(kept)
-            order = np.concatenate([kept, np.setdiff1d(np.arange(mean.shape[1]), kept)])
-            triangle, own = lower_triangle(root[rows][:, order]), uniforms[rows]
-            scores = ndtri(own)
+        for parameters, rows in _by_pattern(active, np.ones(len(mean), dtype=bool)):
+            k, near = len(parameters), np.ix_(rows, parameters)
+            order = np.concatenate([parameters, np.setdiff1d(np.arange(mean.shape[1]), parameters)])
+            triangle = lower_triangle(root[np.ix_(rows, order)])
+            triangle_near, uniforms_near = triangle[:, :k, :k], uniforms[rows, :, :k]
+            scores = ndtri(uniforms[rows])
             if k > MOST_NESTED:
-                part = Boxes(every.lower[:, kept], every.upper[:, kept])
-                drawn = part._gibbs(mean[rows][:, kept], triangle[:, :k, :k], own[:, :, :k]) - mean[rows][:, None, kept]
-                scores[:, :, :k] = np.linalg.solve(triangle[:, :k, :k], drawn.swapaxes(1, 2)).swapaxes(1, 2)
+                deviations = self[near]._gibbs(mean[near], triangle_near, uniforms_near) - mean[near][:, None]
+                scores[:, :, :k] = np.linalg.solve(triangle_near, deviations.swapaxes(1, 2)).swapaxes(1, 2)
             elif k:
-                low, high = ((bound - mean[rows])[:, kept] for bound in (every.lower, every.upper))
-                scores[:, :, :k] = nested_draws(triangle[:, :k, :k], low, high, own[:, :, :k])
-            values[rows[:, None, None], np.arange(own.shape[1])[:, None], order] = mean[rows][
-                :, None, order
-            ] + np.einsum("mjk,mrk->mrj", triangle, scores)
+                low, high = (bound[near] - mean[near] for bound in (self.lower, self.upper))
+                scores[:, :, :k] = nested_draws(triangle_near, low, high, uniforms_near)
+            ordered = mean[np.ix_(rows, order)][:, None] + np.einsum("mjk,mrk->mrj", triangle, scores)
+            values[np.ix_(rows, np.arange(uniforms.shape[1]), order)] = ordered
         return np.clip(values, self.lower[:, None], self.upper[:, None])
 
     def _log_mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -129,26 +127,27 @@ class Boxes:
 
     def _gibbs(self, mean: FloatArray, root: FloatArray, uniforms: FloatArray) -> FloatArray:
         """Return draws (M, R, p) from uniforms (M, R, p) that start the sweeps."""
-        each, p = uniforms.shape[1:]
-        rows = np.repeat(np.arange(len(mean)), each)
+        draws, p = uniforms.shape[1:]
+        rows = np.repeat(np.arange(len(mean)), draws)
         boxes, mean, root = self[rows], mean[rows], root[rows]
         generator, values = np.random.default_rng(0), np.empty(mean.shape)
         for block in np.array_split(np.arange(len(rows)), max(1, len(rows) // 500)):
             log_weights, points = boxes[block].points(mean[block], root[block])
             cumulative = np.cumsum(np.exp(log_weights - log_weights.max(axis=1, keepdims=True)), axis=1)
-            place = uniforms.reshape(-1, p)[block, :1] * cumulative[:, -1:]
-            values[block] = points[np.arange(len(block)), (cumulative < place).sum(axis=1)]
+            targets = uniforms.reshape(-1, p)[block, :1] * cumulative[:, -1:]
+            values[block] = points[np.arange(len(block)), (cumulative < targets).sum(axis=1)]
         inverse = np.linalg.inv(root)
         precision = inverse.swapaxes(1, 2) @ inverse
         for _ in range(SWEEPS):
             for j in range(p):
-                own, away = precision[:, j, j], values - mean
-                away[:, j] = 0.0
-                centre = mean[:, j] - (precision[:, j] * away).sum(axis=1) / own
-                ends = ((bound[:, j] - centre) * np.sqrt(own) for bound in (boxes.lower, boxes.upper))
-                score, _ = interval_quantile(generator.random(len(own)), *ends)
-                values[:, j] = np.clip(centre + score / np.sqrt(own), boxes.lower[:, j], boxes.upper[:, j])
-        return values.reshape(-1, each, p)
+                deviation, precision_of_j = values - mean, precision[:, j, j]
+                deviation[:, j] = 0.0
+                centre = mean[:, j] - (precision[:, j] * deviation).sum(axis=1) / precision_of_j
+                low, high = boxes.lower[:, j], boxes.upper[:, j]
+                ends = ((bound - centre) * np.sqrt(precision_of_j) for bound in (low, high))
+                score, _ = interval_quantile(generator.random(len(centre)), *ends)
+                values[:, j] = np.clip(centre + score / np.sqrt(precision_of_j), low, high)
+        return values.reshape(-1, draws, p)
 
     def _by_points(self, mean: FloatArray, root: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
         """Return the log mass inside the bounds and its error by quasi-random points; more of them where needed."""
@@ -181,8 +180,8 @@ class Boxes:
         standard = np.empty((count, len(uniforms), p))
         points = np.empty_like(standard)
         for step, j in enumerate(order):
-            before = np.einsum("nqk,nk->nq", standard[:, :, :step], triangle[:, step, :step])
-            centre, scale = mean[:, None, j] + before, triangle[:, step, step][:, None]
+            shift = np.einsum("nqk,nk->nq", standard[:, :, :step], triangle[:, step, :step])
+            centre, scale = mean[:, None, j] + shift, triangle[:, step, step][:, None]
             lower, upper = self.lower[:, j, None], self.upper[:, j, None]
             ends = (lower - centre) / scale, (upper - centre) / scale
             standard[:, :, step], log_mass = interval_quantile(uniforms[:, step], *ends)
@@ -214,6 +213,6 @@ def lower_triangle(root: FloatArray) -> FloatArray:
     upper = np.asarray(np.linalg.qr(root.swapaxes(1, 2), mode="r"), dtype=np.float64)
     diagonal = np.einsum("mii->mi", upper)
     lower = (upper * np.where(diagonal < 0, -1.0, 1.0)[:, :, None]).swapaxes(1, 2)
-    least = 1e-12 * np.sqrt((root**2).sum(axis=2))
-    np.einsum("mii->mi", lower)[:] = np.maximum(np.abs(diagonal), least)
+    smallest = 1e-12 * np.sqrt((root**2).sum(axis=2))
+    np.einsum("mii->mi", lower)[:] = np.maximum(np.abs(diagonal), smallest)
     return lower

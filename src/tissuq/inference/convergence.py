@@ -66,8 +66,8 @@ class Draws(ABC):
         """One sentence that says so, or what failed, and then what to try."""
         failures = self._failures()
         if failures:
-            found, remedies = zip(*failures, strict=True)
-            return f"Not converged: {'; '.join(found)}. Try {', or '.join(dict.fromkeys(remedies))}."
+            faults, remedies = zip(*failures, strict=True)
+            return f"Not converged: {'; '.join(faults)}. Try {', or '.join(dict.fromkeys(remedies))}."
         return (
             f"Converged: R-hat at most {self.rhat.max():.4f}, effective sample sizes at least "
             f"{self.ess_bulk.min():.0f} (bulk) and {self.ess_tail.min():.0f} (tail), {self._quality()}."
@@ -85,14 +85,14 @@ class Draws(ABC):
         """Return effective sample sizes, cut down where the sampler knows them to be too large."""
         return sizes
 
-    def _small_sizes(self, least: float, remedy: str) -> list[tuple[str, str]]:
+    def _small_sizes(self, minimum: float, remedy: str) -> list[tuple[str, str]]:
         """Return the failures of effective sample sizes that must exceed a least one."""
         failures = []
-        for part, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
+        for region, sizes in (("bulk", self.ess_bulk), ("tail", self.ess_tail)):
             worst = int(np.argmin(sizes))
-            if not sizes[worst] > least:
-                found = f"the {part} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
-                failures.append((f"{found} and must exceed {least}", remedy))
+            if not sizes[worst] > minimum:
+                fault = f"the {region} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
+                failures.append((f"{fault} and must exceed {minimum}", remedy))
         return failures
 
 

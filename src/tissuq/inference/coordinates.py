@@ -89,8 +89,8 @@ class Box:
             raise InputError(f"the bounds need one shape (d,); found {self.lower.shape} and {self.upper.shape}.")
         if not np.all(self.lower < self.upper):
             index = int(np.argmin(self.lower < self.upper))
-            found = f"{self.lower[index]} is not below {self.upper[index]}"
-            raise InputError(f"bounds {index}: {found}; give lower < upper.")
+            fault = f"{self.lower[index]} is not below {self.upper[index]}"
+            raise InputError(f"bounds {index}: {fault}; give lower < upper.")
 
     @property
     def has_lower(self) -> NDArray[np.bool_]:
@@ -245,22 +245,22 @@ def find_modes(
     line = box.to_line(start)
     if not _is_finite(derivatives(line)):
         raise InputError(f"the log density or its derivatives are not finite at {np.asarray(start)}; start elsewhere.")
-    first = _climb(derivatives, line)
+    mode_at_start = _climb(derivatives, line)
     # A standard normal variable on the line is a uniform one between two bounds.
-    centre = np.where(box.is_bounded, 0.0, first.location)
-    spread = np.where(box.is_bounded, 1.0, 10 * np.linalg.norm(first.scale, axis=1))
+    centre = np.where(box.is_bounded, 0.0, mode_at_start.location)
+    spread = np.where(box.is_bounded, 1.0, 10 * np.linalg.norm(mode_at_start.scale, axis=1))
     scattered = centre + spread * generator.standard_normal((SEARCHES - 1, line.size))
-    found = [first] + [_climb(derivatives, point) for point in scattered if _is_finite(derivatives(point))]
-    return _distinct(sorted(found, key=lambda mode: -mode.log_mass))
+    modes = [mode_at_start] + [_climb(derivatives, point) for point in scattered if _is_finite(derivatives(point))]
+    return _distinct(sorted(modes, key=lambda mode: -mode.log_mass))
 
 
 def _distinct(modes: list[Mode]) -> tuple[Mode, ...]:
-    kept: list[Mode] = []
+    distinct: list[Mode] = []
     for mode in modes:
-        is_new = all(np.linalg.norm(other.whiten(mode.location)) > SAME_MODE for other in kept)
+        is_new = all(np.linalg.norm(earlier.whiten(mode.location)) > SAME_MODE for earlier in distinct)
         if is_new and mode.log_mass >= modes[0].log_mass + np.log(NEGLIGIBLE_MASS):
-            kept.append(mode)
-    return tuple(kept)
+            distinct.append(mode)
+    return tuple(distinct)
 
 
 def _climb(derivatives: Derivatives, line: Floats, max_steps: int = 500, tolerance: float = 1e-8) -> Mode:

@@ -80,8 +80,8 @@ class _Key:
     def __init__(self, identity: tuple[Any, ...], model: StatisticalModel) -> None:
         self.identity, self.model = identity, model
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.identity == other.identity
+    def __eq__(self, value: object) -> bool:
+        return isinstance(value, _Key) and self.identity == value.identity
 
     def __hash__(self) -> int:
         return hash(self.identity)

@@ -61,11 +61,9 @@ class GaussianMixture:
         root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
         return cls(weights, np.zeros((len(weights), 0)), mean, root)
 
-    def __getitem__(self, chosen: NDArray[Any] | slice) -> GaussianMixture:
-        member = None if self.member is None else self.member[chosen]
-        return GaussianMixture(
-            self.weights[chosen], self.settings[chosen], self.mean[chosen], self.root[chosen], member
-        )
+    def __getitem__(self, index: NDArray[Any] | slice) -> GaussianMixture:
+        member = None if self.member is None else self.member[index]
+        return GaussianMixture(self.weights[index], self.settings[index], self.mean[index], self.root[index], member)
 
     def __len__(self) -> int:
         return len(self.weights)
@@ -88,18 +86,18 @@ class GaussianMixture:
         sds = np.sqrt((self.root[:, index] ** 2).sum(axis=1))
         return marginal_of_mixture(self.weights, self.mean[:, index], sds)
 
-    def joined(self, other: GaussianMixture) -> GaussianMixture:
+    def joined(self, more: GaussianMixture) -> GaussianMixture:
         """Return these components followed by others; the weights of both together must sum to one."""
-        is_average = self.member is not None and other.member is not None
+        is_average = self.member is not None and more.member is not None
         names = ("weights", "settings", "mean", "root", *(["member"] if is_average else []))
-        return GaussianMixture(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+        return GaussianMixture(*(np.concatenate([getattr(self, name), getattr(more, name)]) for name in names))
 
     def draw(self, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
         """Return the component (chains, draws) of every draw, and its linear parameters (chains, draws, p)."""
         generator = np.random.default_rng(seed)
-        chosen = generator.choice(len(self.weights), size=(CHAINS, DRAWS), p=self.weights)
+        component = generator.choice(len(self.weights), size=(CHAINS, DRAWS), p=self.weights)
         noise = generator.standard_normal((CHAINS, DRAWS, self.root.shape[2]))
-        return chosen, self.mean[chosen] + np.einsum("cdij,cdj->cdi", self.root[chosen], noise)
+        return component, self.mean[component] + np.einsum("cdij,cdj->cdi", self.root[component], noise)
 
     def weighted(self, weights: FloatArray) -> GaussianMixture:
         """Return the same components with other weights (M,)."""
@@ -123,8 +121,8 @@ class GaussianMixture:
         """Return at most ``count`` equally weighted components that stand for all, of the same weight together."""
         if len(self.weights) <= count:
             return self
-        chosen = self[systematic(self.weights[None], count)[0]]
-        return chosen.weighted(np.full(count, self.weights.sum() / count))
+        representatives = self[systematic(self.weights[None], count)[0]]
+        return representatives.weighted(np.full(count, self.weights.sum() / count))
 
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], NDArray[Any]]]:
         """Return its arrays by name, with their dimensions, without those that are empty."""

@@ -79,8 +79,8 @@ class Marginal:
         for _ in range(7):
             inner = np.linspace(low, high, COARSE)
             rising = self.pdf(self.quantile(inner)) < self.pdf(self.quantile(inner + prob))
-            place = int(rising.argmin()) if not rising.all() else COARSE - 1
-            low, high = inner[max(place - 1, 0)], inner[place]
+            peak = int(rising.argmin()) if not rising.all() else COARSE - 1
+            low, high = inner[max(peak - 1, 0)], inner[peak]
         return float(self.quantile(low)), float(self.quantile(low + prob))
 
 
@@ -90,9 +90,9 @@ def widened(marginal: Marginal, error: float) -> Marginal:
         return marginal
     values = marginal.quantile((np.arange(PARTS) + 0.5) / PARTS)
     sds = np.sqrt((error * values) ** 2 + np.gradient(values) ** 2 / 12)
-    found = marginal_of_mixture(np.full(PARTS, 1 / PARTS), values, sds)
+    mixture = marginal_of_mixture(np.full(PARTS, 1 / PARTS), values, sds)
     sd = float(np.sqrt(marginal.sd**2 * (1 + error**2) + (error * marginal.mean) ** 2))
-    return replace(found, mean=marginal.mean, sd=sd)
+    return replace(mixture, mean=marginal.mean, sd=sd)
 
 
 def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray) -> Marginal:
@@ -124,7 +124,12 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
 
 
 def marginal_of_cut_mixture(
-    weights: FloatArray, means: FloatArray, covariances: FloatArray, place: int, which: int, ends: tuple[float, float]
+    weights: FloatArray,
+    means: FloatArray,
+    covariances: FloatArray,
+    index: int,
+    cut_index: int,
+    ends: tuple[float, float],
 ) -> Marginal:
     """Return the marginal of one parameter of M Gaussians that the bounds of one parameter cut, in closed form.
 
@@ -135,38 +140,38 @@ def marginal_of_cut_mixture(
     means : (M, p) array
     covariances : (M, p, p) array
         Before the cut.
-    place, which : int
+    index, cut_index : int
         The parameter whose marginal is wanted, and the one with bounds.
     ends : tuple of float
         The bounds.
     """
-    weights, means, covariances = _alike(weights / weights.sum(), means, covariances, (place, which))
-    sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (place, which))
-    low, high = ((end - means[:, which]) / sd_cut for end in ends)
+    weights, means, covariances = _alike(weights / weights.sum(), means, covariances, (index, cut_index))
+    sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (index, cut_index))
+    low, high = ((end - means[:, cut_index]) / sd_cut for end in ends)
     log_mass = log_interval(low, high)
     shift, shrink = _cut_moments(low, high, log_mass)
-    along = covariances[:, place, which] / sd_cut
-    own_mean = means[:, place] + along * shift
+    along = covariances[:, index, cut_index] / sd_cut
+    own_mean = means[:, index] + along * shift
     own_variance = np.maximum(sd**2 - along**2 * (1 - shrink), 0.0)
     mean = float(weights @ own_mean)
     variance = float(weights @ (own_variance + (own_mean - mean) ** 2))
     scores = np.linspace(-25, 25, 51)  # what a bound leaves may have an exponential tail
     spread = own_mean[:, None] + np.sqrt(own_variance)[:, None] * scores
-    limits = ends if place == which else (-np.inf, np.inf)
+    limits = ends if index == cut_index else (-np.inf, np.inf)
     reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
     shares = weights[:, None] * np.exp(-np.abs(scores))
     count = max(2 * NODES, min(4 * NODES, MANY_VALUES // len(weights)))
     coarse = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, count)
-    scores = (coarse - means[:, place, None]) / sd[:, None]
+    scores = (coarse - means[:, index, None]) / sd[:, None]
     log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
     rise = -scores
-    if place != which:
+    if index != cut_index:
         correlation = np.clip(along / sd, -1 + 1e-12, 1 - 1e-12)[:, None]
-        rest = np.sqrt(1 - correlation**2)
-        low_given, high_given = ((end[:, None] - correlation * scores) / rest for end in (low, high))
+        complement = np.sqrt(1 - correlation**2)
+        low_given, high_given = ((end[:, None] - correlation * scores) / complement for end in (low, high))
         log_given = log_interval(low_given, high_given)
         log_density += log_given
-        rise += correlation / rest * (_height(low_given, log_given) - _height(high_given, log_given))
+        rise += correlation / complement * (_height(low_given, log_given) - _height(high_given, log_given))
     heights = weights[:, None] * np.exp(log_density)
     smooth = HermiteCubics(coarse, heights.sum(axis=0), (heights * rise / sd[:, None]).sum(axis=0))
     points = _between(coarse)
@@ -201,8 +206,8 @@ def marginal_of_crossed_mixture(
     coarse = _grid(values.ravel(), shares.ravel(), (values.min(), values.max()), 2 * NODES)
     scores = (coarse - means[:, None]) / scale
     log_density = nested_log_density(triangle, low, high, scores)[0] - log_mass
-    within = (scores >= low[:, :1] / scale) & (scores <= high[:, :1] / scale)
-    density = (weights / weights.sum() / scale[:, 0]) @ np.where(within, np.exp(log_density), 0.0)
+    is_inside = (scores >= low[:, :1] / scale) & (scores <= high[:, :1] / scale)
+    density = (weights / weights.sum() / scale[:, 0]) @ np.where(is_inside, np.exp(log_density), 0.0)
     smooth, points = PchipInterpolator(coarse, density), _between(coarse)
     return Marginal(mean, sd, points, np.maximum(smooth(points), 0.0), _proper(smooth.antiderivative()(points)))
 
@@ -227,13 +232,13 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, 
     sd = float(np.sqrt(weights @ (values - mean) ** 2))
     lines = rule.lines(side, index)
     heavy = np.abs(lines.series[:, 0] * lines.width) > 1e-8
-    lines = Lines(lines.before[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
+    lines = Lines(lines.preceding[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
     seen = values[weights > 1e-8]
     low, high = warp.bounds(side)
     margin = 0.05 * np.ptp(seen)
     ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
     points = _grid(values, weights, ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
-    coordinates, slope = warp.coordinate(side, points, lines.before)
+    coordinates, slope = warp.coordinate(side, points, lines.preceding)
     density = np.maximum(lines.evaluate(coordinates, slope), 0.0)
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))
 
@@ -338,42 +343,44 @@ class HermiteCubics:
         self.points = points
         self.coefficients = values[:-1], slopes[:-1], (secant - slopes[:-1]) / width - bend, bend / width
 
-    def __call__(self, at: FloatArray) -> FloatArray:
+    def __call__(self, arguments: FloatArray) -> FloatArray:
         """Return the values at points (g,) within the outermost."""
-        index, step = self._steps(at)
+        index, step = self._steps(arguments)
         return np.asarray(sum(factor[index] * step**power for power, factor in enumerate(self.coefficients)))
 
-    def integral(self, at: FloatArray) -> FloatArray:
+    def integral(self, arguments: FloatArray) -> FloatArray:
         """Return the integrals from the first point to others (g,)."""
-        index, step = self._steps(at)
+        index, step = self._steps(arguments)
         width = np.diff(self.points)
         terms = [(power, factor / power) for power, factor in enumerate(self.coefficients, 1)]
-        before = np.append(0.0, np.cumsum(sum(factor * width**power for power, factor in terms)))
-        return np.asarray(before[index] + sum(factor[index] * step**power for power, factor in terms))
+        integral_to_interval = np.append(0.0, np.cumsum(sum(factor * width**power for power, factor in terms)))
+        return np.asarray(integral_to_interval[index] + sum(factor[index] * step**power for power, factor in terms))
 
-    def _steps(self, at: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    def _steps(self, arguments: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
         """Return the interval (g,) of each point, and how far in it the point lies."""
-        index = np.searchsorted(self.points[1:-1], at, side="right")
-        return index, at - self.points[index]
+        index = np.searchsorted(self.points[1:-1], arguments, side="right")
+        return index, arguments - self.points[index]
 
 
 def _between(coarse: FloatArray) -> FloatArray:
     """Return coarse points with others evenly between them."""
-    places = np.arange(BETWEEN * (len(coarse) - 1) + 1) / BETWEEN
-    return np.asarray(np.interp(places, np.arange(len(coarse)), coarse), dtype=np.float64)
+    fractional_index = np.arange(BETWEEN * (len(coarse) - 1) + 1) / BETWEEN
+    return np.asarray(np.interp(fractional_index, np.arange(len(coarse)), coarse), dtype=np.float64)
 
 
 def _alike(
-    weights: FloatArray, means: FloatArray, covariances: FloatArray, places: tuple[int, int]
+    weights: FloatArray, means: FloatArray, covariances: FloatArray, index_pair: tuple[int, int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Merge Gaussians that are nearly the same in two of their dimensions, keeping moments."""
     if len(weights) <= FEW:
         return weights, means, covariances
     seen = weights > 1e-9 * weights.max()
     weights, means, covariances = weights[seen] / weights[seen].sum(), means[seen], covariances[seen]
-    sds = np.sqrt(covariances[:, places, places])
-    own = means[:, places]
-    bins = np.hstack([(own - own.min(axis=0)) / (FINE * sds), np.log(sds / sds.min(axis=0)) / FINE]).astype(int)
+    sds = np.sqrt(covariances[:, index_pair, index_pair])
+    means_of_pair = means[:, index_pair]
+    bins = np.hstack(
+        [(means_of_pair - means_of_pair.min(axis=0)) / (FINE * sds), np.log(sds / sds.min(axis=0)) / FINE]
+    ).astype(int)
     _, group = np.unique(bins, axis=0, return_inverse=True)
     group = group.ravel()
     total = np.asarray(np.bincount(group, weights), dtype=np.float64)
@@ -392,25 +399,26 @@ def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[Fl
         return weights, means, sds
     seen = weights > 1e-12
     weights, means, sds = weights[seen], means[seen], sds[seen]
-    place = np.floor((means - means.min()) / (np.ptp(means) / 300 + 1e-300)).astype(int)
-    size = np.floor(np.log(sds / sds.min()) / 0.05).astype(int)
-    _, group = np.unique(place * (size.max() + 1) + size, return_inverse=True)
+    mean_bin = np.floor((means - means.min()) / (np.ptp(means) / 300 + 1e-300)).astype(int)
+    sd_bin = np.floor(np.log(sds / sds.min()) / 0.05).astype(int)
+    _, group = np.unique(mean_bin * (sd_bin.max() + 1) + sd_bin, return_inverse=True)
     total = np.asarray(np.bincount(group, weights), dtype=np.float64)
     mean = np.bincount(group, weights * means) / total
     variance = np.bincount(group, weights * (sds**2 + (means - mean[group]) ** 2)) / total
     return total, np.asarray(mean, dtype=np.float64), np.sqrt(variance)
 
 
-def blended(parts: list[tuple[float, Marginal]], bounds: tuple[float, float]) -> Marginal:
+def blended(weighted_marginals: list[tuple[float, Marginal]], bounds: tuple[float, float]) -> Marginal:
     """Return the mixture, within bounds, of marginals with weights that sum to one."""
-    if len(parts) == 1:
-        return parts[0][1]
-    mean = sum(weight * part.mean for weight, part in parts)
-    variance = sum(weight * (part.sd**2 + (part.mean - mean) ** 2) for weight, part in parts)
-    points = np.unique(np.clip(np.concatenate([part.points for _, part in parts]), *bounds))
-    density = sum(weight * part.pdf(points) for weight, part in parts)
+    if len(weighted_marginals) == 1:
+        return weighted_marginals[0][1]
+    mean = sum(weight * marginal.mean for weight, marginal in weighted_marginals)
+    variance = sum(weight * (marginal.sd**2 + (marginal.mean - mean) ** 2) for weight, marginal in weighted_marginals)
+    points = np.unique(np.clip(np.concatenate([marginal.points for _, marginal in weighted_marginals]), *bounds))
+    density = sum(weight * marginal.pdf(points) for weight, marginal in weighted_marginals)
     cumulative = sum(
-        weight * np.interp(points, part.points, part.cumulative, left=0.0, right=1.0) for weight, part in parts
+        weight * np.interp(points, marginal.points, marginal.cumulative, left=0.0, right=1.0)
+        for weight, marginal in weighted_marginals
     )
     return Marginal(mean, float(np.sqrt(variance)), points, np.asarray(density), _proper(np.asarray(cumulative)))
 

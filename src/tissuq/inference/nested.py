@@ -75,10 +75,10 @@ def nested_log_density(
     in `nested_log_mass`.
     """
     shift = score[:, :, None] * triangle[:, None, 1:, 0]
-    each = (-1, low.shape[1] - 1)
-    rest = np.repeat(triangle[:, 1:, 1:], score.shape[1], axis=0)
-    ends = ((end[:, None, 1:] - shift).reshape(each) for end in (low, high))
-    inner, error = nested_log_mass(rest, *ends)
+    shape = (-1, low.shape[1] - 1)
+    inner_triangle = np.repeat(triangle[:, 1:, 1:], score.shape[1], axis=0)
+    ends = ((end[:, None, 1:] - shift).reshape(shape) for end in (low, high))
+    inner, error = nested_log_mass(inner_triangle, *ends)
     return inner.reshape(score.shape) - 0.5 * score**2 - 0.5 * np.log(2 * np.pi), error.reshape(score.shape)
 
 
@@ -101,17 +101,17 @@ def nested_draws(triangle: FloatArray, low: FloatArray, high: FloatArray, unifor
     uniforms : (M, R, k) array
         Between zero and one.
     """
-    count, each, k = uniforms.shape
+    count, draws, k = uniforms.shape
     if k == 1:
         start, stop = (end / triangle[:, 0] for end in (low, high))
         return interval_quantile(uniforms[:, :, 0], start, stop)[0][:, :, None]
     rows = zip(uniforms[:, :, 0], *_distribution(*nested_points(triangle, low, high)), strict=True)
-    first = np.array([np.interp(own, below, score) for own, below, score in rows])
-    shift = first[:, :, None] * triangle[:, None, 1:, 0]
+    first_score = np.array([np.interp(uniform, cumulative, scores) for uniform, cumulative, scores in rows])
+    shift = first_score[:, :, None] * triangle[:, None, 1:, 0]
     start, stop = ((end[:, None, 1:] - shift).reshape(-1, k - 1) for end in (low, high))
-    rest = np.repeat(triangle[:, 1:, 1:], each, axis=0)
-    others = nested_draws(rest, start, stop, uniforms[:, :, 1:].reshape(-1, 1, k - 1))
-    return np.concatenate([first[:, :, None], others.reshape(count, each, k - 1)], axis=2)
+    inner_triangle = np.repeat(triangle[:, 1:, 1:], draws, axis=0)
+    inner_scores = nested_draws(inner_triangle, start, stop, uniforms[:, :, 1:].reshape(-1, 1, k - 1))
+    return np.concatenate([first_score[:, :, None], inner_scores.reshape(count, draws, k - 1)], axis=2)
 
 
 def _distribution(score: FloatArray, log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -121,18 +121,18 @@ def _distribution(score: FloatArray, log_terms: FloatArray) -> tuple[FloatArray,
     by cubics that have the masses as slopes.
     """
     terms = np.exp(log_terms - log_terms.max(axis=1, keepdims=True)).reshape(len(score), PIECES, -1)
-    whole = terms.sum(axis=2, keepdims=True)
-    below = np.cumsum(terms, axis=2) - 0.5 * terms - np.gradient(terms, axis=2) / 12
-    below += np.cumsum(whole, axis=1) - whole
+    mass_of_piece = terms.sum(axis=2, keepdims=True)
+    cumulative = np.cumsum(terms, axis=2) - 0.5 * terms - np.gradient(terms, axis=2) / 12
+    cumulative += np.cumsum(mass_of_piece, axis=1) - mass_of_piece
     f = np.arange(FINER) / FINER
     basis = (1 + 2 * f) * (1 - f) ** 2, f**2 * (3 - 2 * f), f * (1 - f) ** 2, f**2 * (f - 1)
-    ends = below[:, :, :-1], below[:, :, 1:], terms[:, :, :-1], terms[:, :, 1:]
-    between = sum(end[..., None] * part for end, part in zip(ends, basis, strict=True))
+    ends = cumulative[:, :, :-1], cumulative[:, :, 1:], terms[:, :, :-1], terms[:, :, 1:]
+    between = sum(end[..., None] * weight for end, weight in zip(ends, basis, strict=True))
     nodes = score.reshape(terms.shape)
     start, width = nodes[:, :, :1], nodes[:, :, -1:] - nodes[:, :, :1]
-    places = _places(np.arange(-TICKS * FINER, TICKS * FINER) * STEP / FINER)[0]
-    fine = start + width * (places - places[0])
-    total = whole.sum(axis=1)
+    positions = _positions(np.arange(-TICKS * FINER, TICKS * FINER) * STEP / FINER)[0]
+    fine = start + width * (positions - positions[0])
+    total = mass_of_piece.sum(axis=1)
     return np.maximum.accumulate(between.reshape(len(score), -1) / total, axis=1), fine.reshape(len(score), -1)
 
 
@@ -153,9 +153,9 @@ def _nodes(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[Flo
         return nested_log_density(triangle, low, high, score)
 
     ends = _pieces(lambda score: log_density(score)[0], *_first_range(triangle, low, high))
-    place, log_weight, half = _rule()
+    position, log_weight, half = _rule()
     start, width = ends[:, :-1, None], np.maximum(np.diff(ends), 1e-300)[:, :, None]
-    score = (start + width * place).reshape(len(low), -1)
+    score = (start + width * position).reshape(len(low), -1)
     values, errors = log_density(score)
     return score, values + (np.log(width) + log_weight).reshape(len(low), -1), half.ravel(), errors
 
@@ -165,25 +165,25 @@ def _rectangle(triangle: FloatArray, low: FloatArray, high: FloatArray) -> Float
     from scipy.special import ndtr, owens_t
 
     sd = np.column_stack([triangle[:, 0, 0], np.hypot(triangle[:, 1, 0], triangle[:, 1, 1])])
-    correlation, rest = triangle[:, 1].T / sd[:, 1]
+    correlation, complement = triangle[:, 1].T / sd[:, 1]
 
-    def below(h: FloatArray, k: FloatArray) -> FloatArray:
+    def probability_below(h: FloatArray, k: FloatArray) -> FloatArray:
         value = 0.5 * (ndtr(h) + ndtr(k)) - np.where(h * k < 0, 0.5, 0.0)
         with np.errstate(over="ignore"):
-            value -= owens_t(h, (k - correlation * h) / (h * rest))
-            return np.asarray(value - owens_t(k, (h - correlation * k) / (k * rest)))
+            value -= owens_t(h, (k - correlation * h) / (h * complement))
+            return np.asarray(value - owens_t(k, (h - correlation * k) / (k * complement)))
 
     scores = (np.clip(end / sd, -FAR, FAR) for end in (low, high))
     (a, b), (c, d) = (np.where(score == 0, 1e-99, score).T for score in scores)
-    return below(c, d) - below(a, d) - below(c, b) + below(a, b)
+    return probability_below(c, d) - probability_below(a, d) - probability_below(c, b) + probability_below(a, b)
 
 
 def _first_range(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return ends of the first score beyond which no mass is: not far beyond the size of some scores within bounds."""
     scores = np.zeros(low.shape)
     for j in range(low.shape[1]):
-        before = np.einsum("mk,mk->m", triangle[:, j, :j], scores[:, :j])
-        scores[:, j] = np.clip(0.0, *((end[:, j] - before) / triangle[:, j, j] for end in (low, high)))
+        shift = np.einsum("mk,mk->m", triangle[:, j, :j], scores[:, :j])
+        scores[:, j] = np.clip(0.0, *((end[:, j] - shift) / triangle[:, j, j] for end in (low, high)))
     reach = np.sqrt((scores**2).sum(axis=1)) + REACH
     first_low, first_high = (end[:, 0] / triangle[:, 0, 0] for end in (low, high))
     return np.maximum(first_low, -reach), np.minimum(first_high, reach)
@@ -196,20 +196,20 @@ def _pieces(log_density: LogDensity, start: FloatArray, end: FloatArray) -> Floa
     enclose them.
     """
     rows = np.arange(len(start))
-    places = np.linspace(0, 1, GRID)
+    fractions = np.linspace(0, 1, GRID)
     for _ in range(ZOOMS):
-        grid = start[:, None] + (end - start)[:, None] * places
+        grid = start[:, None] + (end - start)[:, None] * fractions
         values = log_density(grid)
         best = values.argmax(axis=1)
         seen = values > values.max(axis=1, keepdims=True) - DROPS[0]
-        first, last = seen.argmax(axis=1), GRID - 1 - seen[:, ::-1].argmax(axis=1)
-        before, after = np.maximum(first - 1, 0), np.minimum(last + 1, GRID - 1)
-        start, end = grid[rows, before], grid[rows, after]
-        if (after - before >= GRID // 2).all():
+        leftmost, rightmost = seen.argmax(axis=1), GRID - 1 - seen[:, ::-1].argmax(axis=1)
+        outer_left, outer_right = np.maximum(leftmost - 1, 0), np.minimum(rightmost + 1, GRID - 1)
+        start, end = grid[rows, outer_left], grid[rows, outer_right]
+        if (outer_right - outer_left >= GRID // 2).all():
             break
     mode, top, reach = grid[rows, best], values.max(axis=1), grid[:, 1] - grid[:, 0]
     outer = np.column_stack([start, start, end, end])
-    inner = np.column_stack([grid[rows, first], mode, mode, grid[rows, last]])
+    inner = np.column_stack([grid[rows, leftmost], mode, mode, grid[rows, rightmost]])
     for _ in range(HALVINGS):
         middle, reach = 0.5 * (outer + inner), 0.5 * reach
         tried = np.column_stack([middle, mode - reach, mode, mode + reach])
@@ -228,13 +228,13 @@ def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
     Double exponential: insensitive to what is steep at the ends of a piece.
     """
     ticks = np.arange(-TICKS, TICKS + 1.0)
-    place, slope = _places(STEP * ticks)
+    position, slope = _positions(STEP * ticks)
     half = np.where(ticks % 2, 0.0, 2.0)
-    place, log_weight, half = (np.tile(each, (PIECES, 1)) for each in (place, np.log(STEP * slope), half))
-    return place, log_weight, half
+    position, log_weight, half = (np.tile(row, (PIECES, 1)) for row in (position, np.log(STEP * slope), half))
+    return position, log_weight, half
 
 
-def _places(t: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _positions(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return where the coordinate of the double exponential rule lies between zero and one, and the slope there."""
     inner = 0.5 * np.pi * np.sinh(t)
     return 0.5 * (1 + np.tanh(inner)), 0.25 * np.pi * np.cosh(t) / np.cosh(inner) ** 2

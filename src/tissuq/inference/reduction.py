@@ -213,11 +213,11 @@ def _along_spectra(fit: _Fit, spectra: Sequence[Spectrum]) -> list[Reduction]:
     ]
 
 
-def _products(shared: FloatArray, own: FloatArray) -> FloatArray:
+def _products(shared: FloatArray, separate: FloatArray) -> FloatArray:
     """Return, along r directions, products (..., B, r, q^2) of shared (..., r, q - 1) and own (..., B, r) columns."""
-    wide = np.broadcast_to(shared[..., None, :, :], (*own.shape, shared.shape[-1]))
-    columns = np.concatenate([wide, own[..., None]], axis=-1)
-    return np.asarray((columns[..., :, None] * columns[..., None, :]).reshape(*own.shape, -1))
+    wide = np.broadcast_to(shared[..., None, :, :], (*separate.shape, shared.shape[-1]))
+    columns = np.concatenate([wide, separate[..., None]], axis=-1)
+    return np.asarray((columns[..., :, None] * columns[..., None, :]).reshape(*separate.shape, -1))
 
 
 def divided_columns(model: StatisticalModel) -> tuple[list[int], list[int]]:

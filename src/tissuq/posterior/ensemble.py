@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.stability import calibrated_range, stable_draws
+from tissuq.assessment.stability import LOG_STRAIN_STEP, calibrated_range, stable_draws
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_modes
@@ -309,8 +309,12 @@ def _energies(
 
 
 def _ends(data: Experiment) -> Iterator[tuple[float, float]]:
-    """Return the ranges of I1 - 3, I2 - 3 and the logarithms of stretches in states whose invariants were measured."""
-    ranges = [data.states, *(mode.at(calibrated_range(data, mode)) for mode in _curve_modes())]
+    """Return the ranges of I1 - 3, I2 - 3 and the logarithms of stretches in states whose invariants were measured.
+
+    They reach a little farther, so that a slope at their ends is that of the draw and not of its continuation.
+    """
+    margin = 2 * LOG_STRAIN_STEP * np.array([-1, 1])
+    ranges = [data.states, *(mode.at(calibrated_range(data, mode) + margin) for mode in _curve_modes())]
     logs = [states.log_stretches[0] for states in ranges]
     for values in zip(*map(largest_invariants, ranges), strict=True):
         yield 0.0, max(values)

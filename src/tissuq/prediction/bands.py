@@ -16,6 +16,7 @@ from tissuq.experiments.reading.experiment_file import STRESS_TYPES
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.resampling import systematic
 from tissuq.inference.solution import Solution
+from tissuq.inference.threads import one_thread
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import stress_moments
@@ -196,8 +197,11 @@ def predict_average(
     solutions = [solution for _, solution in weighted_solutions]
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
-    mixtures = predictive_mixtures(weighted_solutions, points, loading, channel, discrepancy=discrepancy, noise=noise)
-    curves = [[mixture.mean, *map(mixture.quantile, tails)] for mixture in mixtures]
+    with one_thread():
+        mixtures = predictive_mixtures(
+            weighted_solutions, points, loading, channel, discrepancy=discrepancy, noise=noise
+        )
+        curves = [[mixture.mean, *map(mixture.quantile, tails)] for mixture in mixtures]
     return Band(loading.paths[channel].abscissa(points), *np.concatenate(curves, axis=1))
 
 

@@ -178,11 +178,11 @@ class _Integration:
         return value
 
 
-def _ceiling(conditional: ConditionalGaussian, given: Conditional) -> FloatArray:
+def _ceiling(conditional: ConditionalGaussian, gaussians: Conditional) -> FloatArray:
     """Return no less than the log mass (B, N) within the bounds of the linear parameters."""
-    shape, size, p = given.log_likelihood.shape, given.log_likelihood.size, given.mean.shape[2]
-    every = conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
-    return every.ceiling(given.mean.reshape(size, p), given.root.reshape(size, p, p)).reshape(shape)
+    shape, size, p = gaussians.log_likelihood.shape, gaussians.log_likelihood.size, gaussians.mean.shape[2]
+    boxes = conditional.boxes[np.repeat(np.arange(shape[0]), shape[1])]
+    return boxes.ceiling(gaussians.mean.reshape(size, p), gaussians.root.reshape(size, p, p)).reshape(shape)
 
 
 def _solution(integration: _Integration, index: int, seed: int) -> Solution:
@@ -205,11 +205,11 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
     integrated = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
     cut = "; bounds of the linear parameters cut the posterior and were honoured" if truncated.is_cut else ""
-    found = Solution(
+    solution = Solution(
         model, "exact", f"{linear}; {integrated}{cut}", truncated.components, Marginals.of(model, marginal), seed=seed
     )
     if any(isinstance(prior, Flat) for prior in model.priors.values()):
-        return found
+        return solution
     heavy = np.flatnonzero((weights > HEAVY) & (mass_outside.sum(axis=1) > HEAVY))
     log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
     error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY))
@@ -223,4 +223,4 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
         error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT) + error_of_mass)
     else:
         evidence, error_of_evidence = float(gaussians.log_likelihood[index, 0] + log_mass.sum()), error_of_mass
-    return replace(found, log_evidence=evidence, log_evidence_error=error_of_evidence)
+    return replace(solution, log_evidence=evidence, log_evidence_error=error_of_evidence)

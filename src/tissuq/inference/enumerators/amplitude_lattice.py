@@ -189,7 +189,7 @@ class _EnergySums:
         """Return components that stand for all points, taken as often as a power of their weights says."""
         points, node, weights = self._points, self._node, self._weights
         if len(weights) > REPRESENTED:
-            order = np.lexsort((points.noise_sd, points.first, points.second, points.lattice, node))
+            order = np.lexsort((points.noise_sd, points.first_index, points.second_index, points.lattice, node))
             representatives = order[systematic((weights**power)[order][None], REPRESENTED)[0]]  # neighbours are alike
             points, node, weights = (
                 points[representatives],

@@ -54,8 +54,8 @@ class Points:
     """
 
     lattice: Places
-    second: Places
-    first: Places
+    second_index: Places
+    first_index: Places
     noise_sd: FloatArray
     amplitudes: FloatArray
     log_weight: FloatArray
@@ -63,8 +63,8 @@ class Points:
     strain: FloatArray
     log_inside: FloatArray
 
-    def __getitem__(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
-        return Points(*(array[chosen] for array in vars(self).values()))
+    def __getitem__(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Points:
+        return Points(*(array[index] for array in vars(self).values()))
 
     @classmethod
     def joined(cls, point_sets: Sequence[Points]) -> Points:
@@ -119,7 +119,7 @@ class Weighing:
         coarse, last = 0.0, 0.0
         for member, lattice in enumerate(self._lattices):
             of_member_mask = at_even = points.lattice == member
-            for grid, indices in zip(lattice.ratios, (points.first, points.second), strict=True):
+            for grid, indices in zip(lattice.ratios, (points.first_index, points.second_index), strict=True):
                 at_even = at_even & ((indices % 2 == 0) | (len(grid) == 1))
                 last += mass[of_member_mask & (indices == len(grid) - 1) & (len(grid) > 1)].sum()
             coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[at_even].sum()
@@ -133,31 +133,33 @@ class Weighing:
         least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT))
         return [points[mass >= least_mass] for points, mass in zip(points_of_members, masses, strict=True)]
 
-    def _are_cut(self, every: Sequence[Points]) -> bool:
+    def _are_cut(self, point_sets: Sequence[Points]) -> bool:
         """Return whether the bounds of linear parameters take away much."""
         inside, total = 0.0, 0.0
-        for points, mass in zip(every, _masses(every), strict=True):
+        for points, mass in zip(point_sets, _masses(point_sets), strict=True):
             if len(points.lattice):
                 lattice = self._lattices[int(points.lattice[0])]
-                mean, root = lattice.linear(self._index, points.second, points.first)
+                mean, root = lattice.linear(self._index, points.second_index, points.first_index)
                 ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
                 inside, total = inside + float(mass @ np.exp(ceiling)), total + float(mass.sum())
         return inside < HARDLY_CUT * total
 
-    def _best_noise(self, place: int) -> Points:
+    def _best_noise(self, member: int) -> Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
-        lattice, noise = self._lattices[place], self._model.noise
-        second, first = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
-        misfit = lattice.misfit[second, first, self._index]
+        lattice, noise = self._lattices[member], self._model.noise
+        second_index, first_index = np.indices(lattice.misfit.shape[:2]).reshape(2, -1)
+        misfit = lattice.misfit[second_index, first_index, self._index]
         if not noise.parameters:
-            return self._weighed(place, second, first, misfit, np.full(len(second), float(noise.sd({}, 0.0))))
+            return self._weighed(
+                member, second_index, first_index, misfit, np.full(len(second_index), float(noise.sd({}, 0.0)))
+            )
         likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY), *np.exp(self._ends))
         most_likely_noise = np.sqrt(misfit / lattice.freedom)
-        candidates = [self._weighed(place, second, first, misfit, np.clip(most_likely_noise, *likely))]
+        candidates = [self._weighed(member, second_index, first_index, misfit, np.clip(most_likely_noise, *likely))]
         rise = _rise(candidates[0])
         for share in np.linspace(0, 1, TRIED)[1:] if rise.max() > HARDLY_PULLED else ():
             noise_sd = np.clip(most_likely_noise * np.exp(share * rise), *likely)
-            candidates.append(self._weighed(place, second, first, misfit, noise_sd))
+            candidates.append(self._weighed(member, second_index, first_index, misfit, noise_sd))
         best = np.argmax([points.log_weight + points.log_inside for points in candidates], axis=0)
         arrays = zip(*(vars(points).values() for points in candidates), strict=True)
         return Points(*(np.stack(values)[best, np.arange(len(best))] for values in arrays))
@@ -185,31 +187,39 @@ class Weighing:
             logs, cells = low + (high - low) * nodes, (high - low) * cells
         noise_sd = np.exp(logs).ravel()
         rows = np.repeat(np.arange(len(points.misfit)), len(nodes))
-        points_of_noise = self._weighed(member, points.second[rows], points.first[rows], points.misfit[rows], noise_sd)
+        points_of_noise = self._weighed(
+            member, points.second_index[rows], points.first_index[rows], points.misfit[rows], noise_sd
+        )
         log_cell = log_prior_of_noise(self._model, self._ratios, noise_sd) + np.log(
             np.broadcast_to(cells, logs.shape).ravel()
         )
         return replace(points_of_noise, log_weight=points_of_noise.log_weight + log_cell)
 
-    def _weighed(self, place: int, second: Places, first: Places, misfit: FloatArray, noise_sd: FloatArray) -> Points:
+    def _weighed(
+        self, member: int, second_index: Places, first_index: Places, misfit: FloatArray, noise_sd: FloatArray
+    ) -> Points:
         """Return points of a lattice with their weights: likelihood and prior of member and amplitudes."""
-        lattice, symbols = self._lattices[place], self._model.energy_symbols
-        amplitudes = np.zeros((len(first), len(symbols)))
-        log_weight = lattice.log_likelihood(self._index, second, first, noise_sd) + np.log(lattice.member.probability)
-        strain, log_inside = np.zeros(len(first)), np.zeros(len(first))
+        lattice, symbols = self._lattices[member], self._model.energy_symbols
+        amplitudes = np.zeros((len(first_index), len(symbols)))
+        log_weight = lattice.log_likelihood(self._index, second_index, first_index, noise_sd) + np.log(
+            lattice.member.probability
+        )
+        strain, log_inside = np.zeros(len(first_index)), np.zeros(len(first_index))
         if self._is_pulled:
-            mean, root = lattice.linear(self._index, second, first)
+            mean, root = lattice.linear(self._index, second_index, first_index)
             strain = self._priors.strain(mean, root)
             mean, root, log_mass = self._priors.times(mean, root * noise_sd[:, None, None])
             log_weight, log_inside = log_weight + log_mass, self._priors.box.ceiling(mean, root)
-        grids_and_indices = ((lattice.ratios[0], first), (lattice.ratios[1], second))
+        grids_and_indices = ((lattice.ratios[0], first_index), (lattice.ratios[1], second_index))
         for amplitude, (grid, place_on_grid) in zip(lattice.member.amplitude_indices, grids_and_indices, strict=False):
             amplitudes[:, amplitude] = grid[place_on_grid] * noise_sd
             log_weight += log_prior_of_amplitude(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
             # The first point stands for all smaller amplitudes, too, among which the density is constant.
             log_weight += np.log(np.where(place_on_grid == 0, lattice.step / -np.expm1(-lattice.step), lattice.step))
-        member_of_point = np.full(len(first), place)
-        return Points(member_of_point, second, first, noise_sd, amplitudes, log_weight, misfit, strain, log_inside)
+        member_of_point = np.full(len(first_index), member)
+        return Points(
+            member_of_point, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside
+        )
 
 
 def log_prior_of_amplitude(prior: Prior, amplitude: FloatArray) -> FloatArray:
@@ -257,9 +267,9 @@ def _rise(points: Points) -> FloatArray:
     return np.asarray(0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY)))
 
 
-def _masses(every: Sequence[Points]) -> list[FloatArray]:
+def _masses(point_sets: Sequence[Points]) -> list[FloatArray]:
     """Return the masses of the points of several sets, within bounds at most, over the largest of all."""
-    logs = [points.log_weight + points.log_inside for points in every]
+    logs = [points.log_weight + points.log_inside for points in point_sets]
     top = max(log_masses.max(initial=-np.inf) for log_masses in logs)
     return [np.exp(log_masses - top) for log_masses in logs]
 

@@ -85,15 +85,15 @@ def adapted(log_density: Callable[[FloatArray], FloatArray], dimension: int, cou
     return proposal
 
 
-def _tempered(log_weights: FloatArray, least: float) -> tuple[FloatArray, float]:
+def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:
     """Return normalised weights to the largest power at most one that leaves ``least`` effective, and that power."""
     low, high = 0.0, 1.0
-    if effective(log_weights) >= least:
+    if effective(log_weights) >= min_effective:
         low = 1.0
     else:
         for _ in range(40):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if effective(middle * log_weights) >= least else (low, middle)
+            low, high = (middle, high) if effective(middle * log_weights) >= min_effective else (low, middle)
     weights = np.exp(low * (log_weights - log_weights.max()))
     return weights / weights.sum(), low
 

@@ -100,7 +100,7 @@ class Directions:
         The stresses of each block's terms at the measurements.
     count : int
         How many measurements the rows stand for.
-    least : float
+    negligible_stress : float
         A stress that counts as that of a block without stress in this mode.
     unlikely : list of float
         For each block, a ratio g = c / noise_sd below which it is not likely to be before the data.
@@ -120,14 +120,14 @@ class Directions:
         scale: FloatArray,
         features: list[FloatArray],
         count: int,
-        least: float,
+        negligible_stress: float,
         unlikely: list[float],
         step: float = STEP,
         shift: float = 0.0,
     ) -> None:
         self.member, self.step = member, step
         features = [block / scale[:, None] for block in features]
-        sizes = (max(float(np.sqrt((block**2).sum() / count)), least) for block in features)
+        sizes = (max(float(np.sqrt((block**2).sum() / count)), negligible_stress) for block in features)
         pairs = zip(sizes, unlikely, strict=True)
         grids = [*(_grid(size, low, step, shift) for size, low in pairs), *[np.zeros(1)] * 2]
         self.ratios = grids[0], grids[1]

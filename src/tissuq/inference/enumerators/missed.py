@@ -65,5 +65,5 @@ def has_missed(
     return False
 
 
-def _depth(place: FloatArray, log_density: Callable[[FloatArray], FloatArray]) -> float:
-    return -float(log_density(place[None])[0])
+def _depth(point: FloatArray, log_density: Callable[[FloatArray], FloatArray]) -> float:
+    return -float(log_density(point[None])[0])

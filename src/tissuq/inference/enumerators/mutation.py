@@ -72,8 +72,10 @@ class Mutation:
             self.step_size *= float(np.exp(acceptance[0] - TARGET_ACCEPTANCE))
             self.step_size = min(self.step_size, LONGEST_STEP)
             accepted.append(acceptance)
-            before, after = (np.linalg.solve(root, array.reshape(-1, len(root)).T) for array in (start, lines))
-            moved = _has_moved(before, after, distances)
+            whitened_start, whitened_lines = (
+                np.linalg.solve(root, array.reshape(-1, len(root)).T) for array in (start, lines)
+            )
+            moved = _has_moved(whitened_start, whitened_lines, distances)
         return lines, log_likelihoods, len(distances), moved, np.mean(accepted, axis=0)
 
 
@@ -83,16 +85,16 @@ def _covariance(lines: Floats) -> Floats:
     return covariance + 1e-10 * np.diag(np.diag(covariance) + np.finfo(float).tiny)
 
 
-def _has_moved(start: Floats, now: Floats, distances: list[Floats]) -> bool:
+def _has_moved(start: Floats, current: Floats, distances: list[Floats]) -> bool:
     """Return whether the particles have forgotten their start in every whitened direction, (d, particles) arrays.
 
     Either they are uncorrelated with it, or the median distance from it has stopped to grow: for a particle that
     wanders, doubling the sweeps doubles its square. In separated modes, where all remember their mode, only the
     second can happen.
     """
-    distances.append(np.median(np.abs(now - start), axis=1) ** 2)
+    distances.append(np.median(np.abs(current - start), axis=1) ** 2)
     sweeps = len(distances)
-    correlations = np.array([np.corrcoef(*pair)[0, 1] for pair in zip(start, now, strict=True)])
+    correlations = np.array([np.corrcoef(*pair)[0, 1] for pair in zip(start, current, strict=True)])
     has_moved = np.abs(correlations) < FORGOTTEN
     if sweeps >= 4:
         has_moved |= distances[-1] < STOPPED * distances[(sweeps + 1) // 2 - 1]
@@ -166,8 +168,10 @@ def _jumps(clouds: Floats, generator: np.random.Generator) -> Floats:
     """
     runs, draws, dimension = clouds.shape
     shape = (runs, draws, dimension)
-    one, other = (clouds[np.arange(runs)[:, None, None], generator.integers(draws, size=shape)] for _ in range(2))
+    particle, partner = (
+        clouds[np.arange(runs)[:, None, None], generator.integers(draws, size=shape)] for _ in range(2)
+    )
     shortened = 2.38 / np.sqrt(2 * dimension) * SHORTEST ** generator.random(shape)
     sizes = np.where(generator.random(shape) < 0.1, 1.0, shortened)[..., None]
-    takes_part = (generator.random((*shape, 1)) < 0.5) | (generator.random(one.shape) < 0.5)
-    return np.asarray((one - other) * sizes * takes_part)
+    takes_part = (generator.random((*shape, 1)) < 0.5) | (generator.random(particle.shape) < 0.5)
+    return np.asarray((particle - partner) * sizes * takes_part)

@@ -89,14 +89,14 @@ class _Terms:
         self._features = [models[0].energy_features(member) for member in range(len(self._members))]
         unit, _ = invariant_rates(models[0].states)
         self._count = models[0].experiment.size
-        self._least = float(np.sqrt((models[0].rows(unit) ** 2).sum() / self._count))
+        self._negligible_stress = float(np.sqrt((models[0].rows(unit) ** 2).sum() / self._count))
 
-    def directions(self, place: int, scale: FloatArray, step: float = STEP, shift: float = 0.0) -> Directions:
+    def directions(self, index: int, scale: FloatArray, step: float = STEP, shift: float = 0.0) -> Directions:
         """Return the directions of one member for the noise (n,) of every measurement over noise_sd."""
-        member, features = self._members[place], self._features[place]
+        member, features = self._members[index], self._features[index]
         symbols = [self._models[0].energy_symbols[block] for block in member.amplitude_indices]
         unlikely = [min(float(m.priors[s].quantile(UNLIKELY)) / _most_noise(m) for m in self._models) for s in symbols]
-        return Directions(member, scale, features, self._count, self._least, unlikely, step, shift)
+        return Directions(member, scale, features, self._count, self._negligible_stress, unlikely, step, shift)
 
 
 class _Sums:
@@ -156,6 +156,6 @@ def _linear(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[Fl
     for member in np.unique(points.lattice):
         of_member = np.flatnonzero(points.lattice == member)
         mean[of_member], root[of_member] = lattices[member].linear(
-            index, points.second[of_member], points.first[of_member]
+            index, points.second_index[of_member], points.first_index[of_member]
         )
     return mean, root

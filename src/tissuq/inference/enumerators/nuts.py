@@ -69,9 +69,9 @@ class NutsSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, least in (("chains", 2), ("warmup", 20), ("draws", 4), ("thinning", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise InputError(f"NUTS {name}: {getattr(self, name)} is too few; use at least {least}.")
+        for name, minimum in (("chains", 2), ("warmup", 20), ("draws", 4), ("thinning", 1), ("seed", 0)):
+            if getattr(self, name) < minimum:
+                raise InputError(f"NUTS {name}: {getattr(self, name)} is too few; use at least {minimum}.")
         if not 0 < self.target_acceptance < 1:
             raise InputError(f"NUTS target_acceptance: {self.target_acceptance} is not between 0 and 1.")
 
@@ -110,17 +110,17 @@ class NutsDraws(Draws):
         worst = int(np.argmax(self.rhat))
         failures = []
         if not self.rhat[worst] < MAX_RHAT:
-            found = f"R-hat is {self.rhat[worst]:.3f} for {self.names[worst]} and must be below {MAX_RHAT}"
-            failures.append((found, LONGER))
+            fault = f"R-hat is {self.rhat[worst]:.3f} for {self.names[worst]} and must be below {MAX_RHAT}"
+            failures.append((fault, LONGER))
             if not self.rhat[worst] < SEPARATE_RHAT:
                 failures.append(("the chains stay in different places", "a narrower prior that leaves one mode"))
         failures += self._small_sizes(MIN_ESS_PER_CHAIN * len(self.values), LONGER)
         if not self.divergences < MAX_DIVERGENT_SHARE * self.energies.size:
-            found = f"{self.divergences} of {self.energies.size} trajectories diverged"
-            failures.append((found, "a target acceptance closer to one, such as 0.99"))
+            fault = f"{self.divergences} of {self.energies.size} trajectories diverged"
+            failures.append((fault, "a target acceptance closer to one, such as 0.99"))
         if not self.bfmi.min() > MIN_BFMI:
-            found = f"the BFMI is {self.bfmi.min():.2f} and must exceed {MIN_BFMI}"
-            failures.append((found, "a narrower prior on the parameters that set a scale"))
+            fault = f"the BFMI is {self.bfmi.min():.2f} and must exceed {MIN_BFMI}"
+            failures.append((fault, "a narrower prior on the parameters that set a scale"))
         return failures
 
 
@@ -187,14 +187,14 @@ def sample_nuts(
     if len(labels) != dimension:
         raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
     generator = np.random.default_rng(settings.seed)
-    given = () if data is None else (data,)
-    derivatives = derivatives_on_line(log_density, box, *given)
+    arguments = () if data is None else (data,)
+    derivatives = derivatives_on_line(log_density, box, *arguments)
     modes = find_modes(derivatives, box, start, generator)
     states = _overdispersed(derivatives, modes, settings.chains, generator)
     run = _compiled_run(log_density, *_bounds(box), replace(settings, seed=0))
     key = jax.random.key(settings.seed)
-    found = run(key, states, _schedule(settings), modes[0].location, modes[0].scale, *given)
-    values, energies, divergent, leapfrogs = (np.asarray(array) for array in found)
+    trace = run(key, states, _schedule(settings), modes[0].location, modes[0].scale, *arguments)
+    values, energies, divergent, leapfrogs = (np.asarray(array) for array in trace)
     gradients = float(leapfrogs.mean()) * settings.thinning
     return NutsDraws(values, labels, energies, int(divergent.sum()), gradients)
 
@@ -269,10 +269,10 @@ def _compiled_run(
         keys = jax.random.split(key, len(schedule[0]))
         start = (states, _untuned(len(location), settings.target_acceptance))
         _, trace = jax.lax.scan(iterate, start, (keys, *schedule))
-        positions, *others = (jnp.swapaxes(array[settings.warmup :], 0, 1) for array in trace)
-        kept = slice(settings.thinning - 1, None, settings.thinning)
+        positions, *statistics = (jnp.swapaxes(array[settings.warmup :], 0, 1) for array in trace)
+        thinned = slice(settings.thinning - 1, None, settings.thinning)
         to_box: Any = jax.vmap(jax.vmap(lambda whitened: box.from_line(to_line(whitened))))
-        return to_box(positions[:, kept]), *others
+        return to_box(positions[:, thinned]), *statistics
 
     return run
 

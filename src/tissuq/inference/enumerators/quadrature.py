@@ -34,15 +34,15 @@ class Cells:
     width: FloatArray
     log_values: FloatArray
 
-    def __getitem__(self, chosen: NDArray[np.bool_]) -> Cells:
-        return Cells(self.lower[chosen], self.width[chosen], self.log_values[:, chosen])
+    def __getitem__(self, index: NDArray[np.bool_]) -> Cells:
+        return Cells(self.lower[index], self.width[index], self.log_values[:, index])
 
-    def joined(self, other: Cells) -> Cells:
+    def joined(self, more: Cells) -> Cells:
         """Return these cells followed by others."""
         return Cells(
-            np.concatenate([self.lower, other.lower]),
-            np.concatenate([self.width, other.width]),
-            np.concatenate([self.log_values, other.log_values], axis=1),
+            np.concatenate([self.lower, more.lower]),
+            np.concatenate([self.width, more.width]),
+            np.concatenate([self.log_values, more.log_values], axis=1),
         )
 
 
@@ -52,7 +52,7 @@ class Lines:
 
     Attributes
     ----------
-    before : (K, j) array
+    preceding : (K, j) array
         The coordinates before side j at which each line lies.
     start, width : (K,) arrays
         Its interval along side j.
@@ -60,30 +60,30 @@ class Lines:
         Its Legendre coefficients, times its weight: all lines together integrate to one.
     """
 
-    before: FloatArray
+    preceding: FloatArray
     start: FloatArray
     width: FloatArray
     series: FloatArray
 
     def integrate_to(self, coordinates: FloatArray) -> FloatArray:
         """Return the sum over lines of their integrals up to the coordinates (K, k) of each: (k,)."""
-        whole = self.series[:, 0] * self.width
+        full_integral = self.series[:, 0] * self.width
         passed = coordinates >= (self.start + self.width)[:, None]
-        line, place, t = self._inside(coordinates)
+        line, column, t = self._inside(coordinates)
         integral = np.asarray(legendre.legint(self.series.T, lbnd=-1).T, dtype=np.float64)[line]
         partial = 0.5 * self.width[line] * _row_values(integral, t)
-        return whole @ passed.astype(np.float64) + _summed(place, partial, coordinates.shape[1])
+        return full_integral @ passed.astype(np.float64) + _summed(column, partial, coordinates.shape[1])
 
     def evaluate(self, coordinates: FloatArray, factor: FloatArray) -> FloatArray:
         """Return the sum over lines of their values at the coordinates (K, k) of each, times factors (K, k)."""
-        line, place, t = self._inside(coordinates)
-        values = _row_values(self.series[line], t) * factor[line, place]
-        return _summed(place, values, coordinates.shape[1])
+        line, column, t = self._inside(coordinates)
+        values = _row_values(self.series[line], t) * factor[line, column]
+        return _summed(column, values, coordinates.shape[1])
 
     def _inside(self, coordinates: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
         t = 2 * (coordinates - self.start[:, None]) / self.width[:, None] - 1
-        line, place = np.nonzero((t >= -1) & (t < 1))
-        return line, place, t[line, place]
+        line, column = np.nonzero((t >= -1) & (t < 1))
+        return line, column, t[line, column]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,13 +114,13 @@ class Quadrature:
         order = ORDERS[dimension]
         values = np.exp(self.cells.log_values[index] - self.log_integral[index])
         values = values.reshape(-1, order**side, order, order ** (dimension - side - 1))
-        others = np.prod(np.delete(self.cells.width, side, axis=1), axis=1)
+        cross_section = np.prod(np.delete(self.cells.width, side, axis=1), axis=1)
         weighted = (values @ _rule(order, dimension - side - 1)) * _rule(order, side)[:, None]
-        series = (weighted * others[:, None, None]) @ _to_legendre(order).T
-        before = _cell_points(self.cells.lower[:, :side], self.cells.width[:, :side], order)
-        repeat = before.shape[1]
+        series = (weighted * cross_section[:, None, None]) @ _to_legendre(order).T
+        preceding = _cell_points(self.cells.lower[:, :side], self.cells.width[:, :side], order)
+        repeat = preceding.shape[1]
         return Lines(
-            before.reshape(len(before) * repeat, side),
+            preceding.reshape(len(preceding) * repeat, side),
             np.repeat(self.cells.lower[:, side], repeat),
             np.repeat(self.cells.width[:, side], repeat),
             series.reshape(-1, order),
@@ -207,13 +207,13 @@ def _halved(log_function: LogFunction, cells: Cells, error: FloatArray, side: ND
     """Halve the worst cells that together hold nine tenths of the error."""
     order = np.argsort(error)[::-1]
     count = int(np.searchsorted(np.cumsum(error[order]), 0.9 * error.sum())) + 1
-    chosen = np.zeros(len(error), dtype=bool)
-    chosen[order[:count]] = True
-    halved = (np.arange(cells.lower.shape[1]) == side[chosen][:, None]) * 0.5
-    width = cells.width[chosen] * (1 - halved)
-    upper_half = cells.lower[chosen] + cells.width[chosen] * halved
-    lower = np.concatenate([cells.lower[chosen], upper_half])
-    return cells[~chosen].joined(_evaluated(log_function, lower, np.concatenate([width, width])))
+    is_halved = np.zeros(len(error), dtype=bool)
+    is_halved[order[:count]] = True
+    halved = (np.arange(cells.lower.shape[1]) == side[is_halved][:, None]) * 0.5
+    width = cells.width[is_halved] * (1 - halved)
+    upper_half = cells.lower[is_halved] + cells.width[is_halved] * halved
+    lower = np.concatenate([cells.lower[is_halved], upper_half])
+    return cells[~is_halved].joined(_evaluated(log_function, lower, np.concatenate([width, width])))
 
 
 def _finish(cells: Cells, top: FloatArray, integrals: FloatArray, error: FloatArray) -> Quadrature:
@@ -222,16 +222,16 @@ def _finish(cells: Cells, top: FloatArray, integrals: FloatArray, error: FloatAr
     total = integrals.sum(axis=1, keepdims=True)
     masses = np.prod(cells.width, axis=1)[:, None] * np.exp(cells.log_values - top[:, None, None]) * rule
     weights = (masses / total[:, :, None]).reshape(len(top), -1)
-    kept = np.flatnonzero((weights > 1e-12 * weights.max(axis=1, keepdims=True)).any(axis=0))
-    points = _cell_points(cells.lower, cells.width, ORDERS[dimension]).reshape(-1, dimension)[kept]
-    weights = weights[:, kept] / weights[:, kept].sum(axis=1, keepdims=True)
+    significant = np.flatnonzero((weights > 1e-12 * weights.max(axis=1, keepdims=True)).any(axis=0))
+    points = _cell_points(cells.lower, cells.width, ORDERS[dimension]).reshape(-1, dimension)[significant]
+    weights = weights[:, significant] / weights[:, significant].sum(axis=1, keepdims=True)
     fall = np.minimum(error / np.maximum(integrals / total, 1e-300), 1.0)
     return Quadrature(cells, top + np.log(total[:, 0]), (error * fall).sum(axis=1), points, weights)
 
 
-def _summed(place: NDArray[np.intp], values: FloatArray, count: int) -> FloatArray:
+def _summed(column: NDArray[np.intp], values: FloatArray, count: int) -> FloatArray:
     """Return the sums of the values that belong to each of ``count`` places."""
-    return np.asarray(np.bincount(place, values, minlength=count), dtype=np.float64)
+    return np.asarray(np.bincount(column, values, minlength=count), dtype=np.float64)
 
 
 def _row_values(series: FloatArray, t: FloatArray) -> FloatArray:

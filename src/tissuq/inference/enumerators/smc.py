@@ -56,9 +56,9 @@ class SmcSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, least in (("runs", 4), ("particles", 50 * self.runs), ("max_sweeps", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise InputError(f"SMC {name}: {getattr(self, name)} is too few; use at least {least}.")
+        for name, minimum in (("runs", 4), ("particles", 50 * self.runs), ("max_sweeps", 1), ("seed", 0)):
+            if getattr(self, name) < minimum:
+                raise InputError(f"SMC {name}: {getattr(self, name)} is too few; use at least {minimum}.")
         if self.particles % self.runs:
             raise InputError(f"SMC particles: {self.particles} is not a multiple of the {self.runs} runs.")
         if not 0.5 <= self.ess_fraction <= 0.9:
@@ -148,17 +148,17 @@ class SmcDraws(Draws):
         failures = []
         worst = int(np.argmax(self.rhat))
         if not self.rhat[worst] < MAX_RHAT:
-            found = f"R-hat between runs is {self.rhat[worst]:.3f} for {self.names[worst]}"
-            failures.append((f"{found} and must be below {MAX_RHAT}", MORE))
+            fault = f"R-hat between runs is {self.rhat[worst]:.3f} for {self.names[worst]}"
+            failures.append((f"{fault} and must be below {MAX_RHAT}", MORE))
         failures += self._small_sizes(MIN_ESS, MORE)
         if not self.log_evidence_error < MAX_LOG_EVIDENCE_ERROR:
-            found = f"the standard error of the log evidence is {self.log_evidence_error:.2f}"
-            failures.append((f"{found} and must be below {MAX_LOG_EVIDENCE_ERROR}", MORE))
+            fault = f"the standard error of the log evidence is {self.log_evidence_error:.2f}"
+            failures.append((f"{fault} and must be below {MAX_LOG_EVIDENCE_ERROR}", MORE))
         # Particles that hardly moved show in the diagnostics above; on their own they are no failure.
         stuck = np.count_nonzero(~self.moved)
         if failures and stuck:
-            found = f"at {stuck} of {len(self.moved)} temperatures the particles still remember their start"
-            failures.append((f"{found} after {self.sweeps.max()} sweeps", "more sweeps (max_sweeps)"))
+            fault = f"at {stuck} of {len(self.moved)} temperatures the particles still remember their start"
+            failures.append((f"{fault} after {self.sweeps.max()} sweeps", "more sweeps (max_sweeps)"))
         return failures
 
 
@@ -244,13 +244,13 @@ def sample_smc(
     labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
     if len(labels) != dimension:
         raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
-    given = () if data is None else (data,)
+    arguments = () if data is None else (data,)
     program = compiled_program(log_likelihood, log_prior, tuple(box.lower.tolist()), tuple(box.upper.tolist()))
     lines = _starting_lines(box, prior_draws, settings)
-    log_likelihoods = _log_likelihoods_at_start(program, lines, given)
+    log_likelihoods = _log_likelihoods_at_start(program, lines, arguments)
     # Not the plain seed: the caller may have drawn the prior's particles from it.
     generator = np.random.default_rng([settings.seed, 3])
-    mutation = Mutation(program, given, settings.max_sweeps, settings.seed, generator)
+    mutation = Mutation(program, arguments, settings.max_sweeps, settings.seed, generator)
 
     temperature = 0.0
     steps: list[tuple[Any, ...]] = []
@@ -266,8 +266,8 @@ def sample_smc(
         log_weights = rise * log_likelihoods
         increment = logsumexp(log_weights, axis=1)
         reweighted = np.where(log_weights > -np.inf, log_weights, 0) * np.exp(log_weights - increment[:, None])
-        chosen = resampled_at_random(log_weights, generator)
-        lines = np.take_along_axis(lines, chosen[:, :, None], axis=1)
+        survivors = resampled_at_random(log_weights, generator)
+        lines = np.take_along_axis(lines, survivors[:, :, None], axis=1)
         lines, log_likelihoods, *moves = mutation(lines, temperature)
         drift = rise * log_likelihoods.mean(1) - reweighted.sum(1)
         steps.append((increment - np.log(log_weights.shape[1]), drift, temperature, *moves))
@@ -304,7 +304,7 @@ def _log_likelihoods_at_start(program: Program, lines: Floats, data: tuple[Any, 
     return log_likelihoods
 
 
-def _rise(log_likelihoods: Floats, most: float, ess_fraction: float) -> float:
+def _rise(log_likelihoods: Floats, largest_rise: float, ess_fraction: float) -> float:
     """Return the rise in temperature that leaves a share of the particles effective, on average over the runs.
 
     The share is of the particles with a positive likelihood: no rise brings back the others.
@@ -316,10 +316,10 @@ def _rise(log_likelihoods: Floats, most: float, ess_fraction: float) -> float:
         log_ess = 2 * logsumexp(weights, axis=1) - logsumexp(2 * weights, axis=1)
         return bool(np.mean(np.exp(log_ess) / positive.sum(1)) >= ess_fraction)
 
-    if is_small(most):
-        return most
+    if is_small(largest_rise):
+        return largest_rise
     finite = log_likelihoods[positive]
-    low, high = np.log(min(most, 1e-3 / np.ptp(finite))), np.log(most)
+    low, high = np.log(min(largest_rise, 1e-3 / np.ptp(finite))), np.log(largest_rise)
     while high - low > 1e-3:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_small(np.exp(middle)) else (low, middle)

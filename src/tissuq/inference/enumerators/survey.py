@@ -48,10 +48,12 @@ class Survey:
 
 def log_prior_density(priors: Sequence[Sequence[Prior]], h: FloatArray) -> FloatArray:
     """Return the log prior density (B, N) of parameters (B, N, d) under the d priors of each data set."""
-    if all(own == priors[0] for own in priors):
+    if all(priors_of_one == priors[0] for priors_of_one in priors):
         columns = zip(priors[0], np.moveaxis(h, 2, 0), strict=True)
         return np.asarray(sum(prior.log_density(column) for prior, column in columns))
-    return np.array([log_prior_density([own], row[None])[0] for own, row in zip(priors, h, strict=True)])
+    return np.array(
+        [log_prior_density([priors_of_one], row[None])[0] for priors_of_one, row in zip(priors, h, strict=True)]
+    )
 
 
 def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: LogDensity) -> Survey:
@@ -70,7 +72,7 @@ def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: Lo
     log_likelihood : callable
         Maps parameters (B, N, d), with a structure shared by the data sets, to (B, N) values.
     """
-    supports = np.array([[prior.support for prior in own] for own in priors])
+    supports = np.array([[prior.support for prior in priors_of_one] for priors_of_one in priors])
     is_log = np.asarray((supports[:, :, 0] >= 0).all(axis=0), dtype=np.bool_)
     with np.errstate(divide="ignore"):
         bounds = np.where(is_log[:, None], np.log(np.maximum(supports, 0.0)), supports)
@@ -80,8 +82,8 @@ def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: Lo
         value = log_likelihood(h) + log_prior_density(priors, h) + (g * is_log).sum(axis=2)
         return np.where(np.isnan(value), -np.inf, value)
 
-    probes = [_probes(own, is_log) for own in priors]
-    probes_of_others = np.array([_grid(own[structure:]) for own in probes])
+    probes = [_probes(priors_of_one, is_log) for priors_of_one in priors]
+    probes_of_others = np.array([_grid(probes_of_one[structure:]) for probes_of_one in probes])
     low, high = (np.array([end(line) for line in probes[0][:structure]]) for end in (min, max))
     for _ in range(ZOOMS):
         settings, spacing = _lattice(low, high)
@@ -98,8 +100,8 @@ def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: Lo
     away = points - mean[:, None]
     covariance = np.einsum("bk,bki,bkj->bij", weights, away, away)
     covariance[:, structure:, structure:] += np.einsum("bk,bkij->bij", weights, covariances)
-    own = np.arange(structure)
-    covariance[:, own, own] += np.maximum(spacing, 1e-6) ** 2 / 12
+    diagonal = np.arange(structure)
+    covariance[:, diagonal, diagonal] += np.maximum(spacing, 1e-6) ** 2 / 12
     return Survey(structure, is_log, bounds[:, :, 0], bounds[:, :, 1], mean, covariance)
 
 
@@ -129,13 +131,13 @@ def _modes(
     """Return the modes (B, K, t) of the other coordinates at K settings, their covariances, and log masses (B, K)."""
     count, (data_sets, _, t) = len(settings), probes.shape
 
-    def at(points: FloatArray) -> FloatArray:
+    def evaluate(points: FloatArray) -> FloatArray:
         """Evaluate (B, K, P) at the other coordinates (B, K, P, t)."""
         fixed = np.broadcast_to(settings[:, None], (*points.shape[:3], settings.shape[1]))
         g = np.concatenate([fixed, points], axis=3)
         return log_posterior(g.reshape(data_sets, -1, g.shape[3])).reshape(points.shape[:3])
 
-    tried = at(np.broadcast_to(probes[:, None], (data_sets, count, *probes.shape[1:])))
+    tried = evaluate(np.broadcast_to(probes[:, None], (data_sets, count, *probes.shape[1:])))
     best = tried.argmax(axis=2)
     if not t:
         return np.zeros((data_sets, count, 0)), np.zeros((data_sets, count, 0, 0)), tried[:, :, 0]
@@ -143,23 +145,23 @@ def _modes(
     inside = np.where(np.isfinite(bounds), bounds, np.sign(bounds) * 1e6)
     margin = 1e-4 * np.minimum(inside[:, :, 1] - inside[:, :, 0], 1.0)
     low, high = (inside[:, :, 0] + margin)[:, None], (inside[:, :, 1] - margin)[:, None]
-    point, value, curvature = _climb(at, np.clip(start, low, high), low, high)
+    point, value, curvature = _climb(evaluate, np.clip(start, low, high), low, high)
     covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
     return point, covariance, value + 0.5 * np.linalg.slogdet(covariance)[1]
 
 
 def _climb(
-    at: LogDensity, point: FloatArray, low: FloatArray, high: FloatArray
+    evaluate: LogDensity, point: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Climb to the modes, all at once, by damped Newton steps on finite differences."""
-    value, gradient, curvature = _derivatives(at, point)
+    value, gradient, curvature = _derivatives(evaluate, point)
     damping = np.full(value.shape, 1e-2)
     done = ~np.isfinite(value)
     for _ in range(NEWTON_STEPS):
         steep = curvature + damping[..., None, None] * np.eye(point.shape[-1])
         step = np.linalg.solve(steep, gradient[..., None])[..., 0]
         trial = np.clip(point + np.clip(step, -2.0, 2.0), low, high)
-        derivatives = _derivatives(at, trial)
+        derivatives = _derivatives(evaluate, trial)
         better = (derivatives[0] > value) & ~done
         moved = np.abs(trial - point).max(axis=-1)
         point = np.where(better[..., None], trial, point)
@@ -174,13 +176,13 @@ def _climb(
     return point, value, curvature
 
 
-def _derivatives(at: LogDensity, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _derivatives(evaluate: LogDensity, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return values, gradients and negative Hessians, made positive, from finite differences."""
     t = point.shape[-1]
     pairs = [(i, j) for i in range(t) for j in range(i)]
     eye = np.eye(t) * STEP
     stencil = np.array([np.zeros(t), *eye, *-eye, *(eye[i] + eye[j] for i, j in pairs)])
-    values = at(point[..., None, :] + stencil)
+    values = evaluate(point[..., None, :] + stencil)
     centre, up, down, mixed = (
         values[..., 0],
         values[..., 1 : t + 1],

@@ -42,8 +42,8 @@ class Warp:
     scale: FloatArray
 
     def __getitem__(self, data_set: int) -> Warp:
-        own = slice(data_set, data_set + 1)
-        return Warp(self.is_log, *(value[own] for name, value in vars(self).items() if name != "is_log"))
+        index = slice(data_set, data_set + 1)
+        return Warp(self.is_log, *(value[index] for name, value in vars(self).items() if name != "is_log"))
 
     def parameters(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return parameters (B, N, d) at points (N, d) of the cube, and the log density (B, N) of the map there."""
@@ -64,14 +64,14 @@ class Warp:
         low, high = np.exp(ends) if self.is_log[j] else ends
         return float(low), float(high)
 
-    def coordinate(self, j: int, value: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coordinate(self, j: int, value: FloatArray, preceding: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the coordinate u_j (N, k) of values (k,) given those before it (N, j), and du_j/dvalue.
 
         For the first data set.
         """
-        g = np.zeros((1, len(before), len(self.is_log)))
+        g = np.zeros((1, len(preceding), len(self.is_log)))
         if j:
-            padded = np.hstack([before, np.full((len(before), len(self.is_log) - j), 0.5)])
+            padded = np.hstack([preceding, np.full((len(preceding), len(self.is_log) - j), 0.5)])
             h = self[0].parameters(padded)[0]
             g[:, :, :j] = np.where(self.is_log, np.log(np.where(self.is_log, h, 1.0)), h)[:, :, :j]
         centre = self[0]._centre(j, g)
@@ -100,9 +100,9 @@ def warp_along(survey: Survey) -> Warp:
     slope = np.zeros_like(covariance)
     shared = range(survey.structure) if len(anchor) > 1 else range(0)
     for j in range(anchor.shape[1]):
-        before = covariance[:, :j, :j], covariance[:, :j, j]
-        slope[:, j, :j] = np.linalg.solve(before[0], before[1][:, :, None])[:, :, 0]
-        scale[:, j] = np.sqrt(covariance[:, j, j] - (before[1] * slope[:, j, :j]).sum(axis=1))
+        covariances = covariance[:, :j, :j], covariance[:, :j, j]
+        slope[:, j, :j] = np.linalg.solve(covariances[0], covariances[1][:, :, None])[:, :, 0]
+        scale[:, j] = np.sqrt(covariance[:, j, j] - (covariances[1] * slope[:, j, :j]).sum(axis=1))
         if j in shared:
             slope[:, j], centre[:, j] = 0.0, anchor[:, j].mean()
             scale[:, j] = np.sqrt(covariance[:, j, j].mean() + anchor[:, j].var())
