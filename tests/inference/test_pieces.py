@@ -14,8 +14,8 @@ from tissuq.experiments.modes import Uniaxial
 from tissuq.inference.bounds import Bounded, bounded
 from tissuq.inference.box import Boxes
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.lowrank import correlation_spectrum
 from tissuq.inference.marginal import HermiteCubics, blended, marginal_of_mixture, marginal_of_points
+from tissuq.inference.reduction import correlation_spectrum
 from tissuq.mechanics import NeoHookean
 from tissuq.model.discrepancy import Constant, GaussianProcess
 from tissuq.model.statistical_model import StatisticalModel

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.box import NEGLIGIBLE, TOUCHED, Boxes, lower_triangle
+from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.kronecker import quasi_random
 from tissuq.inference.marginal import (
     Marginal,
     blended,
@@ -18,17 +17,18 @@ from tissuq.inference.marginal import (
     marginal_of_mixture,
     marginal_of_points,
 )
-from tissuq.inference.nested import MOST_NESTED
+from tissuq.inference.nested import MAX_NESTED
+from tissuq.inference.quasi_monte_carlo import quasi_random
 
 __all__ = ["Bounded", "bounded"]
 
 FloatArray = NDArray[np.float64]
 
-DRAWN = 4000
+MIN_DRAWS = 4000
 """Draws, at least, that represent what bounds cut, in predictions and in a posterior's draws."""
-REPRESENTED = 200
+MAX_COMPONENTS = 200
 """Components, at most, whose marginals within several bounds are computed."""
-POINTS = 200_000
+MIN_POINTS = 200_000
 """Points, at least, that stand for all of them together where more bounds cut than can be integrated."""
 
 
@@ -75,7 +75,7 @@ class Bounded:
             marginal = marginal_of_mixture(self.free.weights, self.free.mean[:, place], sds)
             parts.append((self.free.weights.sum(), marginal))
         for which, each in self.cut.items():
-            if each.weights.sum() < NEGLIGIBLE * 100:
+            if each.weights.sum() < NEGLIGIBLE_MASS * 100:
                 continue
             ends = float(self.box.lower[0, which]), float(self.box.upper[0, which])
             covariance = each.root @ each.root.swapaxes(1, 2)
@@ -87,15 +87,15 @@ class Bounded:
 
     def _crossed_marginals(self, place: int, bounds: tuple[float, float]) -> list[tuple[float, Marginal]]:
         """Return marginals of what several bounds cut, with their weights: by which bounds these are."""
-        few = self.crossed.thinned(REPRESENTED)
+        few = self.crossed.thinned(MAX_COMPONENTS)
         share, every = self.crossed.weights.sum(), self._boxes(few)
-        active = every.beyond(few.mean, few.root) > TOUCHED
+        active = every.beyond(few.mean, few.root) > TOUCHED_MASS
         active[:, place] = True
         found = []
         for pattern in np.unique(active, axis=0):
             own = few[(active == pattern).all(axis=1)]
             order = np.array([place, *(k for k in np.flatnonzero(pattern) if k != place)])
-            if len(order) > MOST_NESTED:
+            if len(order) > MAX_NESTED:
                 points = self._points(own)
                 marginal = marginal_of_points(points.mean[:, place], points.weights, bounds)
             else:
@@ -110,16 +110,16 @@ class Bounded:
 
     def _drawn(self, components: GaussianMixture) -> GaussianMixture:
         """Return draws within the bounds, as components without extent."""
-        few = components.thinned(DRAWN)
+        few = components.thinned(MIN_DRAWS)
         count, p = few.mean.shape
-        each = -(-DRAWN // count)
+        each = -(-MIN_DRAWS // count)
         uniforms = quasi_random(p, count * each).reshape(count, each, p)
         points = self._boxes(few).draws(few.mean, few.root, uniforms)
         return _of_points(few, components.weights.sum() * np.ones(points.shape[:2]) / points.shape[1], points)
 
     def _points(self, components: GaussianMixture) -> GaussianMixture:
         """Return weighted points within the bounds."""
-        number = max(64, POINTS // len(components.weights))
+        number = max(64, MIN_POINTS // len(components.weights))
         log_shares, points = self._boxes(components).points(components.mean, components.root, number)
         shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
         return _of_points(components, shares / shares.sum(axis=1, keepdims=True), points)
@@ -146,8 +146,8 @@ def bounded(components: GaussianMixture, beyond: FloatArray, box: Boxes) -> Boun
     loss = components.weights * beyond.sum(axis=1)
     order = np.argsort(loss)
     is_cut = np.zeros(len(loss), dtype=bool)
-    is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE]] = True
-    active = beyond > TOUCHED
+    is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE_MASS]] = True
+    active = beyond > TOUCHED_MASS
     alone = is_cut & (active.sum(axis=1) == 1)
     cut = {place: components[alone & active[:, place]] for place in range(beyond.shape[1])}
     cut = {place: each for place, each in cut.items() if len(each.weights)}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.inference.enumerators.quadrature import Lines, Quadrature
-from tissuq.inference.enumerators.warp import Warp
+from tissuq.inference.enumerators.survey import Warp
 from tissuq.inference.nested import nested_log_density, nested_points
 from tissuq.parameters.normal_interval import log_interval
 
@@ -28,17 +28,17 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-GRID = 1001
-COARSE = 101
-NODES = 160
-BETWEEN = 6
-FEW = 60
-PARTS = 800
+TABLE_POINTS = 1001
+HDI_STARTS = 101
+MIXTURE_NODES = 160
+POINTS_PER_NODE = 6
+FEW_COMPONENTS = 60
+QUANTILES_OF_WIDENED = 800
 """Of equal probability, into which a marginal is divided."""
-MANY_VALUES = 300_000
-FAR = 15.0
+MAX_VALUES = 300_000
+FAR_SDS = 15.0
 """Standard deviations beyond a bound from which a cut Gaussian's variance is taken from its expansion."""
-FINE = 0.005
+SAME_GAUSSIAN = 0.005
 """Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
 MANY_LINES = 2000
 MANY_BINS = 10_000
@@ -73,13 +73,13 @@ class Marginal:
 
     def hdi(self, prob: float = 0.95) -> tuple[float, float]:
         """Return the shortest interval that holds ``prob`` of the posterior (95 % HPD for 0.95)."""
-        start = np.linspace(0.0, 1.0 - prob, COARSE)
+        start = np.linspace(0.0, 1.0 - prob, HDI_STARTS)
         best = int((self.quantile(start + prob) - self.quantile(start)).argmin())
-        low, high = start[max(best - 2, 0)], start[min(best + 2, COARSE - 1)]
+        low, high = start[max(best - 2, 0)], start[min(best + 2, HDI_STARTS - 1)]
         for _ in range(7):
-            inner = np.linspace(low, high, COARSE)
+            inner = np.linspace(low, high, HDI_STARTS)
             rising = self.pdf(self.quantile(inner)) < self.pdf(self.quantile(inner + prob))
-            peak = int(rising.argmin()) if not rising.all() else COARSE - 1
+            peak = int(rising.argmin()) if not rising.all() else HDI_STARTS - 1
             low, high = inner[max(peak - 1, 0)], inner[peak]
         return float(self.quantile(low)), float(self.quantile(low + prob))
 
@@ -88,9 +88,9 @@ def widened(marginal: Marginal, error: float) -> Marginal:
     """Return the marginal of a parameter times 1 + e, e a normal error of some standard deviation."""
     if not error:
         return marginal
-    values = marginal.quantile((np.arange(PARTS) + 0.5) / PARTS)
+    values = marginal.quantile((np.arange(QUANTILES_OF_WIDENED) + 0.5) / QUANTILES_OF_WIDENED)
     sds = np.sqrt((error * values) ** 2 + np.gradient(values) ** 2 / 12)
-    mixture = marginal_of_mixture(np.full(PARTS, 1 / PARTS), values, sds)
+    mixture = marginal_of_mixture(np.full(QUANTILES_OF_WIDENED, 1 / QUANTILES_OF_WIDENED), values, sds)
     sd = float(np.sqrt(marginal.sd**2 * (1 + error**2) + (error * marginal.mean) ** 2))
     return replace(mixture, mean=marginal.mean, sd=sd)
 
@@ -108,7 +108,7 @@ def marginal_of_mixture(weights: FloatArray, means: FloatArray, sds: FloatArray)
     weights, means, sds = _merged(weights, means, sds)
     scores = np.linspace(-8, 8, 25)
     spread, shares = means[:, None] + sds[:, None] * scores, weights[:, None] * np.exp(-0.5 * scores**2)
-    coarse = _grid(spread.ravel(), shares.ravel(), (spread.min(), spread.max()), NODES)
+    coarse = _grid(spread.ravel(), shares.ravel(), (spread.min(), spread.max()), MIXTURE_NODES)
     scores = (coarse - means[:, None]) / sds[:, None]
     heights = (weights / sds)[:, None] * np.exp(-0.5 * scores**2) / np.sqrt(2 * np.pi)
     slope = -(heights * scores / sds[:, None]).sum(axis=0)
@@ -160,7 +160,7 @@ def marginal_of_cut_mixture(
     limits = ends if index == cut_index else (-np.inf, np.inf)
     reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
     shares = weights[:, None] * np.exp(-np.abs(scores))
-    count = max(2 * NODES, min(4 * NODES, MANY_VALUES // len(weights)))
+    count = max(2 * MIXTURE_NODES, min(4 * MIXTURE_NODES, MAX_VALUES // len(weights)))
     coarse = _grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, count)
     scores = (coarse - means[:, index, None]) / sd[:, None]
     log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
@@ -203,7 +203,7 @@ def marginal_of_crossed_mixture(
     values = means[:, None] + scale * scores
     mean = float((shares * values).sum())
     sd = float(np.sqrt((shares * (values - mean) ** 2).sum()))
-    coarse = _grid(values.ravel(), shares.ravel(), (values.min(), values.max()), 2 * NODES)
+    coarse = _grid(values.ravel(), shares.ravel(), (values.min(), values.max()), 2 * MIXTURE_NODES)
     scores = (coarse - means[:, None]) / scale
     log_density = nested_log_density(triangle, low, high, scores)[0] - log_mass
     is_inside = (scores >= low[:, :1] / scale) & (scores <= high[:, :1] / scale)
@@ -237,7 +237,7 @@ def marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, 
     low, high = warp.bounds(side)
     margin = 0.05 * np.ptp(seen)
     ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
-    points = _grid(values, weights, ends, GRID if len(lines.start) <= MANY_LINES else GRID // 4)
+    points = _grid(values, weights, ends, TABLE_POINTS if len(lines.start) <= MANY_LINES else TABLE_POINTS // 4)
     coordinates, slope = warp.coordinate(side, points, lines.preceding)
     density = np.maximum(lines.evaluate(coordinates, slope), 0.0)
     return Marginal(mean, sd, points, density, _proper(lines.integrate_to(coordinates)))
@@ -259,9 +259,9 @@ def marginal_of_points(
     is_cut = low > points.min() - bandwidth or high < points.max() + bandwidth
     if not is_cut:
         points = mean + (points - mean) * np.sqrt(1 - (bandwidth / sd) ** 2)
-    heights, edges = np.histogram(points, bins=GRID - 1, range=(low, high), weights=weights, density=True)
+    heights, edges = np.histogram(points, bins=TABLE_POINTS - 1, range=(low, high), weights=weights, density=True)
     step = edges[1] - edges[0]
-    reach = min(int(4 * bandwidth / step) + 1, GRID - 1)
+    reach = min(int(4 * bandwidth / step) + 1, TABLE_POINTS - 1)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / bandwidth) ** 2)
     smooth = np.convolve(np.pad(heights, reach, mode="symmetric"), kernel / kernel.sum(), mode="valid")
     cumulative = np.concatenate([[0.0], np.cumsum(smooth)])
@@ -323,8 +323,8 @@ def _cut_moments(low: FloatArray, high: FloatArray, log_mass: FloatArray) -> tup
     mean = at_low - at_high
     pull = np.where(np.isfinite(low), low, 0.0) * at_low - np.where(np.isfinite(high), high, 0.0) * at_high
     nearest = np.maximum(low, -high)
-    far = np.maximum(nearest, FAR)
-    is_far = (nearest > FAR) & (far * (high - low) > 40)
+    far = np.maximum(nearest, FAR_SDS)
+    is_far = (nearest > FAR_SDS) & (far * (high - low) > 40)
     return mean, np.where(is_far, far**-2 * (1 - 6 * far**-2 + 50 * far**-4), 1 + pull - mean**2)
 
 
@@ -364,7 +364,7 @@ class HermiteCubics:
 
 def _between(coarse: FloatArray) -> FloatArray:
     """Return coarse points with others evenly between them."""
-    fractional_index = np.arange(BETWEEN * (len(coarse) - 1) + 1) / BETWEEN
+    fractional_index = np.arange(POINTS_PER_NODE * (len(coarse) - 1) + 1) / POINTS_PER_NODE
     return np.asarray(np.interp(fractional_index, np.arange(len(coarse)), coarse), dtype=np.float64)
 
 
@@ -372,14 +372,17 @@ def _alike(
     weights: FloatArray, means: FloatArray, covariances: FloatArray, index_pair: tuple[int, int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Merge Gaussians that are nearly the same in two of their dimensions, keeping moments."""
-    if len(weights) <= FEW:
+    if len(weights) <= FEW_COMPONENTS:
         return weights, means, covariances
     seen = weights > 1e-9 * weights.max()
     weights, means, covariances = weights[seen] / weights[seen].sum(), means[seen], covariances[seen]
     sds = np.sqrt(covariances[:, index_pair, index_pair])
     means_of_pair = means[:, index_pair]
     bins = np.hstack(
-        [(means_of_pair - means_of_pair.min(axis=0)) / (FINE * sds), np.log(sds / sds.min(axis=0)) / FINE]
+        [
+            (means_of_pair - means_of_pair.min(axis=0)) / (SAME_GAUSSIAN * sds),
+            np.log(sds / sds.min(axis=0)) / SAME_GAUSSIAN,
+        ]
     ).astype(int)
     _, group = np.unique(bins, axis=0, return_inverse=True)
     group = group.ravel()
@@ -395,7 +398,7 @@ def _alike(
 
 def _merged(weights: FloatArray, means: FloatArray, sds: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Merge Gaussians that are nearly the same (means within a 300th of the range, sds within 5 %), keeping moments."""
-    if len(weights) <= FEW:
+    if len(weights) <= FEW_COMPONENTS:
         return weights, means, sds
     seen = weights > 1e-12
     weights, means, sds = weights[seen], means[seen], sds[seen]

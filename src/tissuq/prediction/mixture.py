@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 
 __all__ = ["Mixtures"]
 

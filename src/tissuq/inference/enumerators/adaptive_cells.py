@@ -9,14 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.inference.algebra import Conditional
 from tissuq.inference.bounds import bounded
-from tissuq.inference.conditional import ConditionalGaussian
-from tissuq.inference.enumerators.missed import QUANTILES, has_missed
-from tissuq.inference.enumerators.quadrature import MAX_DIMENSION, Quadrature, integrate
-from tissuq.inference.enumerators.survey import log_prior_density, survey
-from tissuq.inference.enumerators.warp import Warp, warp_along
+from tissuq.inference.enumerators.quadrature import (
+    MAX_DIMENSION,
+    START_PROBABILITIES,
+    Quadrature,
+    has_missed,
+    integrate,
+)
+from tissuq.inference.enumerators.survey import Warp, log_prior_density, survey, warp_along
 from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import Marginal, marginal_of_quadrature
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.threads import one_thread
@@ -27,13 +30,13 @@ __all__ = ["AdaptiveCells", "solve_exactly"]
 
 FloatArray = NDArray[np.float64]
 
-TOGETHER = (2000, 200, 40, 5)
+DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
-IRRELEVANT = 14.0
+IRRELEVANT_LOG_DROP = 14.0
 """Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
-MOST_ERROR = 0.1
+MAX_LOG_MASS_ERROR = 0.1
 """Error of the log mass within bounds from which the result is refused."""
-HEAVY = 1e-6
+HEAVY_SHARE = 1e-6
 """Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
 
@@ -88,7 +91,7 @@ def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[Sol
     reason = AdaptiveCells().why_not(models[0])
     if reason:
         raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
-    together = TOGETHER[len(models[0].nonlinear)]
+    together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
     blocks = [models[start : start + together] for start in range(0, len(models), together)]
     with one_thread():
         return [
@@ -143,7 +146,7 @@ class _Integration:
             )
             return np.asarray(np.where(np.isnan(value), -np.inf, value)[0])
 
-        tried = np.array([prior.quantile(QUANTILES) for prior in priors[0][: len(structure)]])
+        tried = np.array([prior.quantile(START_PROBABILITIES) for prior in priors[0][: len(structure)]])
         starts = coordinates(tried.T, is_log[: len(structure)]).T
         bounds = np.column_stack([self.warp.lower[index], self.warp.upper[index]])
         if has_missed(log_density, bounds, coordinates(self.settings[index], is_log), weights, starts):
@@ -166,7 +169,7 @@ class _Integration:
         value = gaussians.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
         is_exact = np.zeros(value.shape, dtype=bool)
-        for margin in (0.0, IRRELEVANT):  # the best ones first, which tell what matters
+        for margin in (0.0, IRRELEVANT_LOG_DROP):  # the best ones first, which tell what matters
             floor = self._top if margin else value.max(axis=1, keepdims=True)
             relevant = ~is_exact & (value >= floor - margin) & np.isfinite(value)
             data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
@@ -210,17 +213,17 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     )
     if any(isinstance(prior, Flat) for prior in model.priors.values()):
         return solution
-    heavy = np.flatnonzero((weights > HEAVY) & (mass_outside.sum(axis=1) > HEAVY))
+    heavy = np.flatnonzero((weights > HEAVY_SHARE) & (mass_outside.sum(axis=1) > HEAVY_SHARE))
     log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
-    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY))
-    if error_of_mass > MOST_ERROR:
+    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY_SHARE))
+    if error_of_mass > MAX_LOG_MASS_ERROR:
         raise ConvergenceError(
             f"bounds of several linear parameters ({', '.join(model.linear)}) cut so deep that the mass "
             "within them is not known well enough; use the method 'joint', or wider priors."
         )
     if rule:
         evidence = float(rule.log_integral[index])
-        error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT) + error_of_mass)
+        error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT_LOG_DROP) + error_of_mass)
     else:
         evidence, error_of_evidence = float(gaussians.log_likelihood[index, 0] + log_mass.sum()), error_of_mass
     return replace(solution, log_evidence=evidence, log_evidence_error=error_of_evidence)
