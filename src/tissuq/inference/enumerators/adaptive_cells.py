@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.inference.bounds import bounded
 from tissuq.inference.enumerators.quadrature import (
     MAX_DIMENSION,
     START_PROBABILITIES,
+    Lines,
     Quadrature,
     has_missed,
     integrate,
@@ -20,9 +20,10 @@ from tissuq.inference.enumerators.quadrature import (
 from tissuq.inference.enumerators.survey import Warp, log_prior_density, survey, warp_along
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
-from tissuq.inference.marginal import Marginal, marginal_of_quadrature
+from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.threads import one_thread
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
@@ -36,6 +37,8 @@ IRRELEVANT_LOG_DROP = 14.0
 """Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
 MAX_LOG_MASS_ERROR = 0.1
 """Error of the log mass within bounds from which the result is refused."""
+MANY_LINES = 2000
+"""Of a quadrature, beyond which a marginal is tabulated at fewer points."""
 HEAVY_SHARE = 1e-6
 """Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
@@ -195,7 +198,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     weights = rule.weights[index] if rule else np.ones(1)
     mixture = GaussianMixture(weights, integration.settings[index], gaussians.mean[index], gaussians.root[index])
     mass_outside = box.beyond(mixture.mean, mixture.root)
-    truncated = bounded(mixture, mass_outside, box)
+    truncated = TruncatedMixture.of(mixture, mass_outside, box)
 
     def marginal(symbol: str) -> Marginal:
         if symbol in model.linear:
@@ -203,7 +206,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
         assert integration.rule is not None  # noqa: S101 (there is a nonlinear parameter)
         assert integration.warp is not None  # noqa: S101
         side = model.nonlinear.index(symbol)
-        return marginal_of_quadrature(integration.rule, integration.warp, index, side, mixture.settings[:, side])
+        return _marginal_of_quadrature(integration.rule, integration.warp, index, side, mixture.settings[:, side])
 
     linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
     integrated = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
@@ -227,3 +230,33 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     else:
         evidence, error_of_evidence = float(gaussians.log_likelihood[index, 0] + log_mass.sum()), error_of_mass
     return replace(solution, log_evidence=evidence, log_evidence_error=error_of_evidence)
+
+
+def _marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, values: FloatArray) -> Marginal:
+    """Return the marginal of a nonlinear parameter: the quadrature's own interpolant, other parameters integrated.
+
+    Parameters
+    ----------
+    rule : Quadrature
+        In the coordinates of the warp.
+    warp : Warp
+    index : int
+        The data set's place among those of rule and warp.
+    side : int
+        The parameter's place among the nonlinear ones.
+    values : (M,) array
+        Its values at the points of the rule.
+    """
+    weights, warp = rule.weights[index], warp[index]
+    lines = rule.lines(side, index)
+    heavy = np.abs(lines.series[:, 0] * lines.width) > 1e-8
+    lines = Lines(lines.preceding[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
+    seen = values[weights > 1e-8]
+    low, high = warp.bounds(side)
+    margin = 0.05 * np.ptp(seen)
+    ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
+    points = weighted_grid(values, weights, ends, TABLE_POINTS if len(lines.start) <= MANY_LINES else TABLE_POINTS // 4)
+    coordinates, slope = warp.coordinate(side, points, lines.preceding)
+    density = lines.evaluate(coordinates, slope)
+    cumulative = lines.integrate_to(coordinates)
+    return Marginal.of(*moments_of_values(weights, values), points, density, cumulative)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.inference.bounds import bounded
 from tissuq.inference.box import Boxes
 from tissuq.inference.enumerators.amplitudes import (
     NEGLIGIBLE_SHARE,
@@ -32,6 +31,7 @@ from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_po
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
 from tissuq.inference.threads import one_thread
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
@@ -148,7 +148,8 @@ class _EnergySums:
         total = np.exp(masses - top).sum()
         self._points, self._weights = points, np.exp(masses - top) / total
         settings = self._settings(points, self._node)
-        self._bounded = bounded(GaussianMixture(self._weights, settings, mean, root), mass_outside, self._box)
+        gaussians = GaussianMixture(self._weights, settings, mean, root)
+        self._truncated = TruncatedMixture.of(gaussians, mass_outside, self._box)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
@@ -214,11 +215,11 @@ class _EnergySums:
         mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
-        return bounded(mixture, box.beyond(mean, root), box).components()
+        return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components()
 
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:
-            return self._bounded.marginal(self.model.linear.index(symbol))
+            return self._truncated.marginal(self.model.linear.index(symbol))
         if symbol == "noise_sd":
             return self._noise_marginal()
         values = self._settings(self._points, self._node)[:, self.model.nonlinear.index(symbol)]
@@ -232,7 +233,7 @@ class _EnergySums:
 
     def _noise_marginal(self) -> Marginal:
         """Return the marginal of the noise from its densities given the rest, at some of the points."""
-        is_pulled = self._bounded.is_cut or self._priors.is_gaussian
+        is_pulled = self._truncated.is_cut or self._priors.is_gaussian
         representatives = systematic(self._weights[None], MARGINAL_POINTS // (PULLED_DIVISOR if is_pulled else 1))[0]
         points, freedom = self._points[representatives], self.model.experiment.size - len(self.model.linear)
         logs = np.log(noise_grid(self.model, points, freedom, MARGINAL_NOISES // (2 if is_pulled else 1)))
