@@ -35,7 +35,12 @@ SEEDS = 16
 ROUNDING = 1e-14
 """Relative change of the measured stresses, whose effect is stored beside the numbers."""
 ROUNDING_MARGIN = 10.0
-"""Multiple of this effect that is allowed where it is more than the tolerance."""
+"""Multiple of this effect, or of another processor's, that is allowed where it is more than the tolerance."""
+OLDER_PROCESSORS = (
+    {"OPENBLAS_CORETYPE": "Sandybridge", "XLA_FLAGS": "--xla_cpu_max_isa=AVX", "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3"},
+    {"OPENBLAS_CORETYPE": "Haswell", "XLA_FLAGS": "--xla_cpu_max_isa=AVX2"},
+)
+"""Environments in which the libraries take the instructions of older processors, and so round otherwise."""
 
 Stored = Mapping[str, Any]
 
@@ -68,8 +73,9 @@ def compared(numbers: Numbers, stored: Stored, tolerance: float = TOLERANCE) -> 
     """Compare the numbers of a case with the stored ones.
 
     Sampled numbers are compared with their mean over seeds, in standard errors of one run. All others are compared
-    relative to their value or, where that is larger, to the posterior's spread; where a rounding error of the data
-    moves a number by more than the tolerance (a discrete choice within the integration), ten times as much is allowed.
+    relative to their value or, where that is larger, to the posterior's spread; where a rounding error of the data or
+    another processor moves a number by more than the tolerance (a discrete choice within the integration), ten times
+    as much is allowed.
     """
     expected = stored["numbers"]
     worst = Comparison(0.0, STANDARD_ERRORS if stored["is_sampled"] else tolerance, "")
@@ -102,7 +108,7 @@ def sampled_entry(runs: Sequence[Numbers]) -> Stored:
 
 
 def exact_entry(run: Numbers, perturbed: Sequence[Numbers]) -> Stored:
-    """Return what is stored of any other case: value, scale, and relative change by a rounding error of the data."""
+    """Return what is stored of any other case: value, scale, and relative change by rounding, of the data or within."""
     numbers = {}
     for name, number in run.items():
         change = max(abs(other[name].value - number.value) for other in perturbed)
@@ -111,24 +117,35 @@ def exact_entry(run: Numbers, perturbed: Sequence[Numbers]) -> Stored:
     return {"is_sampled": False, "numbers": numbers}
 
 
+def computed_on(processor: Mapping[str, str], names: Sequence[str]) -> dict[str, Numbers]:
+    """Return the numbers of cases with the instructions of another processor."""
+    before = dict(os.environ)
+    os.environ.update(processor)  # of the processes that are started here
+    try:
+        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            return {name: numbers for name, (numbers, _) in zip(names, pool.map(computed, names), strict=True)}
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
 def write(names: Sequence[str], pool: ProcessPoolExecutor) -> None:
     """Compute the numbers of cases anew and store them."""
     runs = {
         name: [pool.submit(computed, name, seed) for seed in range(SEEDS if CASES[name].is_sampled else 1)]
         for name in names
     }
-    perturbed = {
-        name: [pool.submit(computed, name, 0, sign * ROUNDING) for sign in (-1, 1)]
-        for name in names
-        if not CASES[name].is_sampled
-    }
+    exact = [name for name in names if not CASES[name].is_sampled]
+    perturbed = {name: [pool.submit(computed, name, 0, sign * ROUNDING) for sign in (-1, 1)] for name in exact}
+    on_older = [computed_on(processor, exact) for processor in OLDER_PROCESSORS]
     stored = json.loads(STORED.read_text()) if STORED.exists() else {}
     for name in names:
         results = [run.result()[0] for run in runs[name]]
         if CASES[name].is_sampled:
             stored[name] = sampled_entry(results)
         else:
-            stored[name] = exact_entry(results[0], [run.result()[0] for run in perturbed[name]])
+            others = [run.result()[0] for run in perturbed[name]] + [numbers[name] for numbers in on_older]
+            stored[name] = exact_entry(results[0], others)
         print(f"{name:<28} {len(results[0])} numbers", flush=True)
     ordered = {name: stored[name] for name in CASES if name in stored}
     text = json.dumps(ordered, indent=1)

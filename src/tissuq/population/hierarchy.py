@@ -37,6 +37,8 @@ LKJ_CONCENTRATION = 2.0
 """Concentration of the LKJ prior of the correlations; one would be uniform."""
 DRAWS_PER_CHAIN = 1000
 """Number of draws in each of four chains."""
+THINNINGS = (1, 4)
+"""Steps of the sampler for each draw: the second where the first has not converged."""
 SAMPLING_COMPONENTS, CORRECTION_COMPONENTS = 16, 200
 """Number of Gaussians per specimen for sampling, and for the correction of the draws."""
 CORRECTION_BATCH = 20
@@ -117,19 +119,27 @@ def sample_hierarchy(
     lower = np.r_[np.full(size, -np.inf), np.zeros(size), -np.ones(len(pairs))]
     upper = np.r_[np.full(2 * size, np.inf), np.ones(len(pairs))]
     start = np.r_[np.zeros(size), np.full(size, 0.3 * spread), np.zeros(len(pairs))]
-    settings = NutsSettings(draws=DRAWS_PER_CHAIN, thinning=1, seed=seed)
-    sampled = sample_nuts(
-        _log_posterior, lower, upper, start, settings, names, coarse | {"spread": jnp.asarray(spread)}
-    )
-    points = jnp.asarray(sampled.values.reshape(-1, len(names)))
-    keys = jax.random.split(jax.random.key(seed + 1), len(points))
+    data = coarse | {"spread": jnp.asarray(spread)}
+    for thinning in THINNINGS:
+        settings = NutsSettings(draws=DRAWS_PER_CHAIN, thinning=thinning, seed=seed)
+        sampled = sample_nuts(_log_posterior, lower, upper, start, settings, names, data)
+        hierarchy = _corrected(sampled, coarse, fine, seed + 1)
+        if hierarchy.diagnostics.converged:
+            break
+    return hierarchy
+
+
+def _corrected(sampled: NutsDraws, coarse: Any, fine: Any, seed: int) -> Hierarchy:
+    """Return draws resampled by the likelihood of the many Gaussians, over that of the few that were sampled from."""
+    points = jnp.asarray(sampled.values.reshape(-1, len(sampled.names)))
+    keys = jax.random.split(jax.random.key(seed), len(points))
     mean, root, specimens, gain = (np.asarray(array) for array in _corrected_draws(points, keys, coarse, fine))
     weights = np.exp(gain - gain.max())
     shape = sampled.values.shape[:2]
-    kept_draws = systematic(weights.reshape(shape), DRAWS_PER_CHAIN) + DRAWS_PER_CHAIN * np.arange(shape[0])[:, None]
+    rows = systematic(weights.reshape(shape), DRAWS_PER_CHAIN) + DRAWS_PER_CHAIN * np.arange(shape[0])[:, None]
     effective = float(weights.sum() ** 2 / (weights**2).sum() / len(weights))
-    corrected = sampled.of(sampled.values.reshape(-1, len(names))[kept_draws], sampled.names)
-    return Hierarchy(mean[kept_draws], root[kept_draws], specimens[kept_draws], corrected, effective)
+    corrected = sampled.of(np.asarray(points)[rows], sampled.names)
+    return Hierarchy(mean[rows], root[rows], specimens[rows], corrected, effective)
 
 
 def _population(position: Any) -> tuple[Any, Any]:
