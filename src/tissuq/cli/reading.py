@@ -112,7 +112,7 @@ def _role(text: str) -> tuple[str, str | int]:
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
     """Return the files that were given; of a folder those in it that may hold measurements."""
-    from tissuq.experiments.reading.specimens import SUFFIXES
+    from tissuq.experiments.reading.several_files import SUFFIXES
 
     files: list[Path] = []
     for path in paths:
@@ -140,7 +140,7 @@ def measured(
     InputError
         When there is not one mode, specimen or noise for each file, or a file does not say its mode.
     """
-    from tissuq.experiments.reading.stated_mode import said_mode, told_mode
+    from tissuq.experiments.reading.several_files import find_mode, stated_mode
 
     noise = _numbers(noise_sd)
     if len(files) < 2:
@@ -148,9 +148,9 @@ def measured(
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one file; give it once.")
         file_setting: dict[str, Any] = {"file": str(files[0])} if files else {}
-        mode = modes[0] if modes else said_mode(files[0]) if files else None
+        mode = modes[0] if modes else stated_mode(files[0]) if files else None
         return reading | file_setting | {"mode": mode, "noise_sd": noise[0] if noise else None}
-    modes = _for_each(files, "--mode", modes) or [told_mode(file) for file in files]
+    modes = _for_each(files, "--mode", modes) or [find_mode(file) for file in files]
     names = _for_each(files, "--specimen", specimens)
     each_noise = _for_each(files, "--noise-sd", noise) if noise and len(noise) > 1 else None
     options = {name: value for name, value in reading.items() if value is not None}

@@ -14,7 +14,8 @@ from tissuq.inference.algebra import SpectralCovariance
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.lowrank import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
-from tissuq.model.discrepancy import side_by_side
+from tissuq.inference.threads import one_thread
+from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
 __all__ = [
@@ -175,7 +176,7 @@ def stress_moments(
         extra += model.independent_variance(values)
     if noise:
         extra += model.noise_variance(values, level) * model.relative_noise(states) ** 2
-    return mean, extra + (root**2).sum(axis=2)
+    return mean, extra + np.einsum("mgp,mgp->mg", root, root)
 
 
 def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
@@ -213,8 +214,9 @@ def drawn_curves(
     is_material = np.isin(model.column_symbols, model.material_symbols)
     material_stress, discrepancy_stress = terms[..., is_material].sum(axis=2), terms[..., ~is_material].sum(axis=2)
     if components.member is not None:
-        for shift, _, _, rows in _energies(model, replace(components, mean=linear), states):
-            discrepancy_stress[rows] += shift
+        with one_thread():
+            for shift, rows in _drawn_energies(model, linear, components, states):
+                discrepancy_stress[rows] += shift
     if model.is_correlated and states.is_measured:
         for group in correlated_groups(model, settings):
             shift, covariance = conditioned_jointly(model, group, states, drawn[group.components])
@@ -245,20 +247,35 @@ def _energies(
 
     What the terms that serve the data leave of the discrepancy elsewhere is independent of the data.
     """
-    start = len(model.linear)
-    assert components.member is not None  # noqa: S101 (the caller has looked)
-    for index in np.unique(components.member):
-        member, rows = model.energy_members[index], np.flatnonzero(components.member == index)
-        features = member.stress_features(states)
+    for member, rows, features, weights in _energy_terms(model, components, states):
         unexplained = [
             np.maximum(total - (terms**2).sum(axis=1), 0.0)
             for total, terms in zip(member.stress_variances(states), features, strict=True)
         ]
         symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.amplitude_indices]
         all_terms = side_by_side(features, len(states))
-        weights = slice(start, start + all_terms.shape[1])
         variance = components.settings[rows][:, symbols] ** 2 @ np.reshape(unexplained, (-1, len(states)))
         yield components.mean[rows, weights] @ all_terms.T, all_terms @ components.root[rows, weights], variance, rows
+
+
+def _drawn_energies(
+    model: StatisticalModel, linear: FloatArray, components: GaussianMixture, states: States
+) -> Iterator[tuple[FloatArray, NDArray[np.intp]]]:
+    """Yield the stresses (N, g) of energy discrepancies with drawn weights in `linear`, and whose they are."""
+    for _, rows, features, weights in _energy_terms(model, components, states):
+        yield linear[rows, weights] @ side_by_side(features, len(states)).T, rows
+
+
+def _energy_terms(
+    model: StatisticalModel, components: GaussianMixture, states: States
+) -> Iterator[tuple[Member, NDArray[np.intp], list[FloatArray], slice]]:
+    """Yield energy discrepancies, whose they are, the stresses of their terms, and where the weights of these are."""
+    start = len(model.linear)
+    assert components.member is not None  # noqa: S101 (the caller has looked)
+    for index in np.unique(components.member):
+        member, rows = model.energy_members[index], np.flatnonzero(components.member == index)
+        features = member.stress_features(states)
+        yield member, rows, features, slice(start, start + sum(terms.shape[1] for terms in features))
 
 
 def _with_data(model: StatisticalModel, group: CorrelatedGroup, states: States) -> FloatArray:
