@@ -13,7 +13,6 @@ import typer
 
 from tissuq.cli.options import Force, once_each
 from tissuq.errors import InputError
-from tissuq.registry import variants
 from tissuq.studies.settings import load_settings
 
 __all__ = ["Mode", "files_of", "inspect", "measured", "one_noise", "reads_files", "resolve", "run_name", "tolerances"]
@@ -189,7 +188,7 @@ def run_name(paths: Sequence[Path], config: Path | None, sources: Sequence[Path]
 
 
 def _tolerance(text: str) -> tuple[str, float]:
-    from tissuq.model.measurement_errors import MeasurementError
+    from tissuq.model.measurement_errors import measurement_errors
 
     name, _, number = text.partition("=")
     scale = 0.01 if number.strip().endswith("%") else 1.0
@@ -197,7 +196,7 @@ def _tolerance(text: str) -> tuple[str, float]:
         value = float(number.strip().removesuffix("%")) * scale
     except ValueError:
         value = -1.0
-    name, errors = name.strip(), variants(MeasurementError)
+    name, errors = name.strip(), measurement_errors()
     is_share = name not in errors or not errors[name].is_stress
     if name not in errors or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
         names = ", ".join(errors)
