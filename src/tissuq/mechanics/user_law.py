@@ -197,7 +197,7 @@ def as_material(law: Any, source: str) -> Material:
         return FunctionLaw(law)
     if not isinstance(law, Material) and not (inspect.isclass(law) and issubclass(law, Material)):
         raise InputError(f"'{source}' is no material (it is {law!r}). {HOW_TO_WRITE}.")
-    lacking = [name for name in ("name", "formula", "source", "parameters") if not hasattr(law, name)]
+    lacking = [name for name in ("name", "parameters") if not hasattr(law, name)]
     if lacking:
         raise InputError(f"the material '{source}' lacks {', '.join(lacking)}.")
     if isinstance(law, Material):
