@@ -21,8 +21,6 @@ from tissuq.model.noise import noise_named
 from tissuq.parameters.priors import prior_from
 
 BASES = [
-    tq.Material, tq.LoadingMode, tq.Discrepancy, tq.Noise, tq.MeasurementError, tq.Prior, FileFormat, CardFormat, Case
-]  # fmt: skip
     tq.Material,
     tq.LoadingMode,
     tq.Discrepancy,
