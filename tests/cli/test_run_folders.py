@@ -94,7 +94,7 @@ def test_a_folder_without_permission_is_refused_before_the_work(cli, here, speci
     assert "locked" in said.err
 
 
-@pytest.mark.parametrize("step", ["write_recipe", "write_data", "write_posteriors", "render"])
+@pytest.mark.parametrize("step", ["write_recipe", "write_data", "write_posteriors", "write_page"])
 def test_a_disk_that_is_full_at_any_step_leaves_nothing(cli, here, specimen, monkeypatch, step):
     def fail(*arguments, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -114,7 +114,7 @@ def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(cli,
     def fail(*arguments, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("tissuq.report.specimen.render", fail)
+    monkeypatch.setattr("tissuq.report.specimen.write_page", fail)
     assert cli("fit", specimen, *ALONE, "--force").status == 2
     assert tree(here) == before
 
