@@ -17,7 +17,7 @@ import numpy as np
 
 import tissuq as tq
 from tissuq.assessment.modulus import modulus
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.next_test.candidates import reach_of, target_named
 from tissuq.next_test.expected_variance import joint_stresses, states_of
 from tissuq.next_test.next_test import NextTest

@@ -13,7 +13,7 @@ from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.mechanics.complex_step import MOST_VALUES
 from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants

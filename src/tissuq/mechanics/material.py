@@ -28,8 +28,8 @@ class Material(ABC):
 
     entry_point_group: ClassVar[str] = "tissuq.materials"
     name: ClassVar[str]
-    formula: ClassVar[str]
-    source: ClassVar[str]
+    formula: ClassVar[str] = "formula not stated"
+    source: ClassVar[str] = "source not stated"
     parameters: ClassVar[tuple[Parameter, ...]]
     caution: ClassVar[str] = ""
     """What a reader of its parameters must know."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.kronecker import quasi_random
+from tissuq.inference.quasi_monte_carlo import quasi_random
 from tissuq.inference.solution import Solution
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.moments import values_of

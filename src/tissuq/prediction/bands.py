@@ -14,7 +14,7 @@ from tissuq.experiments.experiment import Curve, Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.experiment_file import STRESS_TYPES
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model.measurement_errors import ErrorPoints

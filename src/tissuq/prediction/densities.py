@@ -8,8 +8,8 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.algebra import integrated
 from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.linear import integrated
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
