@@ -21,7 +21,7 @@ import tissuq as tq
 from tissuq.emulation import Emulator, ForwardRuns, emulate
 from tissuq.emulation.forward import as_forward
 from tissuq.emulation.problem import pose
-from tissuq.emulation.run_plan import space_filling
+from tissuq.emulation.runs import space_filling
 from tissuq.studies.calibrate import runs_of
 
 DEPTH = np.linspace(0.06, 0.9, 15)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissuq.emulation import gathered
-from tissuq.emulation.run_plan import space_filling
+from tissuq.emulation.runs import space_filling
 from tissuq.parameters.priors import Uniform
 
 DEPTH = np.linspace(0.02, 0.3, 15)

@@ -15,10 +15,11 @@ from tissuq.experiments.modes.one_stretch import Uniaxial
 from tissuq.export.cards import CardFormat, card_format
 from tissuq.finite_elements import Case, ClampedBar
 from tissuq.model.discrepancy import Constant, discrepancy_named
+from tissuq.model.measurement_errors import ZeroError
 from tissuq.model.noise import noise_named
 from tissuq.parameters.priors import prior_from
 
-BASES = [tq.Material, tq.LoadingMode, tq.Discrepancy, tq.Noise, tq.Prior, CardFormat, Case]
+BASES = [tq.Material, tq.LoadingMode, tq.Discrepancy, tq.Noise, tq.MeasurementError, tq.Prior, CardFormat, Case]
 
 
 @pytest.fixture
@@ -50,6 +51,7 @@ def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(pa
     kinds = {
         "offset": type("Offset", (Constant,), {"__module__": package.__name__}),
         "loud": type("Loud", (tq.UnknownNoise,), {"__module__": package.__name__}),
+        "settling": type("Settling", (ZeroError,), {"__module__": package.__name__}),
         "upright": type("Upright", (Uniaxial,), {"__module__": package.__name__}),
         "box": type("Box", (tq.Uniform,), {"__module__": package.__name__}),
         "pulled": type("Pulled", (ClampedBar,), {"__module__": package.__name__}),
@@ -58,6 +60,7 @@ def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(pa
     vars(package).update(kinds)
     assert type(discrepancy_named("offset")) is kinds["offset"]
     assert type(noise_named("loud")) is kinds["loud"]
+    assert [type(error) for error, _ in tq.Tolerances(settling=0.1)] == [kinds["settling"]]
     assert type(loading_mode("upright")) is kinds["upright"]
     assert type(prior_from({"distribution": "box", "low": 0, "high": 1})) is kinds["box"]
     assert type(card_format("plain")) is kinds["plain"]

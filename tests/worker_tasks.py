@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from tissuq.studies.stream import run_tasks
-from tissuq.studies.workers import open_pool
+from tissuq.studies.stream import open_pool, run_tasks
 
 
 @dataclass(frozen=True)

@@ -12,20 +12,19 @@ from tissuq.errors import (
 from tissuq.experiments import datasets as datasets
 from tissuq.experiments.experiment import Experiment as Experiment
 from tissuq.experiments.reading.inspection import Inspection as Inspection, inspect as inspect
-from tissuq.experiments.modes import LoadingMode as LoadingMode, loading_modes as loading_modes
+from tissuq.experiments.modes.mode import LoadingMode as LoadingMode, loading_modes as loading_modes
 from tissuq.experiments.reading.experiment_file import read_experiment as read_experiment
 from tissuq.mechanics import (
-    FibreMaterial as FibreMaterial,
-    FunctionLaw as FunctionLaw,
-    Material as Material,
-    StretchMaterial as StretchMaterial,
     engineering_stress as engineering_stress,
     initial_shear_modulus as initial_shear_modulus,
     load_material as load_material,
     simulate as simulate,
 )
-from tissuq.mechanics.material import materials as materials
-from tissuq.model.discrepancy import Discrepancy as Discrepancy, discrepancies as discrepancies
+from tissuq.mechanics.laws.fibres import FibreMaterial as FibreMaterial
+from tissuq.mechanics.material import Material as Material, StretchMaterial as StretchMaterial, materials as materials
+from tissuq.mechanics.user_law import FunctionLaw as FunctionLaw
+from tissuq.model.discrepancy import discrepancies as discrepancies
+from tissuq.model.discrepancy.discrepancy import Discrepancy as Discrepancy
 from tissuq.model.measurement_errors import MeasurementError as MeasurementError, Tolerances as Tolerances
 from tissuq.model.noise import (
     KnownNoise as KnownNoise,

@@ -100,9 +100,9 @@ def test_unloading_that_was_not_measured_is_refused(written):
 def test_dropped_rows_are_counted_with_their_reasons(written):
     stretch, _ = made([1.1, 1.2], rows=21)
     used = read_file(written(stretch), cycle=2, branch="loading", every=2).used
-    assert [(each.count, each.reason) for each in used.dropped] == [
-        (len(stretch) - 21, "not loading of cycle 2 of 2"),
-        (10, "one row in 2 asked for"),
+    assert [(step.counts, step.reason) for step in used.dropped] == [
+        ((len(stretch) - 21,), "not loading of cycle 2 of 2"),
+        ((10,), "one row in 2 asked for"),
     ]
 
 

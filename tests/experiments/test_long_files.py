@@ -8,7 +8,7 @@ import pytest
 import tissuq as tq
 from tissuq.experiments.reading import table
 
-ROWS = table.LONG + 500
+ROWS = table.LONG_FILE + 500
 
 
 def lines(separator=",", seed=0):
@@ -31,7 +31,7 @@ def test_the_fast_parser_reads_the_same_numbers(tmp_path, monkeypatch, separator
     path = written(tmp_path, ["made by a machine, today", *lines(separator), "", ""])
     fast = table.read_table(path)
     assert fast.block is not None
-    monkeypatch.setattr(table, "LONG", 10**9)
+    monkeypatch.setattr(table, "LONG_FILE", 10**9)
     slow = table.read_table(path)
     assert slow.block is None
     assert list(fast.lines) == list(slow.lines)

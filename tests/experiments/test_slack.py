@@ -33,7 +33,7 @@ def test_stretch_is_counted_from_where_the_preload_is_reached(hanging, preload):
 
 def test_rows_that_carry_less_are_dropped_and_told(hanging):
     used = read_file(hanging, dimensions=SPECIMEN, preload="0.1 N").used
-    assert [(each.count, each.reason) for each in used.dropped] == [(36, "carrying less than 0.1 N")]
+    assert [(step.counts, step.reason) for step in used.dropped] == [((36,), "carrying less than 0.1 N")]
     assert "where the preload 0.1 N is reached between lines 19 and 20" in used.steps[2]
 
 

@@ -6,8 +6,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import tissuq.inference.coordinates  # noqa: F401 (double precision of JAX)
-from tissuq.inference.algebra import Fit, SpectralCovariance, condition, integrated
-from tissuq.inference.lowrank import Spectrum
+from tissuq.inference.linear import Fit, SpectralCovariance, condition, integrated
+from tissuq.inference.reduction import Spectrum
 
 N, P = 9, 2
 

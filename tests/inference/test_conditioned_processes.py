@@ -16,7 +16,7 @@ from against import assert_agrees, neo_hookean, parts, uniform_priors
 from dense import Problem, columns
 from tissuq.inference.densities import joint_density
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.lowrank import correlation_spectrum
+from tissuq.inference.reduction import correlation_spectrum
 from tissuq.mechanics import NeoHookean
 from tissuq.mechanics.stress import differentiator
 from tissuq.model.discrepancy import discrepancy_named

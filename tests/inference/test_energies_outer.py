@@ -8,10 +8,9 @@ from scipy.stats import halfcauchy
 
 import tissuq as tq
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.importance import Proposal, adapted
 from tissuq.inference.enumerators.outer import relative_error
-from tissuq.inference.kronecker import even_points
 from tissuq.inference.linear import times_gaussians
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, even_points
 from tissuq.model.noise import stress_level
 
 STRETCH = np.linspace(0.7, 1.9, 14)

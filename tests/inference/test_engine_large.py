@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal, norm
 import tissuq as tq
 from against import TRUTH, columns_of
 from dense import columns
-from tissuq.inference.conditional import ConditionalGaussian
+from tissuq.inference.linear import ConditionalGaussian
 from tissuq.model.statistical_model import StatisticalModel
 
 STRETCH = np.linspace(0.6, 2.0, 500)

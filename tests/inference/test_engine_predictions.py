@@ -10,8 +10,8 @@ import tissuq as tq
 from dense import columns
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.prediction.densities import pointwise_log_likelihood, replicate_data
 from tissuq.prediction.moments import stress_moments
-from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data
 
 REPEATED = np.repeat([0.7, 0.9, 1.2, 1.5, 1.9], [2, 1, 3, 2, 2])
 NEW = np.array([0.7, 0.8, 1.2, 1.7, 1.9])

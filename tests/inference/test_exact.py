@@ -8,8 +8,8 @@ from scipy.stats import multivariate_normal, norm, truncnorm
 
 import tissuq as tq
 from oracle import FORMULATIONS, brute_force
-from tissuq.inference.conditional import ConditionalGaussian
 from tissuq.inference.enumerators.adaptive_cells import solve_exactly
+from tissuq.inference.linear import ConditionalGaussian
 from tissuq.mechanics import NeoHookean, Yeoh, stress_basis
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tissuq.inference.enumerators.missed import has_missed
+from tissuq.inference.enumerators.quadrature import has_missed
 
 BOUNDS = np.array([[-np.inf, np.inf], [-4.0, 4.0]])
 STARTS = np.array([[-2.0, 0.0, 2.0], [-2.0, 0.0, 2.0]])

@@ -11,11 +11,11 @@ from scipy.stats import expon, multivariate_normal, norm, truncnorm
 
 import tissuq as tq
 from tissuq.experiments.modes import Uniaxial
-from tissuq.inference.bounds import Bounded, bounded
 from tissuq.inference.box import Boxes
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.lowrank import correlation_spectrum
 from tissuq.inference.marginal import HermiteCubics, blended, marginal_of_mixture, marginal_of_points
+from tissuq.inference.reduction import correlation_spectrum
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.mechanics import NeoHookean
 from tissuq.model.discrepancy import Constant, GaussianProcess
 from tissuq.model.statistical_model import StatisticalModel
@@ -43,8 +43,8 @@ def test_what_a_bound_cuts_counts_in_the_marginal_though_it_weighs_little(share)
     """A Gaussian far from the bound, and half of one at it, whose mean is 100 sqrt(2 / pi)."""
     free = GaussianMixture(np.array([1 - share]), np.zeros((1, 0)), np.array([[1000.0]]), np.array([[[1.0]]]))
     cut = GaussianMixture(np.array([share]), np.zeros((1, 0)), np.array([[0.0]]), np.array([[[100.0]]]))
-    none = GaussianMixture(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((0, 1, 1)))
-    found = Bounded(free, {0: cut}, none, boxes([0.0], [np.inf])).marginal(0)
+    touched = np.array([[False], [True]])
+    found = TruncatedMixture(free.joined(cut), touched, boxes([0.0], [np.inf])).marginal(0)
     at_bound = 100 * np.sqrt(2 / np.pi)
     assert found.mean == pytest.approx((1 - share) * 1000 + share * at_bound, rel=1e-7)
     assert found.quantile(share / 2) < 500 < found.quantile(1.5 * share)
@@ -101,7 +101,7 @@ def test_a_part_that_bounds_cut_and_that_hardly_weighs_is_kept_without_harm():
     weights = np.array([1 - 7e-8, 7e-8])
     mean, root = np.array([[9.0, 9.0], [0.5, 0.5]]), np.repeat(np.eye(2)[None], 2, axis=0)
     parts = GaussianMixture(weights, np.zeros((2, 0)), mean, root)
-    found = bounded(parts, box.beyond(mean, root), box)
+    found = TruncatedMixture.of(parts, box.beyond(mean, root), box)
     assert len(found.crossed.weights) == 1
     for place in range(2):
         assert found.marginal(place).mean == pytest.approx(9.0, abs=1e-6)

@@ -9,8 +9,7 @@ from scipy.stats import norm
 
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.quadrature import integrate
-from tissuq.inference.enumerators.survey import survey
-from tissuq.inference.enumerators.warp import Warp, warp_along
+from tissuq.inference.enumerators.survey import Warp, survey, warp_along
 from tissuq.parameters.priors import HalfNormal, Normal, Uniform
 
 

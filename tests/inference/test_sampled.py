@@ -8,10 +8,10 @@ from scipy.stats import multivariate_normal
 
 import gallery
 import tissuq as tq
-from tissuq.inference.conditional import ConditionalGaussian
 from tissuq.inference.densities import given_density, joint_density
 from tissuq.inference.enumerators.adaptive_cells import solve_exactly
 from tissuq.inference.enumerators.sampled import sample_joint, sample_nuts_given
+from tissuq.inference.linear import ConditionalGaussian
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel

@@ -20,7 +20,7 @@ from tissuq.inference.coordinates import Box, log_density_on_line
 from tissuq.inference.enumerators import smc
 from tissuq.inference.enumerators.mutation import compiled_program
 from tissuq.inference.enumerators.smc import SmcDraws, SmcSettings, sample_smc
-from tissuq.inference.resampling import resampled_at_random
+from tissuq.inference.quasi_monte_carlo import resampled_at_random
 
 ERRORS_ALLOWED = 5.0
 RUNS = 8

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.targets import target_named
+from tissuq.next_test.candidates import target_named
 
 MODEL = tq.fit(
     tq.simulate("mooney-rivlin", {"C10": 0.5, "C01": 0.1}, [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4], 0.02, seed=1),

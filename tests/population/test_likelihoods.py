@@ -11,8 +11,7 @@ from scipy.stats import multivariate_normal, norm
 import tissuq as tq
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.population.hierarchy import Hierarchy, _log_posterior, _population, _terms
-from tissuq.population.likelihoods import Coordinates, _split, coordinates_of, likelihoods_of, mixtures_of
-from tissuq.population.mixture import reduced
+from tissuq.population.likelihoods import Coordinates, _split, coordinates_of, likelihoods_of, mixtures_of, reduced
 
 STRETCH = np.linspace(0.8, 1.5, 12)
 

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from tissuq.prediction.mixture import Mixtures
+from tissuq.prediction.bands import Mixtures
 
 
 def one_place(weights, means, sds):

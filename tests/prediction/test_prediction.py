@@ -9,8 +9,8 @@ from scipy.stats import multivariate_normal, norm
 import gallery
 import tissuq as tq
 from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.prediction.densities import pointwise_log_likelihood
 from tissuq.prediction.moments import borne, drawn_curves, stress_moments
-from tissuq.prediction.replicates import pointwise_log_likelihood
 
 TRUTH = {"C10": 1.2, "C20": -0.057, "C30": 0.004}
 STRETCH = np.linspace(0.6, 2.2, 14)

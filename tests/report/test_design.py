@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import tissuq as tq
-from tissuq.next_test.targets import target_named
+from tissuq.next_test.candidates import target_named
 from tissuq.report.design import design_figure, heading, readable_design, write_design
 from tissuq.studies.design import DesignSettings, DesignStudy
 

@@ -8,8 +8,8 @@ import pytest
 import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.finite_elements import ClampedBar, simulate
+from tissuq.studies.stream import open_pool
 from tissuq.studies.structure import SimulationSettings, load_posteriors, run_simulation
-from tissuq.studies.workers import open_pool
 
 pytest.importorskip("felupe", reason="FElupe is not installed")
 

@@ -15,8 +15,7 @@ from threading import Timer
 import pytest
 
 from tissuq.errors import InputError
-from tissuq.studies.stream import RESULTS, run_tasks
-from tissuq.studies.workers import open_pool
+from tissuq.studies.stream import RESULTS, open_pool, run_tasks
 from worker_tasks import Number, doubled
 
 TESTS = Path(__file__).parents[1]

@@ -18,8 +18,7 @@ import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics import MooneyRivlin, Ogden2, Yeoh, engineering_stress
-from tissuq.studies.stream import RESULTS
-from tissuq.studies.workers import open_pool
+from tissuq.studies.stream import RESULTS, open_pool
 from tissuq.validation.coverage import (
     PRESETS,
     CoverageSettings,

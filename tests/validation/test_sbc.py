@@ -11,11 +11,19 @@ from scipy.stats import binomtest, kstest
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import engineering_stress
 from tissuq.model.discrepancy import discrepancies
-from tissuq.studies.stream import RESULTS
-from tissuq.studies.workers import open_pool
-from tissuq.validation.sbc import SbcSettings, run_sbc, summarise_ranks
-from tissuq.validation.sbc.campaign import carry_out, draw_from_prior, probability_below, tasks_of
-from tissuq.validation.sbc.summary import ecdf_band, shape_p_value, spread_p_value
+from tissuq.studies.stream import RESULTS, open_pool
+from tissuq.validation.sbc import (
+    SbcSettings,
+    carry_out,
+    draw_from_prior,
+    ecdf_band,
+    probability_below,
+    run_sbc,
+    shape_p_value,
+    spread_p_value,
+    summarise_ranks,
+    tasks_of,
+)
 
 SIZE = 1e-4
 

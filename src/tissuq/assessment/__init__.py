@@ -1,7 +1,6 @@
 """To what extent a model is wrong, and what the answer rests on."""
 
-from tissuq.assessment.averaging import Average, average
-from tissuq.assessment.comparison import compare
+from tissuq.assessment.comparison import Average, average, compare
 from tissuq.assessment.extent import Assessment, assess
 from tissuq.assessment.measurements import measurement_warnings
 from tissuq.assessment.sensitivity import PowerScaling, known_evidence_changes

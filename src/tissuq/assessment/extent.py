@@ -24,7 +24,7 @@ from tissuq.errors import ConvergenceError, ModelError
 from tissuq.experiments.modes import States
 from tissuq.experiments.reading.units import stress_unit
 from tissuq.inference.marginal import Marginal
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.fitted_errors import FittedErrors

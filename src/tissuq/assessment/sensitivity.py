@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from tissuq.inference.solution import Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior, Uniform
-from tissuq.prediction.densities import joint_log_likelihood
-from tissuq.prediction.replicates import stride
+from tissuq.prediction.densities import joint_log_likelihood, stride
 
 __all__ = ["SCALE_FACTORS", "PowerScaling", "known_evidence_changes", "power_scaling", "rescaled", "scale_symbols"]
 

@@ -13,7 +13,6 @@ import typer
 
 from tissuq.cli.options import Force, once_each
 from tissuq.errors import InputError
-from tissuq.registry import variants
 from tissuq.studies.settings import load_settings
 
 __all__ = ["Mode", "files_of", "inspect", "measured", "one_noise", "reads_files", "resolve", "run_name", "tolerances"]
@@ -113,7 +112,7 @@ def _role(text: str) -> tuple[str, str | int]:
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
     """Return the files that were given; of a folder those in it that may hold measurements."""
-    from tissuq.experiments.reading.specimens import SUFFIXES
+    from tissuq.experiments.reading.several_files import SUFFIXES
 
     files: list[Path] = []
     for path in paths:
@@ -141,7 +140,7 @@ def measured(
     InputError
         When there is not one mode, specimen or noise for each file, or a file does not say its mode.
     """
-    from tissuq.experiments.reading.stated_mode import said_mode, told_mode
+    from tissuq.experiments.reading.several_files import find_mode, stated_mode
 
     noise = _numbers(noise_sd)
     if len(files) < 2:
@@ -149,9 +148,9 @@ def measured(
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one file; give it once.")
         file_setting: dict[str, Any] = {"file": str(files[0])} if files else {}
-        mode = modes[0] if modes else said_mode(files[0]) if files else None
+        mode = modes[0] if modes else stated_mode(files[0]) if files else None
         return reading | file_setting | {"mode": mode, "noise_sd": noise[0] if noise else None}
-    modes = _for_each(files, "--mode", modes) or [told_mode(file) for file in files]
+    modes = _for_each(files, "--mode", modes) or [find_mode(file) for file in files]
     names = _for_each(files, "--specimen", specimens)
     each_noise = _for_each(files, "--noise-sd", noise) if noise and len(noise) > 1 else None
     options = {name: value for name, value in reading.items() if value is not None}
@@ -189,7 +188,7 @@ def run_name(paths: Sequence[Path], config: Path | None, sources: Sequence[Path]
 
 
 def _tolerance(text: str) -> tuple[str, float]:
-    from tissuq.model.measurement_errors import MeasurementError
+    from tissuq.model.measurement_errors import measurement_errors
 
     name, _, number = text.partition("=")
     scale = 0.01 if number.strip().endswith("%") else 1.0
@@ -197,7 +196,7 @@ def _tolerance(text: str) -> tuple[str, float]:
         value = float(number.strip().removesuffix("%")) * scale
     except ValueError:
         value = -1.0
-    name, errors = name.strip(), variants(MeasurementError)
+    name, errors = name.strip(), measurement_errors()
     is_share = name not in errors or not errors[name].is_stress
     if name not in errors or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
         names = ", ".join(errors)

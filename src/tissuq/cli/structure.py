@@ -63,8 +63,8 @@ def structure(
     from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import SOURCE, check_source, copy_source, readable_forces, write_simulation
+    from tissuq.studies.stream import open_pool
     from tissuq.studies.structure import SimulationSettings, load_posteriors, run_simulation
-    from tissuq.studies.workers import open_pool
 
     if bool(run) == bool(config):
         raise InputError("give the RUN folder of a fit, or --config run.toml of an earlier simulation.")

@@ -150,8 +150,7 @@ def sbc(
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
     from tissuq.cli.tables import print_rows
     from tissuq.report.campaigns import readable_ranks, write_sbc
-    from tissuq.validation.sbc import SbcSettings, run_sbc
-    from tissuq.validation.sbc.campaign import tasks_of
+    from tissuq.validation.sbc import SbcSettings, run_sbc, tasks_of
 
     options = {"replicates": replicates, "noise": noise, "seed": seed, "material": material}
     settings = load_settings(SbcSettings, config, options | {"formulations": formulation or None})
@@ -173,7 +172,7 @@ def _carry_out(
     settings: Any, folder: Path, workers: int, scheduler: str | None, total: int, run: Any
 ) -> list[dict[str, Any]]:
     """Carry out a campaign in its folder; nothing is written before its workers are there."""
-    from tissuq.studies.workers import open_pool
+    from tissuq.studies.stream import open_pool
 
     check_folder(folder, settings)
     with open_pool(workers, scheduler) as pool, campaign_progress(total) as step:

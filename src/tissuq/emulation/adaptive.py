@@ -13,8 +13,7 @@ from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator, emulate, runs_needed
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
-from tissuq.emulation.run_plan import PointSet, space_filling
-from tissuq.emulation.runs import ForwardRuns
+from tissuq.emulation.runs import ForwardRuns, PointSet, space_filling
 from tissuq.errors import InputError
 from tissuq.parameters.seeds import check_seed
 

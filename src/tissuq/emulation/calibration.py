@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.emulation.checks import EmulatorCheck
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem
-from tissuq.emulation.runs import ForwardRuns
+from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.emulation.warnings import calibration_warnings
 from tissuq.errors import InputError
 from tissuq.inference.marginal import Marginal
-from tissuq.prediction.mixture import Mixtures
+from tissuq.prediction.bands import Mixtures
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.emulation.basis import OutputBasis, basis_of, has_signs, output_moments
-from tissuq.emulation.checks import EmulatorCheck
 from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, leave_one_out, moments, trend_basis
-from tissuq.emulation.runs import ForwardRuns
+from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError
 from tissuq.parameters.priors import Prior
 

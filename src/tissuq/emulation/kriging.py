@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.kronecker import quasi_random
+from tissuq.inference.quasi_monte_carlo import quasi_random
 
 __all__ = ["Kernel", "Kriging", "Trend", "fitted", "trend_basis"]
 

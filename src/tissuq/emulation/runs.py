@@ -1,4 +1,4 @@
-"""Runs of a forward model: their outputs, and which of them failed where."""
+"""Runs of a forward model: where they are made, what they gave or why they failed, and an emulator's errors there."""
 
 from __future__ import annotations
 
@@ -7,17 +7,75 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.forward import Forward
 from tissuq.errors import InputError
+from tissuq.parameters.priors import Prior
 
-__all__ = ["ForwardRun", "ForwardRuns", "carry_out", "gathered"]
+__all__ = ["EmulatorCheck", "ForwardRun", "ForwardRuns", "PointSet", "carry_out", "gathered", "space_filling"]
 
 FloatArray = NDArray[np.float64]
+
+PointSet = Literal["sobol", "latin"]
+"""Scrambled Sobol points, or a Latin hypercube whose points stay apart."""
+
+TAIL_PROBABILITY = 0.001
+"""Probability of an unbounded prior beyond either end of the run plan."""
+
+
+def space_filling(priors: Mapping[str, Prior], runs: int, seed: int = 0, design: PointSet = "sobol") -> FloatArray:
+    """Return the parameters (runs, d) at which to run a model: evenly spread over the quantiles of their priors.
+
+    Uniform and log-uniform priors are covered up to their ends, others up to their quantiles of 0.1 and 99.9 %.
+
+    Parameters
+    ----------
+    priors : mapping of str to Prior
+        Priors of the d parameters.
+    runs : int
+        Number of points.
+    seed : int
+        Seed of the points.
+    design : str
+        ``"sobol"`` (scrambled Sobol points) or ``"latin"`` (a Latin hypercube whose points are moved apart).
+
+    Raises
+    ------
+    InputError
+        When a prior is flat, there is no such design, or the number of runs is below one.
+
+    Examples
+    --------
+    >>> from tissuq import Uniform
+    >>> points = space_filling({"C10": Uniform(0, 2), "C20": Uniform(-1, 1)}, runs=16)
+    >>> points.shape, bool((points[:, 0] > 1).sum() == 8)
+    ((16, 2), True)
+    """
+    from scipy.stats import qmc
+
+    if design not in get_args(PointSet):
+        raise InputError(f"the design must be one of {', '.join(get_args(PointSet))}, not '{design}'.")
+    if runs < 1:
+        raise InputError(f"the number of runs must be at least 1, not {runs}.")
+    size, generator = len(priors), np.random.default_rng([seed, 41])
+    if design == "sobol":
+        cube = qmc.Sobol(size, rng=generator).random_base2(int(np.ceil(np.log2(max(runs, 2)))))[:runs]
+    else:
+        cube = qmc.LatinHypercube(size, optimization="random-cd", rng=generator).random(runs)
+    columns = zip(priors.values(), cube.T, strict=True)
+    return np.column_stack([_quantiles(prior, column) for prior, column in columns])
+
+
+def _quantiles(prior: Prior, probability: FloatArray) -> FloatArray:
+    is_box = prior.gaussian is not None and prior.gaussian[1] == 0
+    is_whole = is_box or prior.name == "log-uniform"
+    shrunk = probability if is_whole else TAIL_PROBABILITY + (1 - 2 * TAIL_PROBABILITY) * probability
+    return np.asarray(prior.quantile(shrunk), dtype=np.float64)
+
 
 MIN_FAILED_RUNS = 3
 """Smallest number of failed runs from which a threshold of one parameter that separates them is reported."""
@@ -173,3 +231,69 @@ def gathered(symbols: Sequence[str], results: Sequence[Mapping[str, Any]], outpu
         tuple(result["error"] for result in results),
         np.array([result["seconds"] for result in results]),
     )
+
+
+NORMAL_QUANTILE_975 = 1.959963984540054
+"""Standard deviations within which 95 % of normal errors lie."""
+
+ROUNDING_SHARE = 1e-9
+"""Share of the largest output below which an error is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class EmulatorCheck:
+    """Runs of a model beside the emulator's predictions of them.
+
+    Parameters
+    ----------
+    kind : str
+        How the runs were withheld from the emulator.
+    points : (N, d) array
+    computed, predicted : (N, n) array
+        Outputs of the model, and of the emulator.
+    covariance : (N, n, n) array
+        Covariance of the emulator's error.
+    """
+
+    kind: str
+    points: FloatArray
+    computed: FloatArray
+    predicted: FloatArray
+    covariance: FloatArray
+
+    @cached_property
+    def sd(self) -> FloatArray:
+        """Standard deviations (N, n) of the emulator's error."""
+        rounding = ROUNDING_SHARE * np.abs(self.computed).max()
+        return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2) + rounding**2))
+
+    @property
+    def standardised(self) -> FloatArray:
+        """Errors (N, n) over their standard deviations: about standard normal."""
+        return np.asarray((self.computed - self.predicted) / self.sd)
+
+    @property
+    def share_inside(self) -> float:
+        """Share of the outputs within 1.96 standard deviations: about 0.95."""
+        return float((np.abs(self.standardised) < NORMAL_QUANTILE_975).mean())
+
+    @property
+    def rms_standardised(self) -> float:
+        """Root mean square of the standardised errors: about one; more where the emulator is over-confident."""
+        return float(np.sqrt((self.standardised**2).mean()))
+
+    @property
+    def log_density(self) -> float:
+        """Mean over the outputs of the log of their marginal densities."""
+        return float((-0.5 * self.standardised**2 - np.log(self.sd)).mean() - 0.5 * np.log(2 * np.pi))
+
+    @property
+    def relative_error(self) -> float:
+        """Root mean square of the errors over that of the outputs."""
+        return float(np.sqrt(((self.computed - self.predicted) ** 2).sum() / (self.computed**2).sum()))
+
+    def __str__(self) -> str:
+        return (
+            f"{self.kind}: {len(self.points)} runs, relative error {self.relative_error:.2g} (root mean square), "
+            f"{self.share_inside:.0%} of the outputs inside 95 %, standardised errors {self.rms_standardised:.2g} (1)"
+        )

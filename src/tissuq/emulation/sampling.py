@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from tissuq.emulation.likelihood import Likelihood, log_posterior
 from tissuq.emulation.problem import Method, Problem
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.inference.enumerators.importance import Proposal, adapted, effective, log_normal
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal, systematic
 
 __all__ = ["SampledPosterior", "sample_posterior"]
 
 FloatArray = NDArray[np.float64]
 
-SEARCH_POINTS, ROUND_POINTS, ROUNDS = 512, 1024, 8
+SEARCH_POINTS, ROUND_POINTS, MAX_ROUNDS = 512, 1024, 8
 """Points of a search round; points of a sampling round, and the number of sampling rounds."""
 MIN_EFFECTIVE_POINTS = 800
 """Smallest effective number of points of a converged posterior."""
@@ -146,10 +145,10 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
     exact = Likelihood(likelihood.problem, likelihood.emulator, has_error=False)
     size = len(likelihood.problem.symbols)
     searched = [adapted(partial(_log_target, candidate), size, SEARCH_POINTS) for candidate in (exact, likelihood)]
-    cube = qmc.Sobol(size, rng=np.random.default_rng([seed, 43])).random(ROUND_POINTS * ROUNDS)
+    cube = qmc.Sobol(size, rng=np.random.default_rng([seed, 43])).random(ROUND_POINTS * MAX_ROUNDS)
     proposals: list[Proposal] = []
     scores, targets, logs = np.zeros((0, size)), np.zeros(0), np.zeros(0)
-    for number, uniforms in enumerate(np.split(np.clip(cube, 1e-12, 1 - 1e-12), ROUNDS)):
+    for number, uniforms in enumerate(np.split(np.clip(cube, 1e-12, 1 - 1e-12), MAX_ROUNDS)):
         proposals.append(searched[number] if number < len(searched) else _moved(scores, logs))
         new = proposals[-1].points(uniforms)
         scores, targets = np.concatenate([scores, new]), np.concatenate([targets, _log_target(likelihood, new)])

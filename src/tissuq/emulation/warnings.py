@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from tissuq.emulation.checks import EmulatorCheck
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem
+from tissuq.emulation.runs import EmulatorCheck
 
 if TYPE_CHECKING:
     from tissuq.emulation.sampling import SampledPosterior

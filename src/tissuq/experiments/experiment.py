@@ -156,10 +156,10 @@ class Experiment:
         single = [test for experiment in tests for test in experiment.tests]
         if not single:
             raise InputError("there is no experiment to fit.")
-        for (number, test), (second, other) in combinations(enumerate(single, 1), 2):
-            if test.has_measurements_of(other):
+        for (number, test), (later, same) in combinations(enumerate(single, 1), 2):
+            if test.has_measurements_of(same):
                 raise InputError(
-                    f"experiments number {number} ('{test.name}') and {second} ('{other.name}') hold the same "
+                    f"experiments number {number} ('{test.name}') and {later} ('{same.name}') hold the same "
                     "measurements, which would count twice: leave one of them out."
                 )
         return single[0] if len(single) == 1 else cls._of_curves(curve for test in single for curve in test.curves)
@@ -266,16 +266,16 @@ class Experiment:
         """Return the same measurements with another name, source, stress_unit or specimen."""
         return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
 
-    def has_measurements_of(self, other: Experiment) -> bool:
+    def has_measurements_of(self, experiment: Experiment) -> bool:
         """Return whether another experiment has the same curves."""
-        return len(self.curves) == len(other.curves) and all(
+        return len(self.curves) == len(experiment.curves) and all(
             curve.mode == same.mode
             and np.array_equal(curve.points, same.points)
             and np.array_equal(curve.stress, same.stress)
-            for curve, same in zip(self.curves, other.curves, strict=True)
+            for curve, same in zip(self.curves, experiment.curves, strict=True)
         )
 
-    def joined(self, other: Experiment) -> Experiment:
+    def joined(self, experiment: Experiment) -> Experiment:
         """Return this experiment with the measurements of another one in the same loading mode added.
 
         Raises
@@ -285,15 +285,15 @@ class Experiment:
         """
         if len(self.tests) > 1:
             raise InputError(
-                f"experiment '{other.name}' cannot be added to a fit of several tests: fit all together again."
+                f"experiment '{experiment.name}' cannot be added to a fit of several tests: fit all together again."
             )
-        if other.mode != self.mode:
+        if experiment.mode != self.mode:
             raise InputError(
-                f"experiment '{other.name}' is {other.mode.name} and experiment '{self.name}' {self.mode.name}: only "
-                "measurements in the same loading mode can be added."
+                f"experiment '{experiment.name}' is {experiment.mode.name} and experiment '{self.name}' "
+                f"{self.mode.name}: only measurements in the same loading mode can be added."
             )
         stretch, stress = (
-            np.concatenate(pair) for pair in ((self.stretch, other.stretch), (self.stress, other.stress))
+            np.concatenate(pair) for pair in ((self.stretch, experiment.stretch), (self.stress, experiment.stress))
         )
         return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit, self.specimen)
 

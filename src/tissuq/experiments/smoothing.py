@@ -11,12 +11,12 @@ __all__ = ["Smoothed", "scatter", "smoothed"]
 
 FloatArray = NDArray[np.float64]
 
-SMOOTHED = 2000
-"""Places at most between which a curve is smoothed."""
-FEWEST = 5
-"""Different places from which there is a spline."""
+MAX_KNOTS = 2000
+"""Number of different stretches at most between which a curve is smoothed."""
+MIN_KNOTS = 5
+"""Number of different stretches from which there is a spline."""
 ORDER = 3
-"""Of the differences that tell the scatter: they are zero for a parabola."""
+"""Order of the differences that show the scatter: they are zero for a parabola."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,44 +27,44 @@ class Smoothed:
     slope: FloatArray
 
 
-def smoothed(place: FloatArray, stress: FloatArray) -> Smoothed:
-    """Return a smoothing spline through stresses (n,) at places (n,), or with few places the means and their slope.
+def smoothed(abscissa: FloatArray, stress: FloatArray) -> Smoothed:
+    """Return a smoothing spline through stresses (n,) at abscissas (n,), or with few of them the means and their slope.
 
     Generalised cross-validation chooses how smooth (SciPy).
     """
-    at, mean, count, which = _averaged(place, stress)
-    if len(at) < FEWEST:
-        slope = np.gradient(mean, at) if len(at) > 1 else np.zeros(1)
-        return Smoothed(mean[which], slope[which])
+    knots, mean, count, group = _averaged(abscissa, stress)
+    if len(knots) < MIN_KNOTS:
+        slope = np.gradient(mean, knots) if len(knots) > 1 else np.zeros(1)
+        return Smoothed(mean[group], slope[group])
     from scipy.interpolate import make_smoothing_spline
 
-    spline = make_smoothing_spline(at, mean, w=count)
-    return Smoothed(np.asarray(spline(place)), np.asarray(spline.derivative()(place)))
+    spline = make_smoothing_spline(knots, mean, w=count)
+    return Smoothed(np.asarray(spline(abscissa)), np.asarray(spline.derivative()(abscissa)))
 
 
-def scatter(place: FloatArray, stress: FloatArray) -> float | None:
+def scatter(abscissa: FloatArray, stress: FloatArray) -> float | None:
     """Return the standard deviation of single measurements about a smooth curve; None where there are too few.
 
     From third divided differences, scaled to the variance of a measurement: what is left of noise, next to nothing of a
     smooth curve (Gasser, Sroka & Jennen-Steinmetz 1986, there with second differences).
     """
-    at, mean, count, _ = _averaged(place, stress)
-    if len(at) <= 2 * ORDER:
+    knots, mean, count, _ = _averaged(abscissa, stress)
+    if len(knots) <= 2 * ORDER:
         return None
     windows = np.lib.stride_tricks.sliding_window_view
-    around = windows(at, ORDER + 1)
-    apart = around[:, :, None] - around[:, None, :] + np.eye(ORDER + 1)
-    weights = 1 / apart.prod(axis=2)
+    neighbours = windows(knots, ORDER + 1)
+    distances = neighbours[:, :, None] - neighbours[:, None, :] + np.eye(ORDER + 1)
+    weights = 1 / distances.prod(axis=2)
     size = np.sqrt((weights**2 / windows(count, ORDER + 1)).sum(axis=1))
     differences = (weights * windows(mean, ORDER + 1)).sum(axis=1) / size
     return float(np.sqrt((differences**2).mean()))
 
 
-def _averaged(place: FloatArray, stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
-    """Return different places, mean stresses and numbers of measurements there, and whose place each one has."""
-    at, which, count = np.unique(place, return_inverse=True, return_counts=True)
-    if len(at) > SMOOTHED:
-        edges = np.linspace(at[0], at[-1], SMOOTHED + 1)[1:-1]
-        _, which, count = np.unique(np.searchsorted(edges, place), return_inverse=True, return_counts=True)
-        at = np.bincount(which, place) / count
-    return at, np.bincount(which, stress) / count, count.astype(np.float64), which
+def _averaged(abscissa: FloatArray, stress: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
+    """Return different abscissas, mean stresses and numbers of measurements there, and at which of them each one is."""
+    knots, group, count = np.unique(abscissa, return_inverse=True, return_counts=True)
+    if len(knots) > MAX_KNOTS:
+        edges = np.linspace(knots[0], knots[-1], MAX_KNOTS + 1)[1:-1]
+        _, group, count = np.unique(np.searchsorted(edges, abscissa), return_inverse=True, return_counts=True)
+        knots = np.bincount(group, abscissa) / count
+    return knots, np.bincount(group, stress) / count, count.astype(np.float64), group

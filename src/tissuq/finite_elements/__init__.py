@@ -1,8 +1,6 @@
 """Finite elements with the draws of a posterior: materials for FElupe, cases, and the uncertainty of what they give."""
 
-from tissuq.finite_elements.case import Case, Mesh, Supports, cases
-from tissuq.finite_elements.clamped_bar import ClampedBar
-from tissuq.finite_elements.indentation import Indentation
+from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, Supports, cases
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond
 from tissuq.finite_elements.simulation import Failure, Simulation, simulate

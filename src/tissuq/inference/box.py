@@ -9,30 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.kronecker import SHIFTS, quasi_random
-from tissuq.inference.nested import MOST_NESTED, nested_draws, nested_log_mass
+from tissuq.inference.nested import MAX_NESTED, nested_draws, nested_log_mass
+from tissuq.inference.quasi_monte_carlo import SHIFTS, quasi_random
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
-__all__ = ["NEGLIGIBLE", "TOUCHED", "Boxes", "lower_triangle"]
+__all__ = ["NEGLIGIBLE_MASS", "TOUCHED_MASS", "Boxes", "lower_triangle"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-NEGLIGIBLE = 1e-8
+NEGLIGIBLE_MASS = 1e-8
 """Mass outside the bounds below which the unbounded closed form stands."""
-TOUCHED = 1e-3 * NEGLIGIBLE
+TOUCHED_MASS = 1e-3 * NEGLIGIBLE_MASS
 """Mass of one parameter beyond its bounds below which it is as good as unbounded."""
-SMALL = 1e-6
+SMALL_MASS = 1e-6
 """Mass outside below which the sum over parameters is near enough."""
-POINTS = 512
-ACCURATE = 1e-3
+FIRST_POINTS, MAX_POINTS = 512, 30_000
+"""Points for each Gaussian to begin with, and beyond which no more are taken."""
+MAX_LOG_MASS_ERROR = 1e-3
 """Error of the log mass from which more points are taken."""
-DEEP = 15.0
+MAX_LOG_MASS_DROP = 15.0
 """Log of the mass within all bounds, relative to the least within one, below which the points may have missed it."""
-AT_ONCE = 500_000
+MAX_POINTS_AT_ONCE = 500_000
 """Points at once: what bounds the memory."""
-MOST_POINTS = 30_000
-SWEEPS = 100
+GIBBS_SWEEPS = 100
 """Gibbs sweeps that take draws to their distribution."""
 
 
@@ -75,14 +75,14 @@ class Boxes:
         low, high = self._scores(mean, root)
         mass_beyond = _beyond(low, high)
         outside = mass_beyond.sum(axis=1)
-        log_mass, error = np.log1p(-np.minimum(outside, 0.5)), np.minimum(outside, SMALL)
-        active = mass_beyond > TOUCHED
+        log_mass, error = np.log1p(-np.minimum(outside, 0.5)), np.minimum(outside, SMALL_MASS)
+        active = mass_beyond > TOUCHED_MASS
         is_single = active.sum(axis=1) == 1
         if is_single.any():
             only = active[is_single].argmax(axis=1)[:, None]
             log_mass[is_single] = log_interval(*(np.take_along_axis(s[is_single], only, 1)[:, 0] for s in (low, high)))
             error[is_single] = 0.0
-        several = (active.sum(axis=1) > 1) & (outside > SMALL)
+        several = (active.sum(axis=1) > 1) & (outside > SMALL_MASS)
         for parameters, crossed in _by_pattern(active, several):
             crossing = np.ix_(crossed, parameters)
             log_mass[crossed], error[crossed] = self[crossing]._log_mass(mean[crossing], root[crossing])
@@ -96,14 +96,14 @@ class Boxes:
         from scipy.special import ndtri
 
         values = np.empty(uniforms.shape)
-        active = self.beyond(mean, root) > TOUCHED
+        active = self.beyond(mean, root) > TOUCHED_MASS
         for parameters, rows in _by_pattern(active, np.ones(len(mean), dtype=bool)):
             k, near = len(parameters), np.ix_(rows, parameters)
             order = np.concatenate([parameters, np.setdiff1d(np.arange(mean.shape[1]), parameters)])
             triangle = lower_triangle(root[np.ix_(rows, order)])
             triangle_near, uniforms_near = triangle[:, :k, :k], uniforms[rows, :, :k]
             scores = ndtri(uniforms[rows])
-            if k > MOST_NESTED:
+            if k > MAX_NESTED:
                 deviations = self[near]._gibbs(mean[near], triangle_near, uniforms_near) - mean[near][:, None]
                 scores[:, :, :k] = np.linalg.solve(triangle_near, deviations.swapaxes(1, 2)).swapaxes(1, 2)
             elif k:
@@ -115,10 +115,10 @@ class Boxes:
 
     def _log_mass(self, mean: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return log masses and their errors where every bound matters."""
-        if mean.shape[1] > MOST_NESTED:
-            log_mass, error = self._by_points(mean, root, POINTS)
+        if mean.shape[1] > MAX_NESTED:
+            log_mass, error = self._by_points(mean, root, FIRST_POINTS)
             # The error is not to be trusted where no bound alone tells how little is left.
-            return log_mass, error + np.where(self.ceiling(mean, root) - log_mass > DEEP, 1.0, 0.0)
+            return log_mass, error + np.where(self.ceiling(mean, root) - log_mass > MAX_LOG_MASS_DROP, 1.0, 0.0)
         log_mass, error = np.empty(len(mean)), np.empty(len(mean))
         for block in np.array_split(np.arange(len(mean)), 1 + len(mean) // 500):
             ends = ((bound[block] - mean[block]) for bound in (self.lower, self.upper))
@@ -138,7 +138,7 @@ class Boxes:
             values[block] = points[np.arange(len(block)), (cumulative < targets).sum(axis=1)]
         inverse = np.linalg.inv(root)
         precision = inverse.swapaxes(1, 2) @ inverse
-        for _ in range(SWEEPS):
+        for _ in range(GIBBS_SWEEPS):
             for j in range(p):
                 deviation, precision_of_j = values - mean, precision[:, j, j]
                 deviation[:, j] = 0.0
@@ -154,7 +154,7 @@ class Boxes:
         from scipy.special import logsumexp
 
         log_mass, error = np.empty(len(mean)), np.empty(len(mean))
-        for block in np.array_split(np.arange(len(mean)), 1 + len(mean) * number // AT_ONCE):
+        for block in np.array_split(np.arange(len(mean)), 1 + len(mean) * number // MAX_POINTS_AT_ONCE):
             log_weights, _ = self[block].points(mean[block], root[block], number)
             top = log_weights.max(axis=1, keepdims=True)
             shares = np.exp(log_weights - top).reshape(len(block), SHIFTS, -1).mean(axis=2)
@@ -162,12 +162,12 @@ class Boxes:
             effective = np.exp(2 * logsumexp(log_weights, axis=1) - logsumexp(2 * log_weights, axis=1))
             spread = shares.std(axis=1, ddof=1) / np.sqrt(SHIFTS) / shares.mean(axis=1)
             error[block] = spread + 10 / effective**1.5
-        rough = np.flatnonzero(error > ACCURATE)
-        if len(rough) and number < MOST_POINTS:
+        rough = np.flatnonzero(error > MAX_LOG_MASS_ERROR)
+        if len(rough) and number < MAX_POINTS:
             log_mass[rough], error[rough] = self[rough]._by_points(mean[rough], root[rough], 8 * number)
         return log_mass, error
 
-    def points(self, mean: FloatArray, root: FloatArray, number: int = POINTS) -> tuple[FloatArray, FloatArray]:
+    def points(self, mean: FloatArray, root: FloatArray, number: int = FIRST_POINTS) -> tuple[FloatArray, FloatArray]:
         """Return log weights (M, P) and P = number points (M, P, p) inside the bounds (M, p).
 
         They stand for M bounded Gaussians, drawn one parameter after another; the mean weight is the mass inside.

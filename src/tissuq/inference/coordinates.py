@@ -38,11 +38,11 @@ Floats = NDArray[np.float64]
 Derivatives = Callable[[Any], tuple[Any, Any, Any]]
 """Maps a point to the value, the gradient and the Hessian of a log density."""
 
-SEARCHES = 8
+MODE_SEARCHES = 8
 """Starting points of the search for modes: the given one, the others scattered over the box."""
 NEGLIGIBLE_MASS = 1e-2
 """Modes with less than this share of the best mode's probability, by Laplace's approximation, are ignored."""
-SAME_MODE = 0.5
+SAME_MODE_SDS = 0.5
 """Two modes closer than this, in standard deviations, are one."""
 
 
@@ -249,7 +249,7 @@ def find_modes(
     # A standard normal variable on the line is a uniform one between two bounds.
     centre = np.where(box.is_bounded, 0.0, mode_at_start.location)
     spread = np.where(box.is_bounded, 1.0, 10 * np.linalg.norm(mode_at_start.scale, axis=1))
-    scattered = centre + spread * generator.standard_normal((SEARCHES - 1, line.size))
+    scattered = centre + spread * generator.standard_normal((MODE_SEARCHES - 1, line.size))
     modes = [mode_at_start] + [_climb(derivatives, point) for point in scattered if _is_finite(derivatives(point))]
     return _distinct(sorted(modes, key=lambda mode: -mode.log_mass))
 
@@ -257,7 +257,7 @@ def find_modes(
 def _distinct(modes: list[Mode]) -> tuple[Mode, ...]:
     distinct: list[Mode] = []
     for mode in modes:
-        is_new = all(np.linalg.norm(earlier.whiten(mode.location)) > SAME_MODE for earlier in distinct)
+        is_new = all(np.linalg.norm(earlier.whiten(mode.location)) > SAME_MODE_SDS for earlier in distinct)
         if is_new and mode.log_mass >= modes[0].log_mass + np.log(NEGLIGIBLE_MASS):
             distinct.append(mode)
     return tuple(distinct)

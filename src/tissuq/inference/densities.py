@@ -14,7 +14,7 @@ import numpy as np
 from jax.scipy.linalg import solve_triangular
 
 from tissuq.experiments.modes import States
-from tissuq.inference.algebra import Fit, condition
+from tissuq.inference.linear import Fit, condition
 from tissuq.inference.reduction import Reducer, divided_columns
 from tissuq.mechanics import traced_stress_basis
 from tissuq.model.statistical_model import StatisticalModel

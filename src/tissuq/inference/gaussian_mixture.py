@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.inference.marginal import Marginal, marginal_of_mixture
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 
 __all__ = ["CHAINS", "GaussianMixture"]
 

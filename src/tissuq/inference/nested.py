@@ -10,28 +10,31 @@ from numpy.typing import NDArray
 
 from tissuq.parameters.normal_interval import interval_quantile, log_interval
 
-__all__ = ["MOST_NESTED", "nested_draws", "nested_log_density", "nested_log_mass", "nested_points"]
+__all__ = ["MAX_NESTED", "nested_draws", "nested_log_density", "nested_log_mass", "nested_points"]
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
-MOST_NESTED = 3
+MAX_NESTED = 3
 """Parameters whose bounds are integrated so: the effort grows by two hundred with each."""
-DROPS = 26.0, 4.0
+LOG_DENSITY_DROPS = 26.0, 4.0
 """What lies so far below the largest log density is negligible (e^-26 is 5e-12), or not worth close attention."""
-REACH = 12.0
+REACH_SDS = 12.0
 """Standard deviations, beyond a point within the bounds, where nothing is left."""
-ROUNDING = 1e-15
-ACCURATE = 1e-7
+MASS_ROUNDING = 1e-15
+"""Rounding error of the closed form for the mass of two parameters within bounds."""
+MAX_ROUNDING_ERROR = 1e-7
 """Relative error up to which rounding is borne with."""
-FAR = 38.0
+MAX_SCORE = 38.0
 """Standard deviations beyond which a parameter never is."""
-GRID = 16
-ZOOMS, HALVINGS = 12, 12
+GRID_POINTS, MAX_ZOOMS, HALVINGS = 16, 12, 12
+"""Points of a grid that zooms in on the density, how often at most, and halvings of what is then left."""
 PIECES = 4
-STEP, TICKS = 0.15, 20
+"""In which the density is smooth enough for a rule."""
+TICK_STEP, TICKS_PER_SIDE = 0.15, 20
 """Of the rule's coordinate: what lies beyond the last tick is 1e-13 of a piece."""
-FINER = 4
+POINTS_PER_TICK = 4
+"""At which the cumulative probability is tabulated."""
 
 
 def nested_log_mass(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -59,8 +62,8 @@ def nested_log_mass(triangle: FloatArray, low: FloatArray, high: FloatArray) -> 
     if low.shape[1] > 2:
         return _integrated(triangle, low, high)
     mass = _rectangle(triangle, low, high)
-    log_mass, error = np.log(np.maximum(mass, ROUNDING)), ROUNDING / np.maximum(mass, ROUNDING)
-    deep = mass < ROUNDING / ACCURATE
+    log_mass, error = np.log(np.maximum(mass, MASS_ROUNDING)), MASS_ROUNDING / np.maximum(mass, MASS_ROUNDING)
+    deep = mass < MASS_ROUNDING / MAX_ROUNDING_ERROR
     if deep.any():
         log_mass[deep], error[deep] = _integrated(triangle[deep], low[deep], high[deep])
     return log_mass, error
@@ -124,13 +127,14 @@ def _distribution(score: FloatArray, log_terms: FloatArray) -> tuple[FloatArray,
     mass_of_piece = terms.sum(axis=2, keepdims=True)
     cumulative = np.cumsum(terms, axis=2) - 0.5 * terms - np.gradient(terms, axis=2) / 12
     cumulative += np.cumsum(mass_of_piece, axis=1) - mass_of_piece
-    f = np.arange(FINER) / FINER
+    f = np.arange(POINTS_PER_TICK) / POINTS_PER_TICK
     basis = (1 + 2 * f) * (1 - f) ** 2, f**2 * (3 - 2 * f), f * (1 - f) ** 2, f**2 * (f - 1)
     ends = cumulative[:, :, :-1], cumulative[:, :, 1:], terms[:, :, :-1], terms[:, :, 1:]
     between = sum(end[..., None] * weight for end, weight in zip(ends, basis, strict=True))
     nodes = score.reshape(terms.shape)
     start, width = nodes[:, :, :1], nodes[:, :, -1:] - nodes[:, :, :1]
-    positions = _positions(np.arange(-TICKS * FINER, TICKS * FINER) * STEP / FINER)[0]
+    reach = TICKS_PER_SIDE * POINTS_PER_TICK
+    positions = _positions(np.arange(-reach, reach) * TICK_STEP / POINTS_PER_TICK)[0]
     fine = start + width * (positions - positions[0])
     total = mass_of_piece.sum(axis=1)
     return np.maximum.accumulate(between.reshape(len(score), -1) / total, axis=1), fine.reshape(len(score), -1)
@@ -143,7 +147,7 @@ def _integrated(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tupl
     terms = np.exp(log_terms - top)
     mass = terms.sum(axis=1)
     error = np.abs((terms * half).sum(axis=1) / mass - 1) + (terms * errors).sum(axis=1) / mass
-    return top[:, 0] + np.log(mass), np.asarray(error + np.exp(-DROPS[0]))
+    return top[:, 0] + np.log(mass), np.asarray(error + np.exp(-LOG_DENSITY_DROPS[0]))
 
 
 def _nodes(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, ...]:
@@ -173,7 +177,7 @@ def _rectangle(triangle: FloatArray, low: FloatArray, high: FloatArray) -> Float
             value -= owens_t(h, (k - correlation * h) / (h * complement))
             return np.asarray(value - owens_t(k, (h - correlation * k) / (k * complement)))
 
-    scores = (np.clip(end / sd, -FAR, FAR) for end in (low, high))
+    scores = (np.clip(end / sd, -MAX_SCORE, MAX_SCORE) for end in (low, high))
     (a, b), (c, d) = (np.where(score == 0, 1e-99, score).T for score in scores)
     return probability_below(c, d) - probability_below(a, d) - probability_below(c, b) + probability_below(a, b)
 
@@ -184,7 +188,7 @@ def _first_range(triangle: FloatArray, low: FloatArray, high: FloatArray) -> tup
     for j in range(low.shape[1]):
         shift = np.einsum("mk,mk->m", triangle[:, j, :j], scores[:, :j])
         scores[:, j] = np.clip(0.0, *((end[:, j] - shift) / triangle[:, j, j] for end in (low, high)))
-    reach = np.sqrt((scores**2).sum(axis=1)) + REACH
+    reach = np.sqrt((scores**2).sum(axis=1)) + REACH_SDS
     first_low, first_high = (end[:, 0] / triangle[:, 0, 0] for end in (low, high))
     return np.maximum(first_low, -reach), np.minimum(first_high, reach)
 
@@ -196,16 +200,16 @@ def _pieces(log_density: LogDensity, start: FloatArray, end: FloatArray) -> Floa
     enclose them.
     """
     rows = np.arange(len(start))
-    fractions = np.linspace(0, 1, GRID)
-    for _ in range(ZOOMS):
+    fractions = np.linspace(0, 1, GRID_POINTS)
+    for _ in range(MAX_ZOOMS):
         grid = start[:, None] + (end - start)[:, None] * fractions
         values = log_density(grid)
         best = values.argmax(axis=1)
-        seen = values > values.max(axis=1, keepdims=True) - DROPS[0]
-        leftmost, rightmost = seen.argmax(axis=1), GRID - 1 - seen[:, ::-1].argmax(axis=1)
-        outer_left, outer_right = np.maximum(leftmost - 1, 0), np.minimum(rightmost + 1, GRID - 1)
+        seen = values > values.max(axis=1, keepdims=True) - LOG_DENSITY_DROPS[0]
+        leftmost, rightmost = seen.argmax(axis=1), GRID_POINTS - 1 - seen[:, ::-1].argmax(axis=1)
+        outer_left, outer_right = np.maximum(leftmost - 1, 0), np.minimum(rightmost + 1, GRID_POINTS - 1)
         start, end = grid[rows, outer_left], grid[rows, outer_right]
-        if (outer_right - outer_left >= GRID // 2).all():
+        if (outer_right - outer_left >= GRID_POINTS // 2).all():
             break
     mode, top, reach = grid[rows, best], values.max(axis=1), grid[:, 1] - grid[:, 0]
     outer = np.column_stack([start, start, end, end])
@@ -216,7 +220,7 @@ def _pieces(log_density: LogDensity, start: FloatArray, end: FloatArray) -> Floa
         values = log_density(tried)
         best = values.argmax(axis=1)
         mode, top = tried[rows, best], values[rows, best]
-        seen = values[:, :4] > top[:, None] - np.array([*DROPS, *DROPS[::-1]])
+        seen = values[:, :4] > top[:, None] - np.array([*LOG_DENSITY_DROPS, *LOG_DENSITY_DROPS[::-1]])
         outer, inner = np.where(seen, outer, middle), np.where(seen, middle, inner)
     return np.sort(np.column_stack([outer, np.clip(mode, outer[:, 0], outer[:, 3])]), axis=1)
 
@@ -227,10 +231,10 @@ def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
 
     Double exponential: insensitive to what is steep at the ends of a piece.
     """
-    ticks = np.arange(-TICKS, TICKS + 1.0)
-    position, slope = _positions(STEP * ticks)
+    ticks = np.arange(-TICKS_PER_SIDE, TICKS_PER_SIDE + 1.0)
+    position, slope = _positions(TICK_STEP * ticks)
     half = np.where(ticks % 2, 0.0, 2.0)
-    position, log_weight, half = (np.tile(row, (PIECES, 1)) for row in (position, np.log(STEP * slope), half))
+    position, log_weight, half = (np.tile(row, (PIECES, 1)) for row in (position, np.log(TICK_STEP * slope), half))
     return position, log_weight, half
 
 

@@ -16,9 +16,9 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.smoothing import smoothed
-from tissuq.registry import find, variants
+from tissuq.registry import find, plugins, variants
 
-__all__ = ["BETWEEN_SPECIMENS", "ErrorPoints", "MeasurementError", "Tolerances", "specimens_of"]
+__all__ = ["BETWEEN_SPECIMENS", "ErrorPoints", "MeasurementError", "Tolerances", "measurement_errors", "specimens_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -51,6 +51,7 @@ class MeasurementError(ABC):
     standard deviation is then one of `Tolerances`, in closed form like everything that is linear.
     """
 
+    entry_point_group: ClassVar[str] = "tissuq.measurement_errors"
     name: ClassVar[str]
     description: ClassVar[str]
     """What a size of it is, after the number: ``of the strain``."""
@@ -66,6 +67,12 @@ class MeasurementError(ABC):
     @abstractmethod
     def effect(self, points: ErrorPoints) -> Any:
         """Return what a unit of the error adds to the stresses (..., n), MPa."""
+
+
+def measurement_errors() -> dict[str, type[MeasurementError]]:
+    """Return the errors of a test by name, those of other packages included."""
+    plugins(MeasurementError)
+    return variants(MeasurementError)
 
 
 class ScaleError(MeasurementError):
@@ -164,7 +171,8 @@ class Tolerances:
         for name, size in sizes.items():
             if not isinstance(size, Real) or isinstance(size, bool) or not 0 <= float(size) < inf:
                 raise InputError(f"the tolerance of the {name} must be a number, zero or more, not {size!r}.")
-        self._sizes = {name: float(sizes[name]) for name in variants(MeasurementError) if sizes.get(name)}
+        ordered = dict.fromkeys([*variants(MeasurementError), *sizes])
+        self._sizes = {name: float(sizes[name]) for name in ordered if sizes.get(name)}
         self._errors = {name: errors[name] for name in self._sizes}
 
     def __repr__(self) -> str:

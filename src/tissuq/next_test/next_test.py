@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.next_test.candidates import Candidate, farthest_range, reach_of
+from tissuq.next_test.candidates import Candidate, Target, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances
-from tissuq.next_test.targets import Target
 from tissuq.prediction.joint_moments import joint_stresses, states_of
 
 __all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]

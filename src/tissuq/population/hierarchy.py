@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nuts
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.population.likelihoods import likelihoods_of
 
 __all__ = ["Hierarchy", "sample_hierarchy"]

@@ -12,8 +12,7 @@ from tissuq.assessment import known_evidence_changes
 from tissuq.errors import InputError
 from tissuq.inference.solution import Solution
 from tissuq.posterior.netcdf import LabelledGroup
-from tissuq.prediction.densities import leave_one_out
-from tissuq.prediction.replicates import pointwise_log_likelihood, replicate_data, stride
+from tissuq.prediction.densities import leave_one_out, pointwise_log_likelihood, replicate_data, stride
 
 if TYPE_CHECKING:
     import pandas as pd

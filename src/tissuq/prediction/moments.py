@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
-from tissuq.inference.algebra import SpectralCovariance
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.lowrank import correlation_spectrum, scaled_spectrum
+from tissuq.inference.linear import SpectralCovariance
+from tissuq.inference.reduction import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model.discrepancy import Member, side_by_side

@@ -12,8 +12,7 @@ from tissuq.report.figures import STYLE, save_figure
 from tissuq.report.run_folder import RECIPE, embedded_figure, render
 from tissuq.report.tables import significant
 from tissuq.validation.coverage import CoverageSettings, summarise, summarise_unseen
-from tissuq.validation.sbc import SbcSettings, summarise_ranks
-from tissuq.validation.sbc.summary import ecdf_band, probabilities_of
+from tissuq.validation.sbc import SbcSettings, ecdf_band, probabilities_of, summarise_ranks
 
 if TYPE_CHECKING:
     import pandas as pd

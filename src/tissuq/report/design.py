@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.next_test.targets import Target
+from tissuq.next_test.candidates import Target
 from tissuq.report.figures import BAND, BASE, INK, STYLE
 from tissuq.report.run_folder import RECIPE, embedded_figure, render, write_figures, write_recipe
 from tissuq.report.tables import Row, significant, write_csv, write_json

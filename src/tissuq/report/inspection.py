@@ -33,31 +33,28 @@ def curve_figure(inspection: Inspection) -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    stresses = inspection.reading.stresses
+    reading = inspection.reading
+    count = len(reading.used.labels)
     with rc_context(STYLE):
-        figure = Figure(figsize=(9.2, 3.9 * len(stresses)))
-        for (recorded_axis, fitted_axis), stress in zip(
-            figure.subplots(len(stresses), 2, squeeze=False), stresses, strict=True
-        ):
-            _draw_stress(recorded_axis, fitted_axis, stress)
+        figure = Figure(figsize=(9.2, 3.9 * count))
+        for number, (recorded_axis, fitted_axis) in enumerate(figure.subplots(count, 2, squeeze=False)):
+            _draw_stress(recorded_axis, fitted_axis, reading, number)
     return figure
 
 
-def _draw_stress(recorded_axis: Axes, fitted_axis: Axes, reading: Reading) -> None:
-    recorded, used, unit = reading.recorded, reading.used, stress_unit(reading.experiment.stress_unit)
-    prefix = f"{reading.label}, " if reading.label else ""
+def _draw_stress(recorded_axis: Axes, fitted_axis: Axes, reading: Reading, number: int) -> None:
+    used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
+    stretch, stress = reading.recorded.stretch[number], reading.recorded.stress[number] / unit.to_mpa
+    prefix = f"{used.labels[number]}, " if used.labels[number] else ""
     controls = reading.experiment.mode.controls
     name = controls[0].name if len(controls) == 1 else "stretch"
-    recorded_axis.plot(recorded.stretch, recorded.stress / unit.to_mpa, "-", color=BASE, lw=0.8, label="all rows")
-    rows = used.rows
-    recorded_axis.plot(
-        recorded.stretch[rows], recorded.stress[rows] / unit.to_mpa, ".", color=BAND, ms=3, label="rows used"
-    )
+    recorded_axis.plot(stretch, stress, "-", color=BASE, lw=0.8, label="all rows")
+    recorded_axis.plot(stretch[used.rows], stress[used.rows], ".", color=BAND, ms=3, label="rows used")
     recorded_axis.set_title(f"{prefix}as recorded")
     recorded_axis.legend(fontsize=9)
     fitted_axis.axhline(0, color=BASE, lw=0.6)
     fitted_axis.axvline(controls[0].reference, color=BASE, lw=0.6)
-    fitted_axis.plot(used.stretch, used.stress / unit.to_mpa, ".", color=INK, ms=3)
+    fitted_axis.plot(used.stretch[number], used.stress[number] / unit.to_mpa, ".", color=INK, ms=3)
     fitted_axis.set_title(f"{prefix}to be fitted: {len(used)} rows")
     for axis in (recorded_axis, fitted_axis):
         axis.set_xlabel(name)

@@ -19,8 +19,7 @@ from tissuq.report.run_folder import (
     write_tables,
 )
 from tissuq.report.tables import Row, readable_parameters, readable_summary, summary_row, write_csv
-from tissuq.validation.paper.settings import FORMULATIONS
-from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, Fitted, PaperStudy
+from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, FORMULATIONS, Fitted, PaperStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

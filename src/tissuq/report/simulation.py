@@ -12,9 +12,8 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.finite_elements.response import CellFields, respond
-from tissuq.finite_elements.simulation import COMPLETE, MATERIAL_ONLY, WITHOUT, Simulation
+from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
-from tissuq.finite_elements.warnings import FAMILIES
 from tissuq.report.run_folder import INPUT, RECIPE, embedded_figure, render, write_figures
 from tissuq.report.simulation_figures import force_unit, simulation_figures, write_collection, write_vtu
 from tissuq.report.tables import significant, write_csv

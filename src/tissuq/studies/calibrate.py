@@ -26,8 +26,7 @@ from tissuq.emulation.runs import ForwardRun, ForwardRuns, carry_out, gathered
 from tissuq.errors import InputError
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.parameters.priors import Prior
-from tissuq.studies.stream import RESULTS, Step, run_tasks, silent
-from tissuq.studies.workers import open_pool
+from tissuq.studies.stream import RESULTS, Step, open_pool, run_tasks, silent
 
 __all__ = ["calibrate", "runs_of"]
 

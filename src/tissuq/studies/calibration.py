@@ -17,7 +17,7 @@ from tissuq.emulation import Calibration, FileForward, UmbridgeForward
 from tissuq.emulation.forward import Forward
 from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method
-from tissuq.emulation.run_plan import PointSet
+from tissuq.emulation.runs import PointSet
 from tissuq.errors import InputError
 from tissuq.experiments.reading.table import Table, read_table
 from tissuq.parameters.priors import Prior, prior_from

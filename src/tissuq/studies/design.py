@@ -12,10 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from tissuq.errors import InputError
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
-from tissuq.next_test.candidates import Candidate, candidate_named
+from tissuq.next_test.candidates import MODULUS, Candidate, Target, candidate_named, target_named
 from tissuq.next_test.next_test import NextTest
 from tissuq.next_test.ranking import rank_tests
-from tissuq.next_test.targets import MODULUS, Target, target_named
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.earlier_run import load

@@ -13,10 +13,9 @@ from pydantic import Field
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.data_warnings import doubts
+from tissuq.experiments.reading.data_warnings import data_warnings
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.specimens import find_tests, read_column
-from tissuq.experiments.reading.stated_mode import told_mode
+from tissuq.experiments.reading.several_files import find_mode, find_tests, read_column
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
@@ -61,7 +60,7 @@ class PopulationSettings(FittedSettings, ReadingSettings):
 
     def _test(self, specimen: str, file: Path) -> MeasuredTest:
         options = {name: getattr(self, name) for name in ReadingSettings.model_fields}
-        mode = self.mode or told_mode(file, otherwise=DEFAULT_MODE)
+        mode = self.mode or find_mode(file, otherwise=DEFAULT_MODE)
         return MeasuredTest(**options | {"mode": mode, "file": str(file), "name": specimen, "specimen": specimen})
 
 
@@ -144,7 +143,7 @@ def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]
     """Return the warnings about the files, each once with the specimens that it concerns."""
     concerned: dict[str, list[str]] = {}
     for name, specimen_readings in readings.items():
-        for text in dict.fromkeys(text for reading in specimen_readings for text in doubts(reading)):
+        for text in dict.fromkeys(text for reading in specimen_readings for text in data_warnings(reading)):
             concerned.setdefault(text, []).append(name)
     messages = [
         f"{'all specimens' if len(names) == len(readings) else ', '.join(names)}: {text}"

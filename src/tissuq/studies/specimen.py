@@ -14,7 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.data_warnings import doubts
+from tissuq.experiments.reading.data_warnings import data_warnings
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
@@ -278,7 +278,7 @@ def _options(
 
 def _data_warnings(readings: Sequence[Reading]) -> tuple[str, ...]:
     """Return the warnings about the files, each with the name of its test if there are several."""
-    messages = [(reading.experiment.name, text) for reading in readings for text in doubts(reading)]
+    messages = [(reading.experiment.name, text) for reading in readings for text in data_warnings(reading)]
     return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in messages)
 
 

@@ -14,11 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.finite_elements.case import Case
-from tissuq.finite_elements.response import BULK_RATIO
-from tissuq.finite_elements.simulation import Simulation, simulate
+from tissuq.finite_elements.response import BULK_RATIO, Solve, solved
+from tissuq.finite_elements.simulation import Simulation, simulate, simulation_warnings
 from tissuq.finite_elements.solver import felupe
-from tissuq.finite_elements.tasks import Solve, solved
-from tissuq.finite_elements.warnings import simulation_warnings
 from tissuq.mechanics import Material
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.parameters.seeds import MAX_SEED
@@ -156,7 +154,7 @@ def run_simulation(
     prepare : callable
         Called when it is certain that there is something to compute.
     pool : Executor, optional
-        From `tissuq.studies.workers.open_pool`.
+        From `tissuq.studies.stream.open_pool`.
     progress : callable
         Gives, for a number of tasks, a context with the function that is told of each.
 

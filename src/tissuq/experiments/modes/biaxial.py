@@ -16,8 +16,8 @@ from tissuq.experiments.modes.path import Deformation, Path
 __all__ = ["Biaxial", "ConstrainedUniaxial", "ThinTube"]
 
 
-def _sheet(first: Any, second: Any) -> Deformation:
-    return Deformation.along_axes((first, second, 1 / (first * second)))
+def _sheet(stretch_1: Any, stretch_2: Any) -> Deformation:
+    return Deformation.along_axes((stretch_1, stretch_2, 1 / (stretch_1 * stretch_2)))
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class _Pulled(Path):
     axis: int
 
     def moved(self, point: Any, step: Any) -> Deformation:
-        first, second = point[..., 0], point[..., 1]
-        return _sheet(first, second + step) if self.axis else _sheet(first + step, second)
+        stretch_1, stretch_2 = point[..., 0], point[..., 1]
+        return _sheet(stretch_1, stretch_2 + step) if self.axis else _sheet(stretch_1 + step, stretch_2)
 
     def abscissa(self, points: Any) -> Any:
         return points[..., self.axis]

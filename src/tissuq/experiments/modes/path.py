@@ -41,8 +41,8 @@ class Deformation:
     @classmethod
     def along_axes(cls, stretches: tuple[Any, Any, Any]) -> Deformation:
         """Return the deformation whose principal axes are those of the test."""
-        first, second, _ = stretches
-        return cls(stretches, (first**2, second**2, 0.0))
+        stretch_1, stretch_2, _ = stretches
+        return cls(stretches, (stretch_1**2, stretch_2**2, 0.0))
 
 
 class Path(ABC):
@@ -94,7 +94,9 @@ class States:
     @classmethod
     def joined(cls, states: Sequence[States]) -> States:
         """Return the states of several, one after another."""
-        return cls(*(tuple(chain(*(getattr(one, name) for one in states))) for name in ("paths", "points", "curves")))
+        return cls(
+            *(tuple(chain(*(getattr(group, name) for group in states))) for name in ("paths", "points", "curves"))
+        )
 
     def __len__(self) -> int:
         return sum(self._counts)
@@ -143,8 +145,8 @@ class States:
         moved = [path.moved(points, step) for path, points in pairs]
         if len(moved) == 1:
             return moved[0]
-        stretches = (self._column([one.stretches[axis] for one in moved]) for axis in range(3))
-        plane = (self._column([one.plane[component] for one in moved]) for component in range(3))
+        stretches = (self._column([on_path.stretches[axis] for on_path in moved]) for axis in range(3))
+        plane = (self._column([on_path.plane[component] for on_path in moved]) for component in range(3))
         return Deformation((*stretches,), (*plane,))
 
     def _column(self, components: list[Any]) -> Any:
@@ -162,16 +164,16 @@ class States:
         w(l1) + w(l2) + w(l3) is sum_k l_k w'(l_k) rate_k.
         """
         stretches = self.moved(1j * STEP).stretches
-        logs = np.log(np.stack([np.broadcast_to(one, len(self)).astype(complex) for one in stretches], axis=-1))
+        logs = np.log(np.stack([np.broadcast_to(stretch, len(self)).astype(complex) for stretch in stretches], axis=-1))
         return np.asarray(logs.real), np.asarray((logs.imag.T / STEP / self.loaded_axes).T)
 
     def by_path(self) -> Iterator[tuple[Path, Any, NDArray[np.intp]]]:
         """Yield every different path with all its points, and their numbers among all states."""
         numbers = np.split(np.arange(len(self)), np.cumsum(self._counts)[:-1])
         for path in dict.fromkeys(self.paths):
-            chosen = [number for number, other in enumerate(self.paths) if other == path]
-            points = _end_to_end([self.points[number] for number in chosen])
-            yield path, points, np.concatenate([numbers[number] for number in chosen])
+            pieces = [number for number, path_of_piece in enumerate(self.paths) if path_of_piece == path]
+            points = _end_to_end([self.points[number] for number in pieces])
+            yield path, points, np.concatenate([numbers[number] for number in pieces])
 
     def thinned(self, step: int) -> States:
         """Return one of so many states of every path, from its first."""
@@ -181,8 +183,8 @@ class States:
         """Return the state of that number by itself."""
         ends = np.cumsum(self._counts)
         path = int(np.searchsorted(ends, number, side="right"))
-        first = number - int(ends[path]) + self._counts[path]
-        return States((self.paths[path],), (self.points[path][first : first + 1],), (self.curves[path],))
+        position = number - int(ends[path]) + self._counts[path]
+        return States((self.paths[path],), (self.points[path][position : position + 1],), (self.curves[path],))
 
 
 def _end_to_end(arrays: list[Any]) -> Any:

@@ -1,46 +1,22 @@
-"""Which columns of a table hold the deformation and the stress or force, and the units that their headings state."""
+"""Which columns of a table hold the deformation and the stress or force of every measured stress, by name or role."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 
 from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.headings import STRESS_NAMES, heading, on_axis, plain, role_names
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.units import looks_like_unit
-from tissuq.experiments.reading.vocabulary import STRESS_NAMES, on_axis, plain, role_names
 
-__all__ = [
-    "DEFORMATIONS",
-    "LOADS",
-    "ColumnChoice",
-    "Heading",
-    "axes_of",
-    "choose_columns",
-    "columns_there_are",
-    "declared_unit",
-    "find_column",
-    "heading",
-]
+__all__ = ["DEFORMATIONS", "LOADS", "ColumnChoice", "about_stress", "choose_columns", "find_column"]
 
 DEFORMATIONS = ("stretch", "strain", "displacement", "shear")
 LOADS = ("stress", "force")
-UNIT_IN_HEADING = (
-    re.compile(r"(?P<quantity>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]"),
-    re.compile(r"(?P<quantity>.+?)\s*/\s*(?P<unit>.+)"),
-    re.compile(r"(?P<quantity>.+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
-)
-UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[_\s](?P<unit>\S*[^\W\d_]\S*|%)")
-
-
-@dataclass(frozen=True)
-class Heading:
-    """A column name taken apart: ``Stress [kPa]`` is the quantity ``stress`` in the unit ``kPa``."""
-
-    quantity: str
-    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,71 +44,115 @@ class ColumnChoice:
         return self.measure == "strain"
 
 
-def heading(name: str) -> Heading:
-    """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = name.strip()
-    parts = next(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)), None)
-    if parts is None:
-        parts = UNIT_AS_SUFFIX.fullmatch(name)
-        if parts is None or not looks_like_unit(parts["unit"]):
-            return Heading(plain(name))
-    return Heading(plain(parts["quantity"]), parts["unit"].strip())
-
-
-def declared_unit(table: Table, column: int) -> str:
-    """Return the unit that the heading or the units row states for a column; empty when neither does.
-
-    Raises
-    ------
-    InputError
-        When both state one and they differ.
-    """
-    in_heading = heading(table.names[column]).unit
-    beneath = table.units[column].strip("[]() ")
-    if in_heading and beneath and in_heading != beneath and looks_like_unit(in_heading):
-        raise InputError(
-            f"{table.place(column)}: the name says '{in_heading}' but the row of units beneath it says "
-            f"'{beneath}'. Correct the file."
-        )
-    return beneath or in_heading
-
-
-def axes_of(table: Table) -> list[str]:
-    """Return the axes (x, y) of which the table has columns."""
-    return sorted({axis for axis, _ in (on_axis(heading(name).quantity) for name in table.names) if axis})
-
-
 def choose_columns(
-    table: Table,
-    mapping: Mapping[str, str | int] | None,
-    stress_type: str,
-    axis: str | None = None,
-    is_shear: bool = False,
-) -> ColumnChoice:
-    """Return the columns to read: those of the mapping, the others by their names.
+    table: Table, mode: LoadingMode, mapping: Mapping[str, str | int] | None, stress_type: str, axis: str | None
+) -> dict[str, ColumnChoice]:
+    """Return the columns of every stress of a mode, by what it is called; of a mode with one by an empty text.
 
-    A stress goes before a force, a stretch or strain before a displacement.
+    They are those of the mapping, the others are known by their names: a stress goes before a force, a stretch or
+    strain before a displacement. Those of a second stress are known by the axis in their names, or given in roles that
+    end in 2.
 
     Parameters
     ----------
     table : Table
         The table to choose from.
+    mode : LoadingMode
     mapping : mapping or None
         From a role (stretch, strain, displacement or shear; stress or force) to the name or the number, from 1, of a
         column.
     stress_type : str
         ``engineering`` or ``cauchy``: what a stress column may be called.
-    axis : str, optional
-        ``x`` or ``y``: whose columns are read from the file of a biaxial machine.
-    is_shear : bool
-        Whether the deformation is an amount of shear.
+    axis : str or None
+        ``x`` or ``y``: whose columns are read from the file of a biaxial machine in a mode with one stress.
 
     Raises
     ------
     InputError
         When a role or column does not exist, several columns fit, or none does.
     """
-    mapping = dict(mapping or {})
+    count, is_shear = len(mode.stresses), mode.controls == (SHEAR,)
+    if count > 1 and axis is not None:
+        raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
+    mappings = _mapping_of_each_stress(mode, mapping)
+    is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
+    if not is_of_axes and not all(_has_roles(mode, roles) for roles in mappings[1:]):
+        raise _roles_missing(table, mode)
+    axes = mode.machine_axes if is_of_axes else (axis,) * count
+    labels = [f"axis {name}" for name in axes] if is_of_axes else list(mode.stresses) if count > 1 else [""]
+    choices: list[ColumnChoice] = []
+    for number, (roles, axis_of_stress) in enumerate(zip(mappings, axes, strict=True)):
+        if number and len(mode.controls) == 1:
+            roles = roles | {choices[0].measure: choices[0].deformation + 1}
+        with about_stress(number, labels, mode):
+            choices.append(_choice(table, roles, stress_type, axis_of_stress, is_shear))
+    if count > 1:
+        _check_together(table, mode, choices)
+    return dict(zip(labels, choices, strict=True))
+
+
+@contextmanager
+def about_stress(number: int, labels: Sequence[str], mode: LoadingMode) -> Iterator[None]:
+    """Add to what is wrong with a stress after the first how its columns and dimensions are given."""
+    try:
+        yield
+    except InputError as error:
+        if not number:
+            raise
+        sizes = " Along it the specimen measures --width, and across it --length." if mode.machine_axes else ""
+        raise InputError(
+            f"{error} (This is about {labels[number]}: roles of its columns end in 2, as in "
+            f"--column stress2=NAME.{sizes})"
+        ) from error
+
+
+def find_column(table: Table, role: str, wanted: str | int) -> int:
+    """Return the column (counted from 0) that is asked for in a role by its name, or its number from 1."""
+    text = str(wanted).strip()
+    readings = (
+        table.names,
+        [name.lower() for name in table.names],
+        [heading(name).quantity for name in table.names],
+    )
+    for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
+        columns = [column for column, name in enumerate(names) if name and name == key]
+        if len(columns) > 1:
+            raise _ambiguous(table, role, columns)
+        if columns:
+            return columns[0]
+    if text.isdecimal() and 1 <= int(text) <= len(table.names):
+        return int(text) - 1
+    close = get_close_matches(text.lower(), [name.lower() for name in table.names], n=1)
+    suggestion = next((f" Did you mean '{name}'?" for name in table.names if [name.lower()] == close), "")
+    raise InputError(
+        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {_columns_there_are(table)}"
+    )
+
+
+def _axes_of(table: Table) -> list[str]:
+    """Return the axes (x, y) of which the table has columns."""
+    return sorted({axis for axis, _ in (on_axis(heading(name).quantity) for name in table.names) if axis})
+
+
+def _mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
+    """Return the roles of every stress: those of the second end in 2; with one control it has only a stress."""
+    mappings = [dict(mapping or {})]
+    roles = (*DEFORMATIONS, *LOADS) if len(mode.controls) > 1 else ("stress",)
+    for number in range(2, len(mode.stresses) + 1):
+        numbered = [role for role in roles if f"{role}{number}" in mappings[0]]
+        mappings.append({role: mappings[0].pop(f"{role}{number}") for role in numbered})
+    return mappings
+
+
+def _has_roles(mode: LoadingMode, mapping: Mapping[str, str | int]) -> bool:
+    """Return whether a mapping holds a stress or force, and a deformation where each stress has one of its own."""
+    return bool(mapping.keys() & LOADS and (len(mode.controls) == 1 or mapping.keys() & DEFORMATIONS))
+
+
+def _choice(
+    table: Table, mapping: Mapping[str, str | int], stress_type: str, axis: str | None, is_shear: bool
+) -> ColumnChoice:
+    """Return the columns of one stress."""
     _check_roles(table, mapping, is_shear)
     quantities = _quantities(table, axis, mapping)
     load = next((role for role in LOADS if role in mapping), None)
@@ -146,15 +166,16 @@ def choose_columns(
     if measure:
         deformation = find_column(table, measure, mapping[measure])
     else:
-        first, second = (("shear",), ()) if is_shear else (("stretch", "strain"), ("displacement",))
-        known = first if not second or _fitting(quantities, first) else second
-        what = "amount of shear" if is_shear else "stretch, strain or displacement"
-        deformation = _recognise(table, quantities, first[0], known, stress_type, what)
-        measure = next(role for role in known if quantities[deformation] in role_names(role))
+        measures = ["shear"] if is_shear else ["stretch", "strain"]
+        role, what = ("shear", "amount of shear") if is_shear else ("stretch", "stretch, strain or displacement")
+        if not is_shear and not _fitting(quantities, measures):
+            measures = ["displacement"]
+        deformation = _recognise(table, quantities, role, measures, stress_type, what)
+        measure = next(name for name in measures if quantities[deformation] in role_names(name))
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
-            f"give two columns. {columns_there_are(table)}"
+            f"give two columns. {_columns_there_are(table)}"
         )
     choice = ColumnChoice(deformation, stress, measure, load)
     _check_measures(table, choice, stress_type)
@@ -163,11 +184,11 @@ def choose_columns(
 
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
-    found = [on_axis(heading(name).quantity) for name in table.names]
-    axes = axes_of(table)
+    names = [on_axis(heading(name).quantity) for name in table.names]
+    axes = _axes_of(table)
     if axis is not None and axis not in axes:
         raise InputError(
-            f"{table.file} has no columns of an axis '{axis}'. {columns_there_are(table)} Leave axis (--axis) out."
+            f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
         )
     if axis is None and len(axes) == 2 and not mapping:
         raise InputError(
@@ -175,7 +196,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
             "with the loading mode that belongs to it, or read both at once: mode='biaxial' (--mode biaxial)."
         )
     wanted = axis or (axes[0] if len(axes) == 1 else "")
-    return [name if each in ("", wanted) else "" for each, name in found]
+    return [name if axis_of_name in ("", wanted) else "" for axis_of_name, name in names]
 
 
 def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:
@@ -186,38 +207,15 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
             'stress or force, as in columns={"strain": "Strain"} or --column strain=Strain.'
         )
     for roles in (DEFORMATIONS, LOADS):
-        both = [role for role in roles if role in mapping]
-        if len(both) > 1:
-            raise InputError(f"{table.file}: columns are given for both {' and '.join(both)}; give only one of them.")
-    other = set(DEFORMATIONS) - {"shear"} if is_shear else {"shear"}
-    if other & set(mapping):
+        chosen_roles = [role for role in roles if role in mapping]
+        if len(chosen_roles) > 1:
+            raise InputError(
+                f"{table.file}: columns are given for both {' and '.join(chosen_roles)}; give only one of them."
+            )
+    unfit = (set(DEFORMATIONS) - {"shear"} if is_shear else {"shear"}) & set(mapping)
+    if unfit:
         deformation = "an amount of shear" if is_shear else "a stretch, strain or displacement"
-        raise InputError(
-            f"{table.file}: a column is given as {min(other & set(mapping))}, but this loading mode has {deformation}."
-        )
-
-
-def find_column(table: Table, role: str, wanted: str | int) -> int:
-    """Return the place of a column, by its name or its number from 1, that is asked for in a role."""
-    text = str(wanted).strip()
-    readings = (
-        table.names,
-        [name.lower() for name in table.names],
-        [heading(name).quantity for name in table.names],
-    )
-    for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
-        found = [column for column, name in enumerate(names) if name and name == key]
-        if len(found) > 1:
-            raise _ambiguous(table, role, found)
-        if found:
-            return found[0]
-    if text.isdecimal() and 1 <= int(text) <= len(table.names):
-        return int(text) - 1
-    close = get_close_matches(text.lower(), [name.lower() for name in table.names], n=1)
-    suggestion = next((f" Did you mean '{name}'?" for name in table.names if [name.lower()] == close), "")
-    raise InputError(
-        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {columns_there_are(table)}"
-    )
+        raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
 
 
 def _fitting(quantities: Sequence[str], roles: Sequence[str], stress_type: str = "engineering") -> list[int]:
@@ -229,40 +227,40 @@ def _recognise(
     table: Table,
     quantities: Sequence[str],
     role: str,
-    known: Sequence[str],
+    candidates: Sequence[str],
     stress_type: str,
     what: str,
     hint: str = "",
 ) -> int:
-    """Return the one column whose name says that it has one of the known roles."""
-    found = _fitting(quantities, known, stress_type)
-    if len(found) > 1:
-        raise _ambiguous(table, known[0], found)
-    if not found:
+    """Return the one column whose name says that it has one of the candidate roles."""
+    columns = _fitting(quantities, candidates, stress_type)
+    if len(columns) > 1:
+        raise _ambiguous(table, candidates[0], columns)
+    if not columns:
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
-            f"{columns_there_are(table)} {_how_to_say(table, role)}"
+            f"{_columns_there_are(table)} {_how_to_say(table, role)}"
         )
-    return found[0]
+    return columns[0]
 
 
 def _stress_hint(table: Table, stress_type: str) -> str:
-    for other, known in STRESS_NAMES.items():
-        named = [column for column, name in enumerate(table.names) if heading(name).quantity in known]
-        if named and other != stress_type:
+    for kind, names in STRESS_NAMES.items():
+        columns = [column for column, name in enumerate(table.names) if heading(name).quantity in names]
+        if columns and kind != stress_type:
             return (
-                f" Column {table.label(named[0])} is a stress of the {other} kind; "
-                f'to read it give stress_type="{other}" (--stress-type {other}).'
+                f" Column {table.label(columns[0])} is a stress of the {kind} kind; "
+                f'to read it give stress_type="{kind}" (--stress-type {kind}).'
             )
     return ""
 
 
-def _ambiguous(table: Table, role: str, found: Sequence[int]) -> InputError:
-    fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in found)
+def _ambiguous(table: Table, role: str, columns: Sequence[int]) -> InputError:
+    fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in columns)
     return InputError(f"{table.file}: several columns may be the {role}: {fitting}. {_how_to_say(table, role)}")
 
 
-def columns_there_are(table: Table) -> str:
+def _columns_there_are(table: Table) -> str:
     """Return the sentence that lists the columns of a table."""
     if not any(table.names):
         return f"Its {len(table.names)} columns have no names."
@@ -303,3 +301,34 @@ def _check_measures(table: Table, choice: ColumnChoice, stress_type: str) -> Non
             f"{table.place(choice.deformation)} is not an engineering strain (stretch - 1), the only "
             "strain that is converted. Add a column with the stretch to the file."
         )
+
+
+def _roles_missing(table: Table, mode: LoadingMode) -> InputError:
+    roles = ("stretch", "stress", "stretch2", "stress2") if len(mode.controls) > 1 else ("stress", "stress2")
+    named = ", or name them 'stretch x', 'stress x', 'stretch y', 'stress y'" if mode.machine_axes else ""
+    return InputError(
+        f"{table.file}: loading mode '{mode.name}' has {' and '.join(mode.stresses)}, and the file's columns do not "
+        f"tell both. {_columns_there_are(table)} Say which they are: "
+        f"{' '.join(f'--column {role}=NAME' for role in roles)} (in Python columns=){named}."
+    )
+
+
+def _check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnChoice]) -> None:
+    """Refuse one column for two stresses, and forces and displacements where the mode does not say what they do."""
+    columns = [[choice.stress for choice in choices]]
+    columns += [[choice.deformation for choice in choices]] * (len(mode.controls) > 1)
+    for column, *later in columns:
+        if column in later:
+            raise InputError(
+                f"{table.file}: column {table.label(column)} cannot be that of both {' and '.join(mode.stresses)}. Say "
+                "which is the second one's: --column stretch2=NAME, --column stress2=NAME."
+            )
+    if mode.machine_axes:
+        return
+    for choice in choices:
+        for column, content in ((choice.deformation, choice.measure), (choice.stress, choice.load)):
+            if content in ("displacement", "force"):
+                raise InputError(
+                    f"{table.place(column)} holds a {content}, and in loading mode '{mode.name}' columns are read as "
+                    "stretch, strain or shear, and as stress. Convert it, and give its column as one of them."
+                )

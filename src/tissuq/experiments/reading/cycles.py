@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import heading
-from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.table_rows import Curve
-from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
+from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading
+from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["BRANCHES", "Cycle", "chosen", "find_cycles"]
+__all__ = ["BRANCHES", "Cycle", "find_cycles", "of_cycle"]
 
 BRANCHES = ("loading", "unloading")
 REVERSAL = 0.1
@@ -37,14 +36,14 @@ class Cycle:
 
     def rows(self, branch: str | None = None) -> NDArray[np.intp]:
         """Return its rows, or those of one branch; both branches have the turning point."""
-        first = self.peak if branch == "unloading" else self.start
-        last = self.peak + 1 if branch == "loading" else self.stop
-        return np.arange(first, last)
+        start = self.peak if branch == "unloading" else self.start
+        stop = self.peak + 1 if branch == "loading" else self.stop
+        return np.arange(start, stop)
 
 
-def find_cycles(table: Table, stretch: NDArray[np.float64]) -> list[Cycle]:
-    """Return the cycles of a test, by the file's column of cycles where it tells several, else by turning points."""
-    labels = _labels(table)
+def find_cycles(table: Table, stretch: Column) -> list[Cycle]:
+    """Return the cycles of a test, by the file's column of cycles where it has several, else by turning points."""
+    labels = _cycle_labels(table)
     starts = [0, *(k for k in range(1, len(labels)) if labels[k] != labels[k - 1]), len(labels)]
     if len(starts) > 2:
         peaks = (
@@ -59,7 +58,9 @@ def find_cycles(table: Table, stretch: NDArray[np.float64]) -> list[Cycle]:
     ]
 
 
-def chosen(curve: Curve, cycles: Sequence[Cycle], cycle: str | int | None, branch: str | None) -> Curve:
+def of_cycle(
+    measured: MeasuredRows, cycles: Sequence[Cycle], cycle: str | int | None, branch: str | None
+) -> MeasuredRows:
     """Return the rows of one cycle (``first``, ``last`` or its number from 1), one branch, or both.
 
     Raises
@@ -70,13 +71,13 @@ def chosen(curve: Curve, cycles: Sequence[Cycle], cycle: str | int | None, branc
     if branch is not None and branch not in BRANCHES:
         raise InputError(f"branch must be one of {', '.join(BRANCHES)}, not '{branch}'.")
     if cycle is None and branch is None:
-        return curve
-    wanted = list(cycles) if cycle is None else [cycles[_position(curve.table.file, len(cycles), cycle)]]
-    rows = np.unique(np.concatenate([each.rows(branch) for each in wanted]))
+        return measured
+    wanted = list(cycles) if cycle is None else [cycles[_position(measured.table.file, len(cycles), cycle)]]
+    rows = np.unique(np.concatenate([wanted_cycle.rows(branch) for wanted_cycle in wanted]))
     if branch == "unloading" and len(rows) <= len(wanted):
-        raise InputError(f"{curve.table.file}: there is no unloading in {_words(wanted, cycles)}.")
+        raise InputError(f"{measured.table.file}: there is no unloading in {_words(wanted, cycles)}.")
     what = f"{branch} of {_words(wanted, cycles)}" if branch else _words(wanted, cycles)
-    return curve.kept(rows, f"not {what}").told(f"only {what}")
+    return measured.kept(rows, f"not {what}").with_step(f"only {what}")
 
 
 def _words(wanted: Sequence[Cycle], cycles: Sequence[Cycle]) -> str:
@@ -99,8 +100,8 @@ def _position(file: str, count: int, cycle: str | int) -> int:
     raise InputError(f"{file} has {count} cycles; cycle must be first, last or 1 to {count}, not '{cycle}'.")
 
 
-def _labels(table: Table) -> list[str]:
-    """Return the set and the cycle of every row as the file tells them; nothing where it has no column of cycles.
+def _cycle_labels(table: Table) -> list[str]:
+    """Return the set and the cycle of every row as in the file; nothing where it has no column of cycles.
 
     CellScale's machines write the phase beside the number (``2-Stretch``, ``2-Recover``), which is left out.
     """
@@ -115,9 +116,9 @@ def _labels(table: Table) -> list[str]:
     return [f"{name} {number}" for name, number in zip(table.texts(sets[0]), numbers, strict=True)]
 
 
-def _turning_points(stretch: NDArray[np.float64]) -> list[int]:
+def _turning_points(stretch: Column) -> list[int]:
     """Return the rows where the test turns back by a notable share of its range."""
-    enough = REVERSAL * float(np.ptp(stretch))
+    reversal = REVERSAL * float(np.ptp(stretch))
     turns: list[int] = []
     low = high = direction = 0
     values = stretch.tolist()
@@ -127,7 +128,7 @@ def _turning_points(stretch: NDArray[np.float64]) -> list[int]:
         value = values[row]
         high = row if value > values[high] else high
         low = row if value < values[low] else low
-        rises, falls = value - values[low] > enough, values[high] - value > enough
+        rises, falls = value - values[low] > reversal, values[high] - value > reversal
         if direction == 0:
             direction = rises - falls
         elif falls if direction > 0 else rises:

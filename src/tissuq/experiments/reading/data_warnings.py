@@ -1,82 +1,83 @@
-"""What is strange about measurements that can be read: each doubt is a function that says a sentence or nothing."""
+"""What is strange about measurements that can be read: each check is a function that returns a sentence or nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import STRETCH
-from tissuq.experiments.reading.columns import heading
 from tissuq.experiments.reading.cycles import find_cycles
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.two_stresses import told_once
+from tissuq.experiments.reading.headings import ROLES, heading, on_axis
+from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.units import stress_unit
-from tissuq.experiments.reading.vocabulary import ROLES, on_axis
 
-__all__ = ["doubts"]
+__all__ = ["data_warnings"]
 
-MANY = 10_000
+MANY_ROWS = 10_000
 """Rows from which thinning is worth a word."""
-ROWS_OF_A_CYCLE = 10
-"""Rows that a cycle has on average where cycles are meant, and not a table in any order."""
-NOTABLE = 0.05
+MIN_ROWS_PER_CYCLE = 10
+"""Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
+NOTABLE_SHARE = 0.05
 """Share of the largest stress, or of the range of stretches, that is worth a word."""
 PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
+"""Stretch beyond which lengths are likely mistaken."""
 SLACK_STRESS, SLACK_STRETCH = 0.01, 0.2
 """Share of the largest stress that a slack specimen stays below, over what share of the range of stretches."""
 
 
-def doubts(reading: Reading) -> tuple[str, ...]:
-    """Return what a person should look at before a fit; of two stresses each."""
-    labels = [each.label for each in reading.stresses]
-    found = (told_once(labels, [doubt(each) for each in reading.stresses]) for doubt in DOUBTS)
-    return (*reading.warnings, *(text for texts in found for text in texts if text))
+def data_warnings(reading: Reading) -> tuple[str, ...]:
+    """Return what a person should look at before a fit, of each stress."""
+    labels = reading.used.labels
+    texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
+    return (*reading.warnings, *filter(None, chain.from_iterable(texts)))
 
 
-def _unit_assumed(reading: Reading) -> str:
+def _unit_assumed(reading: Reading, number: int) -> str:
     if "the file states no unit" not in reading.experiment.source:
         return ""
     return "the file states no unit of stress, so MPa was assumed; if it is another, give --stress-unit."
 
 
-def _size(reading: Reading) -> str:
-    largest, low, high = float(np.abs(reading.used.stress).max()), *PLAUSIBLE_STRESS
+def _size(reading: Reading, number: int) -> str:
+    largest, low, high = float(np.abs(reading.used.stress[number]).max()), *PLAUSIBLE_STRESS
     if low <= largest <= high:
         return ""
     return f"the largest stress is {largest:.3g} MPa: check the units of force and area, or of stress."
 
 
-def _stretch_size(reading: Reading) -> str:
-    largest = float(reading.used.stretch.max())
+def _stretch_size(reading: Reading, number: int) -> str:
+    largest = float(reading.used.stretch[number].max())
     if largest <= LARGE_STRETCH:
         return ""
     return f"the largest stretch is {largest:.4g}: check the length of the specimen and the unit of the displacement."
 
 
-def _cycles(reading: Reading) -> str:
-    count = len(find_cycles(reading.used.table, reading.course))
-    if count < 2 or len(reading.used) < ROWS_OF_A_CYCLE * count:
+def _cycles(reading: Reading, number: int) -> str:
+    count = len(find_cycles(reading.used.table, reading.used.course))
+    if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count:
         return ""
     return f"all {count} cycles are used; to fit one, give --cycle last, first or a number."
 
 
-def _hysteresis(reading: Reading) -> str:
-    used, course = reading.used, reading.course
+def _hysteresis(reading: Reading, number: int) -> str:
+    used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
     cycle = find_cycles(used.table, course)[-1]
     branches = [cycle.rows("loading"), cycle.rows("unloading")]
-    if min(map(len, branches)) < ROWS_OF_A_CYCLE / 2:
+    if min(map(len, branches)) < MIN_ROWS_PER_CYCLE / 2:
         return ""
     ordered = [rows[np.argsort(course[rows])] for rows in branches]
     low = max(course[rows[0]] for rows in ordered)
     high = min(course[rows[-1]] for rows in ordered)
     grid = np.linspace(low, high, 50)
-    loading, unloading = (np.interp(grid, course[rows], used.stress[rows]) for rows in ordered)
-    share = float(np.abs(loading - unloading).max() / np.abs(used.stress).max())
-    if share < NOTABLE:
+    loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
+    share = float(np.abs(loading - unloading).max() / np.abs(stress).max())
+    if share < NOTABLE_SHARE:
         return ""
     return (
         f"loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one "
@@ -84,34 +85,34 @@ def _hysteresis(reading: Reading) -> str:
     )
 
 
-def _reference(reading: Reading) -> str:
-    used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
+def _reference(reading: Reading, number: int) -> str:
+    stretch, stress = reading.used.stretch[number], reading.used.stress[number]
+    unit = stress_unit(reading.experiment.stress_unit)
     mode, points = reading.experiment.mode, reading.experiment.stretch
     control = mode.controls[0] if len(mode.controls) == 1 else STRETCH
-    change = np.abs((points - mode.reference).reshape(len(used), -1)).max(axis=1)
+    change = np.abs((points - mode.reference).reshape(len(stress), -1)).max(axis=1)
     nearest = int(np.argmin(change))
     gap, furthest = float(change[nearest]), float(change.max())
-    if gap > NOTABLE * furthest:
+    if gap > NOTABLE_SHARE * furthest:
         position = " If the file gives positions, not displacements, --preload sets their zero."
-        begin = f"the measurements begin at {control.name} {used.stretch[nearest]:.4g}, not near {control.reference:g}."
-        return begin + position * (reading.choice.measure == "displacement")
-    stress = float(used.stress[nearest])
-    if abs(stress) <= NOTABLE * np.abs(used.stress).max():
+        begin = f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
+        return begin + position * (reading.choices[number].measure == "displacement")
+    at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
+    if abs(at_reference) <= NOTABLE_SHARE * largest:
         return ""
     return (
-        f"at {control.name} {used.stretch[nearest]:.4g} the stress is already {stress / unit.to_mpa:.3g} {unit.name}, "
-        f"{abs(stress) / np.abs(used.stress).max():.0%} of the largest: a preload, or the zero of the load cell. "
+        f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
+        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell. "
         f"A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
 
 
-def _slack(reading: Reading) -> str:
-    used, course = reading.used, reading.course
-    if any("the preload" in step for step in used.steps):
+def _slack(reading: Reading, number: int) -> str:
+    course, size = reading.used.course, np.abs(reading.used.stress[number])
+    if any("the preload" in step for step in reading.used.steps):
         return ""
-    carries = np.abs(used.stress) > SLACK_STRESS * np.abs(used.stress).max()
-    first = int(np.argmax(carries))
-    share = abs(float(course[first] - course[0])) / max(float(np.ptp(course)), 1e-12)
+    row = int(np.argmax(size > SLACK_STRESS * size.max()))
+    share = abs(float(course[row] - course[0])) / max(float(np.ptp(course)), 1e-12)
     if share < SLACK_STRETCH:
         return ""
     return (
@@ -120,33 +121,35 @@ def _slack(reading: Reading) -> str:
     )
 
 
-def _many(reading: Reading) -> str:
+def _many(reading: Reading, number: int) -> str:
     count = len(reading.used)
-    if count < MANY:
+    if count < MANY_ROWS:
         return ""
     return f"all {count} rows would be fitted; --every {count // 1000} would leave about a thousand."
 
 
-def _other_axis(reading: Reading) -> str:
-    """Tell of a biaxial test that is read as uniaxial."""
+def _other_axis(reading: Reading, number: int) -> str:
+    """Return a sentence about a biaxial test that is read as uniaxial."""
     table = reading.table
-    axis, _ = on_axis(heading(table.names[reading.choice.deformation]).quantity)
+    choice = reading.choices[number]
+    axis, _ = on_axis(heading(table.names[choice.deformation]).quantity)
     if not axis or not isinstance(reading.experiment.mode, Uniaxial):
         return ""
     names = [on_axis(heading(name).quantity) for name in table.names]
-    others = [k for k, (other, name) in enumerate(names) if other not in ("", axis) and name in ROLES["force"]]
-    if not others:
+    is_across = [name_axis not in ("", axis) and name in ROLES["force"] for name_axis, name in names]
+    if not any(is_across):
         return ""
-    own, other = (float(np.abs(each).max()) for each in table.numbers([reading.choice.stress, others[0]]))
-    if other < NOTABLE * own:
+    column = is_across.index(True)
+    along, across = (float(np.abs(numbers).max()) for numbers in table.numbers([choice.stress, column]))
+    if across < NOTABLE_SHARE * along:
         return ""
     return (
-        f"column {table.label(others[0])} carries force, too, so the test is not uniaxial: give --mode biaxial to read "
+        f"column {table.label(column)} carries force, too, so the test is not uniaxial: give --mode biaxial to read "
         "both axes, or equibiaxial with one of them if both were stretched alike."
     )
 
 
-DOUBTS: tuple[Callable[[Reading], str], ...] = (
+CHECKS: tuple[Callable[[Reading, int], str], ...] = (
     _unit_assumed,
     _size,
     _stretch_size,

@@ -1,24 +1,30 @@
-"""Cross-section and length of a specimen: as the user gives them, or from the lines above the table."""
+"""Cross-section and length of a specimen: as the user gives them, or as the file states them, along each axis."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isclose, pi, prod
 
+import numpy as np
+
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import heading
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.headings import DIMENSION_NAMES, heading, on_axis
 from tissuq.experiments.reading.layout import WHITESPACE, split
-from tissuq.experiments.reading.quantities import AREA, LENGTH, Kind, number_and_unit
-from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.units import AREA, LENGTH, Quantity, number_and_unit
 
-__all__ = ["Dimension", "Dimensions", "dimensions_of"]
+__all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
 
-SAME = 0.01
+CONTRADICTION = 0.01
 """Relative difference from which two statements of one dimension contradict each other."""
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
+"""Forms of cross-sections, by the dimensions that they follow from."""
+TURNED = {"length": "width", "width": "length"}
+"""What the undeformed sizes along the first and the second axis are to the second one."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +37,12 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """What is known of a specimen's dimensions, what the file states in two ways, and what it contradicts."""
+    """The dimensions of a specimen, those that the user gives, what the file states in two ways, and what differs."""
 
     file: str
-    known: Mapping[str, Dimension]
-    given: frozenset[str]
-    unclear: Mapping[str, str]
+    sizes: Mapping[str, Dimension]
+    set_by_user: frozenset[str]
+    ambiguous: Mapping[str, str]
     warnings: tuple[str, ...] = ()
 
     @property
@@ -48,13 +54,13 @@ class Dimensions:
         InputError
             When it is not known.
         """
-        self._refuse_unclear("length")
-        if "length" not in self.known:
+        self._refuse_ambiguous("length")
+        if "length" not in self.sizes:
             raise InputError(
                 f"{self.file}: to turn displacements into stretches give the undeformed length: length '20 mm' "
                 '(--length "20 mm"; in Python dimensions={"length": "20 mm"}). The lines above the table state none.'
             )
-        return self.known["length"]
+        return self.sizes["length"]
 
     @property
     def area(self) -> Dimension:
@@ -65,40 +71,40 @@ class Dimensions:
         InputError
             When it is not known, or follows in two ways that contradict each other.
         """
-        areas = _sections(self.known)
-        own = {name: area for name, area in areas.items() if self.given & set(SECTIONS[name])}
-        if not own:
-            self._refuse_unclear("area", "width", "thickness", "diameter")
-        areas = own or areas
+        areas = _sections(self.sizes)
+        areas_of_user = {name: area for name, area in areas.items() if self.set_by_user & set(SECTIONS[name])}
+        if not areas_of_user:
+            self._refuse_ambiguous("area", "width", "thickness", "diameter")
+        areas = areas_of_user or areas
         if not areas:
             raise InputError(
                 f"{self.file}: to turn forces into stresses give the undeformed cross-section: area "
                 '(--area "10 mm2"), or width and thickness (--width "5 mm" --thickness "2 mm"), or diameter '
-                f'(--diameter "4 mm"). {self._found()}'
+                f'(--diameter "4 mm"). {self._partly_known()}'
             )
-        first, *others = areas.values()
-        if any(not isclose(first.value, other.value, rel_tol=SAME) for other in others):
-            found = " or ".join(f"{each.value:g} mm2 ({each.source})" for each in areas.values())
+        area, *alternatives = areas.values()
+        if any(not _agree(area, alternative) for alternative in alternatives):
+            words = " or ".join(f"{section.value:g} mm2 ({section.source})" for section in areas.values())
             raise InputError(
-                f"{self.file}: the cross-section could be {found}. "
+                f"{self.file}: the cross-section could be {words}. "
                 'Say which: --area "10 mm2", and leave out the others.'
             )
-        return first
+        return area
 
-    def _refuse_unclear(self, *names: str) -> None:
+    def _refuse_ambiguous(self, *names: str) -> None:
         for name in names:
-            if name in self.unclear:
+            if name in self.ambiguous:
                 raise InputError(
-                    f"{self.file}: the file states two {name}s: {self.unclear[name]}. Say which: --{name} "
-                    f'"NUMBER {_kind(name).unit}".'
+                    f"{self.file}: the file states two {name}s: {self.ambiguous[name]}. Say which: --{name} "
+                    f'"NUMBER {_quantity(name).unit}".'
                 )
 
-    def _found(self) -> str:
-        parts = [name for name in ("width", "thickness") if name in self.known]
-        return f"Known is only the {parts[0]}." if parts else "The lines above the table state none."
+    def _partly_known(self) -> str:
+        sides = [name for name in ("width", "thickness") if name in self.sizes]
+        return f"Known is only the {sides[0]}." if sides else "The lines above the table state none."
 
 
-def dimensions_of(table: Table, given: Mapping[str, str] | None) -> Dimensions:
+def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None) -> Dimensions:
     """Return the dimensions that the user gives, and those of the file where the user gives none.
 
     Raises
@@ -106,74 +112,147 @@ def dimensions_of(table: Table, given: Mapping[str, str] | None) -> Dimensions:
     InputError
         When a dimension is unknown or has no unit.
     """
-    given = dict(given or {})
-    unknown = [name for name in given if name not in DIMENSION_NAMES]
+    texts = dict(set_by_user or {})
+    unknown = [name for name in texts if name not in DIMENSION_NAMES]
     if unknown:
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
-    if len([name for name in ("area", "diameter", "width") if name in given]) > 1:
+    if len([name for name in ("area", "diameter", "width") if name in texts]) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    found = {name: _stated(table, name) for name in DIMENSION_NAMES}
-    unclear = {
-        name: " and ".join(f"{each.value:g} {_kind(name).unit} {each.source}" for each in several)
-        for name, several in found.items()
-        if name not in given and any(not isclose(each.value, several[0].value, rel_tol=SAME) for each in several)
-    }
-    stated = {name: several[0] for name, several in found.items() if several and name not in unclear}
-    own = {name: Dimension(_kind(name).value(str(text)), "as given") for name, text in given.items()}
-    dimensions = Dimensions(table.file, stated | own, frozenset(given), unclear)
+    stated, ambiguous = {}, {}
+    for name in DIMENSION_NAMES:
+        sizes = list(_stated(table, name))
+        if name not in texts and any(not _agree(size, sizes[0]) for size in sizes):
+            ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
+        elif sizes:
+            stated[name] = sizes[0]
+    of_user = {name: Dimension(_quantity(name).value(str(text)), "as given") for name, text in texts.items()}
+    dimensions = Dimensions(table.file, stated | of_user, frozenset(texts), ambiguous)
     return replace(dimensions, warnings=tuple(_contradictions(dimensions, stated)))
 
 
-def _sections(known: Mapping[str, Dimension]) -> dict[str, Dimension]:
-    """Return the cross-section in every way in which it follows from what is known."""
-    found = {}
-    for name, parts in SECTIONS.items():
-        if all(part in known for part in parts):
-            sizes = [known[part] for part in parts]
-            words = (f"{part} {size.value:g} mm {size.source}" for part, size in zip(parts, sizes, strict=True))
-            value = pi / 4 * sizes[0].value ** 2 if name == "circle" else prod(size.value for size in sizes)
-            found[name] = sizes[0] if name == "area" else Dimension(value, " and ".join(words))
-    return found
+def dimensions_of_stresses(
+    table: Table,
+    dimensions: Dimensions,
+    mode: LoadingMode,
+    choices: Sequence[ColumnChoice],
+    deformations: Sequence[Column],
+) -> list[Dimensions]:
+    """Return the dimensions that belong to every stress: the same, unless the mode is that of a machine with two axes.
+
+    There the specimen's length is that along the first axis, its width that along the second one; each is the width of
+    the other axis. Where neither the user nor the lines above the table say them, the file's columns of sizes may.
+
+    Raises
+    ------
+    InputError
+        When a diameter is given for two axes.
+    """
+    if not mode.machine_axes:
+        return [dimensions] * len(choices)
+    if "diameter" in dimensions.set_by_user:
+        raise InputError(
+            f"{table.file}: the cross-sections of two axes do not follow from a diameter. Give thickness, and length "
+            "and width (the undeformed sizes along the first and the second axis) where the file does not say them."
+        )
+    sizes = {name: size for name, size in dimensions.sizes.items() if name != "diameter"}
+    along_first = replace(dimensions, sizes=sizes)
+    along = along_first, _turned(along_first)
+    across = choices[::-1], deformations[::-1]
+    return [_of_axis(table, *axis) for axis in zip(along, choices, *across, strict=True)]
+
+
+def initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> Dimension | None:
+    """Return the length from a column of sizes beside that of displacements (CellScale's machines write one)."""
+    moved = heading(table.names[choice.deformation])
+    axis, _ = on_axis(moved.quantity)
+    headings = [heading(name) for name in table.names]
+    columns = [
+        k for k, name in enumerate(headings) if on_axis(name.quantity) == (axis, "size") or name.quantity == "size"
+    ]
+    if len(columns) != 1 or headings[columns[0]].unit != moved.unit or LENGTH.factor_or_none(moved.unit) is None:
+        return None
+    (size,) = table.taken(np.arange(1)).numbers(columns)
+    value = float(size[0] - displacement[0]) * LENGTH.factor(moved.unit)
+    return Dimension(value, f"from column {table.label(columns[0])} less the displacement")
+
+
+def _of_axis(
+    table: Table, dimensions: Dimensions, choice: ColumnChoice, across: ColumnChoice, moved_across: Column
+) -> Dimensions:
+    """Return the dimensions of an axis, with the width from a column of sizes along the axis across it."""
+    unneeded = {"length"} if choice.measure != "displacement" and across.load == "force" else set()
+    unneeded |= {"width"} if choice.load != "force" and across.measure == "displacement" else set()
+    sizes = dict(dimensions.sizes)
+    is_sought = "width" not in sizes and ("area" not in sizes or "thickness" in dimensions.set_by_user)
+    if is_sought and across.measure == "displacement" and (width := initial_size(table, across, moved_across)):
+        sizes["width"] = width
+    return replace(dimensions, sizes=sizes, set_by_user=dimensions.set_by_user - unneeded)
+
+
+def _turned(dimensions: Dimensions) -> Dimensions:
+    """Return the dimensions as the second axis has them."""
+
+    def turned(name: str) -> str:
+        return TURNED.get(name, name)
+
+    return replace(
+        dimensions,
+        sizes={turned(name): size for name, size in dimensions.sizes.items()},
+        set_by_user=frozenset(map(turned, dimensions.set_by_user)),
+        ambiguous={turned(name): text for name, text in dimensions.ambiguous.items()},
+    )
+
+
+def _agree(size: Dimension, alternative: Dimension) -> bool:
+    return isclose(size.value, alternative.value, rel_tol=CONTRADICTION)
+
+
+def _sections(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:
+    """Return the cross-section in every way in which it follows from sizes."""
+    sections = {}
+    for form, names in SECTIONS.items():
+        if all(name in sizes for name in names):
+            sides = [sizes[name] for name in names]
+            words = (f"{name} {side.value:g} mm {side.source}" for name, side in zip(names, sides, strict=True))
+            value = pi / 4 * sides[0].value ** 2 if form == "circle" else prod(side.value for side in sides)
+            sections[form] = sides[0] if form == "area" else Dimension(value, " and ".join(words))
+    return sections
 
 
 def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> Iterator[str]:
-    """Tell where the file states another length or cross-section than the user."""
+    """Yield a sentence where the file states another length or cross-section than the user."""
     pairs = []
-    if "length" in dimensions.given and "length" in stated:
+    if "length" in dimensions.set_by_user and "length" in stated:
         pairs.append(("length", "mm", dimensions.length, stated["length"]))
-    uses_given = any(dimensions.given & set(SECTIONS[name]) for name in _sections(dimensions.known))
-    if uses_given and _sections(stated):
+    is_set_by_user = any(dimensions.set_by_user & set(SECTIONS[form]) for form in _sections(dimensions.sizes))
+    if is_set_by_user and _sections(stated):
         pairs.append(("cross-section", "mm2", dimensions.area, next(iter(_sections(stated).values()))))
-    for what, unit, own, theirs in pairs:
-        if not isclose(own.value, theirs.value, rel_tol=SAME):
+    for what, unit, size, in_file in pairs:
+        if not _agree(size, in_file):
             yield (
-                f"the {what} is {own.value:g} {unit} ({own.source}), but the file says {theirs.value:g} {unit} "
-                f"({theirs.source})."
+                f"the {what} is {size.value:g} {unit} ({size.source}), but the file says {in_file.value:g} {unit} "
+                f"({in_file.source})."
             )
 
 
-def _stated(table: Table, name: str) -> list[Dimension]:
-    """Return what the lines above the table state of one dimension."""
-    return [each for line, text in table.above for each in _read(line, text, table.separator, name)]
+def _stated(table: Table, name: str) -> Iterator[Dimension]:
+    """Yield what lines above the table like ``Width : 5 mm`` or ``"Probendicke";1,55;"mm"`` state of one dimension."""
+    for line, text in table.above:
+        text = text.lstrip("# ")
+        cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
+        words = [word.strip(' "') for cell in cells for word in re.split(r"[:=\t]|\s{2,}", cell)]
+        words = [word for word in words if word]
+        for position, word in enumerate(words, start=1):
+            label = heading(word)
+            if label.quantity not in DIMENSION_NAMES[name]:
+                continue
+            for texts in (words[position : position + 2], words[position : position + 1]):
+                number, unit = number_and_unit(" ".join(texts))
+                factor = _quantity(name).factor_or_none(unit or label.unit)
+                if number and number > 0 and factor:
+                    yield Dimension(number * factor, f"in line {line}")
+                    break
 
 
-def _read(line: int, text: str, separator: str, name: str) -> Iterator[Dimension]:
-    """Give what a line like ``Width : 5 mm`` or ``"Probendicke";1,55;"mm"`` states of one dimension."""
-    text = text.lstrip("# ")
-    cells = [text] if separator == WHITESPACE else split(text, separator)
-    words = [word.strip(' "') for cell in cells for word in re.split(r"[:=\t]|\s{2,}", cell)]
-    words = [word for word in words if word]
-    for place, word in enumerate(words):
-        label = heading(word)
-        if label.quantity not in DIMENSION_NAMES[name]:
-            continue
-        for texts in (words[place + 1 : place + 3], words[place + 1 : place + 2]):
-            number, unit = number_and_unit(" ".join(texts))
-            factor = _kind(name).known(unit or label.unit)
-            if number and number > 0 and factor:
-                yield Dimension(number * factor, f"in line {line}")
-                break
-
-
-def _kind(name: str) -> Kind:
+def _quantity(name: str) -> Quantity:
     return AREA if name == "area" else LENGTH

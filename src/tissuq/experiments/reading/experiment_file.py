@@ -1,10 +1,9 @@
-"""From a laboratory's file to an experiment, in steps of which each leaves a sentence."""
+"""From a laboratory's file to an experiment, with one stress or several, in steps of which each leaves a sentence."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -14,23 +13,13 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.cycles import Cycle, chosen, find_cycles
-from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of
+from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns
+from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
+from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
+from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.measures import Load, stress_of, stretch_of
-from tissuq.experiments.reading.plausibility import check_shear_signs, check_signs, check_stretch
-from tissuq.experiments.reading.signs import with_compression_negative
-from tissuq.experiments.reading.slack import preload_stress, taut
-from tissuq.experiments.reading.table import Table, read_table
-from tissuq.experiments.reading.table_rows import Column, Curve, course
-from tissuq.experiments.reading.two_stresses import (
-    choose_every,
-    dimensions_of_axes,
-    of_the_second,
-    on_same_rows,
-    told_steps,
-)
+from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
+from tissuq.experiments.reading.table import Column, Table, read_table
 
 __all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file", "read_rows"]
 
@@ -62,52 +51,31 @@ class ReadingOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """A file, the experiment that was read from it, and what was done on the way to its stress, or the first of two.
+    """A file, the experiment that was read from it, and what was done on the way to its stresses.
 
     Parameters
     ----------
     experiment : Experiment
     table : Table
         All rows of the file.
-    choice : ColumnChoice
-        The columns that were read.
-    recorded : Curve
+    choices : tuple of ColumnChoice
+        The columns that were read for each stress.
+    recorded : MeasuredRows
         All rows as stretch and stress, before any was dropped or stretch counted from a preload.
-    used : Curve
+    used : MeasuredRows
         The rows of the experiment, and the steps that led to it.
     cycles : tuple of Cycle
         Of the recorded rows.
     warnings : tuple of str
-    label : str
-        What the stress is called where the mode has two.
-    further : tuple of Reading
-        The same of the second stress.
     """
 
     experiment: Experiment
     table: Table
-    choice: ColumnChoice
-    recorded: Curve
-    used: Curve
+    choices: tuple[ColumnChoice, ...]
+    recorded: MeasuredRows
+    used: MeasuredRows
     cycles: tuple[Cycle, ...]
     warnings: tuple[str, ...]
-    label: str = ""
-    further: tuple[Reading, ...] = ()
-
-    @property
-    def stresses(self) -> tuple[Reading, ...]:
-        """What was read of each stress: this, and of the second one."""
-        return (self, *self.further)
-
-    @property
-    def steps(self) -> list[str]:
-        """What was done, a sentence a step."""
-        return told_steps([each.label for each in self.stresses], [each.used for each in self.stresses])
-
-    @property
-    def course(self) -> Column:
-        """What tells how far the test has gone in the rows used: its stretch, or the mean of its stretches."""
-        return np.asarray(self.experiment.stretch.reshape(len(self.used), -1).mean(axis=1))
 
 
 def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Experiment:
@@ -196,54 +164,37 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
 def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
     """Return what `read_file` does for the rows of a file that have been found already, all of them or some."""
     mode = _checked_mode(**options)
-    stress_type, every, name = options.get("stress_type", "engineering"), options.get("every", 1), options.get("name")
+    stress_type, name = options.get("stress_type", "engineering"), options.get("name")
     is_positive = options.get("compression_positive", False)
-    found = choose_every(table, mode, options.get("columns"), stress_type, options.get("axis"))
-    labels, choices = list(found), list(found.values())
+    labelled_choices = choose_columns(table, mode, options.get("columns"), stress_type, options.get("axis"))
+    choices = tuple(labelled_choices.values())
     dimensions = dimensions_of(table, options.get("dimensions"))
-    curves, loads = _measured(table, mode, found, dimensions, options)
-    curves = [with_compression_negative(*each, is_positive) for each in zip(curves, choices, strict=True)]
-    recorded, cycles = curves, find_cycles(table, course(curves))
-    curves = [chosen(curve, cycles, options.get("cycle"), options.get("branch")) for curve in curves]
+    measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
+    recorded = with_compression_negative(measured, choices, is_positive)
+    cycles = find_cycles(table, recorded.course)
+    used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
     if (preload := options.get("preload")) is not None:
-        peak = find_cycles(curves[0].table, course(curves))[0].peak
         thresholds = [preload_stress(preload, load.area) for load in loads]
-        pairs = zip(curves, thresholds, strict=True)
-        curves = [taut(curve, preload, threshold, peak) for curve, threshold in pairs]
-        curves = on_same_rows(curves, f"carrying less than {preload} on the other axis")
-    is_shear = mode.controls == (SHEAR,)
-    if not is_shear:
-        for choice, curve in zip(choices, curves, strict=True):
-            check_stretch(curve.table, choice, curve.stretch)
-    if stress_type == "cauchy" and not is_shear:
-        recorded = _from_cauchy(mode, recorded)
-        curves = [
-            each.told("Cauchy stress divided by stretch to engineering stress") for each in _from_cauchy(mode, curves)
-        ]
-    if every > 1:
-        kept = np.arange(0, len(curves[0]), every)
-        curves = [curve.kept(kept, f"one row in {every} asked for").told(f"one row in {every}") for curve in curves]
-    if is_shear:
-        check_shear_signs(curves[0].table, choices[0], curves[0].stretch, curves[0].stress)
-    else:
-        _check_signs(curves, choices, is_positive)
-    lines = curves[0].table.lines
-    curves = [curve.told(f"{len(curve)} rows (lines {lines[0]} to {lines[-1]})") for curve in curves]
-    steps = told_steps(labels, curves)
+        used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak)
+    check_stretches(used, choices)
+    if stress_type == "cauchy" and choices[0].measure != "shear":
+        recorded, used = _from_cauchy(mode, recorded), _from_cauchy(mode, used)
+        used = used.with_step("Cauchy stress divided by stretch to engineering stress")
+    if (every := options.get("every", 1)) > 1:
+        rows = np.arange(0, len(used), every)
+        used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
+    check_signs(used, choices, is_positive)
+    used = used.with_step(f"{len(used)} rows (lines {used.table.lines[0]} to {used.table.lines[-1]})")
     sheet = table.file.removeprefix(str(path))
     experiment = Experiment(
         mode=mode,
-        stretch=_points(mode, curves),
-        stress=np.stack([curve.stress for curve in curves], axis=-1) if len(curves) > 1 else curves[0].stress,
+        stretch=_points(mode, used),
+        stress=np.ascontiguousarray(used.stress.T) if len(used.stress) > 1 else used.stress[0],
         name=Path(path).stem if name is None else name,
-        source=f"{Path(path).name}{sheet}: {'; '.join(steps)}",
+        source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
         stress_unit=loads[0].unit.name,
     )
-    first, *further = (
-        Reading(experiment, table, choice, before, curve, tuple(cycles), dimensions.warnings, label)
-        for label, choice, before, curve in zip(labels, choices, recorded, curves, strict=True)
-    )
-    return replace(first, further=tuple(further))
+    return Reading(experiment, table, choices, recorded, used, tuple(cycles), dimensions.warnings)
 
 
 def _checked_mode(**options: Unpack[ReadingOptions]) -> LoadingMode:
@@ -280,45 +231,37 @@ def _measured(
     choices: Mapping[str, ColumnChoice],
     dimensions: Dimensions,
     options: ReadingOptions,
-) -> tuple[list[Curve], list[Load]]:
-    """Return every row as stretch and stress of the kind that the file gives, and how the stress was obtained."""
-    labels, chosen_columns = list(choices), list(choices.values())
-    numbers = [table.numbers([choice.deformation, choice.stress]) for choice in chosen_columns]
-    of_each = [dimensions] * len(labels)
-    if mode.machine_axes:
-        of_each = dimensions_of_axes(table, dimensions, chosen_columns, [own[0] for own in numbers])
-    curves, loads = [], []
-    for number, (choice, own, (deformation, load)) in enumerate(zip(chosen_columns, of_each, numbers, strict=True)):
-        with of_the_second(labels, mode) if number else nullcontext():
-            stretch, source = stretch_of(
-                table, choice, deformation, load, own, options.get("strain_unit"), options.get("displacement_unit")
-            )
-            stress_type = options.get("stress_type", "engineering")
-            stress = stress_of(
-                table, choice, load, own, stress_type, options.get("stress_unit"), options.get("force_unit")
-            )
-        curves.append(Curve(table, np.arange(len(stretch)), stretch, stress.stress, (source, stress.source)))
+) -> tuple[MeasuredRows, list[Load]]:
+    """Return every row as stretch and stress of the kind that the file gives, and how each stress was obtained."""
+    labels, columns = tuple(choices), list(choices.values())
+    numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
+    sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
+    units = options.get("strain_unit"), options.get("displacement_unit")
+    stress_type, stress_unit = options.get("stress_type", "engineering"), options.get("stress_unit")
+    stretches, loads, stretch_steps = [], [], []
+    for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
+        with about_stress(number, labels, mode):
+            stretch, step = stretch_of(table, choice, deformation, load, size, *units)
+            stress = stress_of(table, choice, load, size, stress_type, stress_unit, options.get("force_unit"))
+        stretches.append(stretch)
+        stretch_steps.append(step)
         loads.append(stress)
-    return curves, loads
+    measured = MeasuredRows(
+        table=table,
+        rows=np.arange(len(table.rows)),
+        stretch=np.stack(stretches),
+        stress=np.stack([load.stress for load in loads]),
+        labels=labels,
+    )
+    return measured.with_step(*stretch_steps).with_step(*(load.source for load in loads)), loads
 
 
-def _points(mode: LoadingMode, curves: Sequence[Curve]) -> Column:
-    """Return the points of the mode: the stretch, or a column for each axis."""
-    return np.stack([curve.stretch for curve in curves], axis=-1) if len(mode.controls) > 1 else curves[0].stretch
+def _points(mode: LoadingMode, measured: MeasuredRows) -> Column:
+    """Return the points of the mode: the stretch, or a column for each control."""
+    return np.ascontiguousarray(measured.stretch.T) if len(mode.controls) > 1 else measured.stretch[0]
 
 
-def _from_cauchy(mode: LoadingMode, curves: Sequence[Curve]) -> list[Curve]:
-    points = _points(mode, curves)
-    return [
-        replace(curve, stress=curve.stress / path.cauchy_ratio(points))
-        for path, curve in zip(mode.paths, curves, strict=True)
-    ]
-
-
-def _check_signs(curves: Sequence[Curve], choices: Sequence[ColumnChoice], compression_positive: bool) -> None:
-    """Refuse stresses of the wrong sign in those rows where the stretches, all above 1 or below, tell their sign."""
-    change = np.stack([curve.stretch - 1 for curve in curves])
-    alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
-    for curve, choice in zip(curves if len(alike) else (), choices, strict=False):
-        own = curve.kept(alike, "of no sign")
-        check_signs(own.table, choice, own.stretch, own.stress, compression_positive)
+def _from_cauchy(mode: LoadingMode, measured: MeasuredRows) -> MeasuredRows:
+    points = _points(mode, measured)
+    pairs = zip(mode.paths, measured.stress, strict=True)
+    return replace(measured, stress=np.stack([stress / path.cauchy_ratio(points) for path, stress in pairs]))

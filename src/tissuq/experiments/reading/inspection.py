@@ -1,4 +1,4 @@
-"""What was understood of a file before anything is fitted: columns, rows, cycles, ranges, noise, doubts."""
+"""What was understood of a file before anything is fitted: columns, rows, cycles, ranges, noise, warnings."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ from textwrap import fill
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tissuq.experiments.reading.data_warnings import doubts
+from tissuq.experiments.reading.data_warnings import data_warnings
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
-from tissuq.experiments.reading.table_rows import Curve, course
-from tissuq.experiments.reading.two_stresses import told_once
+from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.units import stress_unit
 
 __all__ = ["Inspection", "inspect", "noise_between_neighbours"]
 
-Column = NDArray[np.float64]
-
-ENOUGH = 30
-"""Triples of neighbouring measurements from which their scatter tells the noise."""
-CYCLES_SHOWN = 12
+MIN_TRIPLES = 30
+"""Number of triples of neighbouring measurements from which their scatter shows the noise."""
+MAX_CYCLES_SHOWN = 12
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
-LABEL, WIDTH = 10, 110
+LABEL_WIDTH, TEXT_WIDTH = 10, 110
+"""Characters of the column of labels, and of a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +36,7 @@ class Inspection:
         The experiment and what was done on the way to it.
     noise_sds : tuple of float or None
         Estimate of the noise of the engineering stress, MPa, of each stress of the loading mode; None where the
-        measurements do not tell it.
+        measurements do not show it.
     """
 
     reading: Reading
@@ -52,12 +50,12 @@ class Inspection:
     @property
     def steps(self) -> tuple[str, ...]:
         """What was done, a sentence a step."""
-        return tuple(self.reading.steps)
+        return self.reading.used.steps
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a person should look at before fitting."""
-        return doubts(self.reading)
+        return data_warnings(self.reading)
 
     def __str__(self) -> str:
         lines = [f"{self.reading.table.file}: what was understood", ""]
@@ -69,67 +67,61 @@ class Inspection:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used, unit = self.reading.table, self.reading.used, stress_unit(self.reading.experiment.stress_unit)
-        above = f"{len(table.above)} lines above them" if len(table.above) != 1 else "1 line above them"
+        head = f"{len(table.above)} lines above them" if len(table.above) != 1 else "1 line above them"
         cells = SEPARATORS[table.separator]
-        yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {above}"
+        yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {head}"
         yield "columns", ", ".join(self._columns())
-        dropped = [
-            "; ".join(f"{each.count} dropped: {each.reason}" for each in stress.used.dropped)
-            for stress in self.reading.stresses
-        ]
-        yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *filter(None, self._of_each(dropped))])
+        dropped = filter(None, labelled(used.labels, used.reasons))
+        yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
-        curves = [stress.used for stress in self.reading.stresses]
-        spans = self._of_each([f"{each.stretch.min():.6g} to {each.stretch.max():.6g}" for each in curves])
+        spans = labelled(used.labels, [f"{stretch.min():.6g} to {stretch.max():.6g}" for stretch in used.stretch])
         yield "stretch", f"{'; '.join(spans)}{again}"
-        ends = [(each.stress.min() / unit.to_mpa, each.stress.max() / unit.to_mpa) for each in curves]
-        spans = self._of_each([f"{low:.6g} to {high:.6g} {unit.name}" for low, high in ends])
+        ends = [(stress.min() / unit.to_mpa, stress.max() / unit.to_mpa) for stress in used.stress]
+        spans = labelled(used.labels, [f"{low:.6g} to {high:.6g} {unit.name}" for low, high in ends])
         yield "stress", f"{'; '.join(spans)} (engineering stress, tension positive)"
-        noise = [self._noise(*each) for each in zip(self.noise_sds, curves, strict=True)]
-        yield "noise", "; ".join(self._of_each(noise))
-
-    def _of_each(self, texts: Sequence[str]) -> list[str]:
-        return told_once([stress.label for stress in self.reading.stresses], texts)
+        noise = [self._noise(sd, stress) for sd, stress in zip(self.noise_sds, used.stress, strict=True)]
+        yield "noise", "; ".join(labelled(used.labels, noise))
 
     def _columns(self) -> Iterator[str]:
         table = self.reading.table
-        taken = {}
-        for each in self.reading.stresses:
-            of = f" of {each.label}" if each.label else ""
-            taken[each.choice.stress] = f"{each.choice.load}{of}"
-            taken[each.choice.deformation] = each.choice.measure + of * (len(self.reading.experiment.mode.controls) > 1)
+        has_several_controls = len(self.reading.experiment.mode.controls) > 1
+        roles = {}
+        for label, choice in zip(self.reading.used.labels, self.reading.choices, strict=True):
+            suffix = f" of {label}" if label else ""
+            roles[choice.stress] = f"{choice.load}{suffix}"
+            roles[choice.deformation] = choice.measure + suffix * has_several_controls
         for column in range(len(table.names)):
-            yield f"{table.label(column)} {'is ' + taken[column] if column in taken else 'not read'}"
+            yield f"{table.label(column)} {'is ' + roles[column] if column in roles else 'not read'}"
 
-    def _noise(self, noise_sd: float | None, curve: Curve) -> str:
+    def _noise(self, noise_sd: float | None, stress: Column) -> str:
         unit = stress_unit(self.reading.experiment.stress_unit)
         if noise_sd is None:
             return "not told: too few neighbouring measurements"
         if noise_sd == 0:
             return "smaller than the last digit in the file"
-        share = noise_sd / float(np.abs(curve.stress).max())
+        share = noise_sd / float(np.abs(stress).max())
         return (
             f"sd about {noise_sd / unit.to_mpa:.2g} {unit.name} between neighbours, {100 * share:.2g} % of the "
             "largest stress; slow drifts are not in it"
         )
 
     def _cycle_table(self) -> Iterator[str]:
-        cycles, stretch = self.reading.cycles, course([each.recorded for each in self.reading.stresses])
+        cycles, stretch = self.reading.cycles, self.reading.recorded.course
         mean = "mean " * (len(self.reading.experiment.mode.controls) > 1)
         yield f"{'cycle     lines':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
-        for number, cycle in list(enumerate(cycles, start=1))[:CYCLES_SHOWN]:
+        for number, cycle in list(enumerate(cycles, start=1))[:MAX_CYCLES_SHOWN]:
             rows = cycle.rows()
             ends = (stretch[row] for row in (rows[0], cycle.peak, rows[-1]))
             label = "" if cycle.label == str(number) else cycle.label
             span = _span(self.reading.table.lines[rows[0] : rows[-1] + 1])
             yield f"{number:<9} {span:<18}" + "".join(f"{end:>13.4f}" for end in ends) + f"  {label}".rstrip()
-        if len(cycles) > CYCLES_SHOWN:
+        if len(cycles) > MAX_CYCLES_SHOWN:
             yield f"... {len(cycles)} cycles in all"
 
 
 def inspect(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Inspection:
-    """Tell what would be understood of a file, with the options of :func:`tissuq.read_experiment`, before a fit.
+    """Return what would be understood of a file, with the options of :func:`tissuq.read_experiment`, before a fit.
 
     Raises
     ------
@@ -144,8 +136,8 @@ def inspect(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> 
     stretch = column 'stretch'
     """
     reading = read_file(path, **options)
-    sds = (noise_between_neighbours(reading.course, each.used.stress) for each in reading.stresses)
-    return Inspection(reading, tuple(sds))
+    course = reading.used.course
+    return Inspection(reading, tuple(noise_between_neighbours(course, stress) for stress in reading.used.stress))
 
 
 def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:
@@ -155,13 +147,13 @@ def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:
     (Gasser, Sroka & Jennen-Steinmetz, Biometrika 73, 1986); the median makes turning points harmless. The curve itself
     must be straight over three measurements. None where there are fewer than 30 such.
     """
-    before, at, after = stretch[:-2], stretch[1:-1], stretch[2:]
-    between = (at - before) * (after - at) > 0
-    if between.sum() < ENOUGH:
+    low, middle, high = stretch[:-2], stretch[1:-1], stretch[2:]
+    is_between = (middle - low) * (high - middle) > 0
+    if is_between.sum() < MIN_TRIPLES:
         return None
-    weight = ((after - at)[between]) / ((after - before)[between])
-    line = weight * stress[:-2][between] + (1 - weight) * stress[2:][between]
-    residual = (stress[1:-1][between] - line) / np.sqrt(1 + weight**2 + (1 - weight) ** 2)
+    weight = ((high - middle)[is_between]) / ((high - low)[is_between])
+    line = weight * stress[:-2][is_between] + (1 - weight) * stress[2:][is_between]
+    residual = (stress[1:-1][is_between] - line) / np.sqrt(1 + weight**2 + (1 - weight) ** 2)
     return float(1.4826 * np.median(np.abs(residual)))
 
 
@@ -170,4 +162,4 @@ def _span(lines: Sequence[int]) -> str:
 
 
 def _wrapped(label: str, text: str) -> str:
-    return fill(f"{label:<{LABEL}}{text}", WIDTH, subsequent_indent=" " * LABEL)
+    return fill(f"{label:<{LABEL_WIDTH}}{text}", TEXT_WIDTH, subsequent_indent=" " * LABEL_WIDTH)

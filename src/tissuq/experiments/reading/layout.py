@@ -8,13 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tissuq.experiments.reading.units import looks_like_unit
+from tissuq.experiments.reading.units import NUMBER, looks_like_unit
 
-__all__ = ["NUMBER", "WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
+__all__ = ["WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
 
 WHITESPACE = " "
 SEPARATORS = ("\t", ";", ",", WHITESPACE)
-NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 SPREADSHEET_ERRORS = frozenset(
     ["#n/a", "#nv", "#ref!", "#bezug!", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#name?", "#null!", "#calc!",
      "#spill!", "#field!", "#getting_data"]
@@ -23,8 +22,9 @@ SPREADSHEET_ERRORS = frozenset(
 MISSING = SPREADSHEET_ERRORS | frozenset(
     ["", "-", "--", "---", "n/a", "na", "nan", "null", "none", "inf", "+inf", "-inf"]
 )
-LINES_TO_JUDGE = 500
-SHORT, FAR_LONGER = 3, 10
+LINES_FOR_SEPARATOR = 500
+"""Lines at the head of a file that show its separator."""
+SHORT_TABLE, LENGTH_RATIO = 3, 10
 """Rows that a table passed over has at most, and how many times more the one beneath it has at least."""
 
 Split = Callable[[str], list[str]]
@@ -61,17 +61,18 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
     A table of a few rows, such as a machine's table of results, is passed over for a far longer one beneath it with
     other names.
     """
-    separator = separator or _likely_separator(lines[:LINES_TO_JUDGE])
+    separator = separator or _likely_separator(lines[:LINES_FOR_SEPARATOR])
     cells = partial(split, separator=separator)
     confirmed = _main_row(lines, cells)
     if confirmed is None:
         return None
-    first = _with_faulty_rows_above(lines, cells, confirmed)
-    has_units = first > 1 and _is_units_row(cells(lines[first - 1])) and _are_names(cells(lines[first - 2]))
-    above = first - 2 if has_units else first - 1
+    first_row = _with_faulty_rows_above(lines, cells, confirmed)
+    units_row = first_row - 1
+    has_units = units_row > 0 and _is_units_row(cells(lines[units_row])) and _are_names(cells(lines[units_row - 1]))
+    names_row = units_row - has_units
     width = len(cells(lines[confirmed]))
-    named = above >= 0 and bool(column_names(lines[above], width, separator))
-    return Layout(separator, first, width, above if named else None, first - 1 if has_units else None)
+    has_names = names_row >= 0 and bool(column_names(lines[names_row], width, separator))
+    return Layout(separator, first_row, width, names_row if has_names else None, units_row if has_units else None)
 
 
 def is_comment(line: str) -> bool:
@@ -115,22 +116,23 @@ def _likely_separator(lines: Sequence[str]) -> str:
 
 def _main_row(lines: Sequence[str], cells: Split) -> int | None:
     """Find the first row of the first table that is not far shorter than a named one after it."""
-    first = _first_numeric_row(lines, cells)
-    if first is None:
+    row = _first_numeric_row(lines, cells)
+    if row is None:
         return None
-    length = _length(lines, cells, first, limit=SHORT + 1)
-    if length > SHORT:
-        return first
-    later = _first_numeric_row(lines, cells, first + length)
-    headings = [] if later is None else lines[max(later - 2, first + length) : later]
-    if later is None or not any(_are_names(cells(line)) and line not in lines[:first] for line in headings):
-        return first
-    return later if _length(lines, cells, later, limit=FAR_LONGER * length) == FAR_LONGER * length else first
+    length = _length(lines, cells, row, limit=SHORT_TABLE + 1)
+    if length > SHORT_TABLE:
+        return row
+    later = _first_numeric_row(lines, cells, row + length)
+    headings = [] if later is None else lines[max(later - 2, row + length) : later]
+    if later is None or not any(_are_names(cells(line)) and line not in lines[:row] for line in headings):
+        return row
+    long = LENGTH_RATIO * length
+    return later if _length(lines, cells, later, limit=long) == long else row
 
 
-def _length(lines: Sequence[str], cells: Split, first: int, limit: int) -> int:
-    """Count the rows of data from the first on, up to a limit."""
-    rows = lines[first : first + limit]
+def _length(lines: Sequence[str], cells: Split, row: int, limit: int) -> int:
+    """Count the rows of data from one on, up to a limit."""
+    rows = lines[row : row + limit]
     return next((count for count, line in enumerate(rows) if not _is_data(cells(line))), len(rows))
 
 
@@ -144,17 +146,17 @@ def _first_numeric_row(lines: Sequence[str], cells: Split, start: int = 0) -> in
     return None
 
 
-def _with_faulty_rows_above(lines: Sequence[str], cells: Split, first: int) -> int:
+def _with_faulty_rows_above(lines: Sequence[str], cells: Split, row: int) -> int:
     """Take in rows above that hold a number or a mark for none: faulty data to report, not names."""
-    width = len(cells(lines[first]))
-    while first > 0:
-        above = cells(lines[first - 1])
-        is_row = _are_values(above) or (_is_data(above) and len(above) == width)
-        beneath_names = first > 1 and _are_names(cells(lines[first - 2]))
-        if not is_row or (beneath_names and _is_units_row(above)):
+    width = len(cells(lines[row]))
+    while row > 0:
+        previous = cells(lines[row - 1])
+        is_row = _are_values(previous) or (_is_data(previous) and len(previous) == width)
+        is_beneath_names = row > 1 and _are_names(cells(lines[row - 2]))
+        if not is_row or (is_beneath_names and _is_units_row(previous)):
             break
-        first -= 1
-    return first
+        row -= 1
+    return row
 
 
 def _count_numbers(cells: Sequence[str]) -> int:

@@ -5,22 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading import units
-from tissuq.experiments.reading.columns import ColumnChoice, declared_unit, heading
-from tissuq.experiments.reading.dimensions import Dimension, Dimensions
+from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.dimensions import Dimensions, initial_size
+from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.plausibility import check_strain
-from tissuq.experiments.reading.quantities import FORCE, LENGTH, Kind
-from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.vocabulary import on_axis
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.units import FORCE, LENGTH, Quantity
 
-__all__ = ["Load", "initial_size", "stress_of", "stretch_of"]
+__all__ = ["Load", "stress_of", "stretch_of"]
 
-Column = NDArray[np.float64]
-
-SHOWN_FOR_FORCES = "kPa"
+UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
 
 
@@ -56,14 +53,14 @@ def stretch_of(
     if choice.measure == "displacement":
         return _from_displacement(table, choice, values, dimensions, displacement_unit)
     _refuse(table, choice, "displacement_unit", displacement_unit)
-    if "length" in dimensions.given:
+    if "length" in dimensions.set_by_user:
         raise InputError(
             f"{table.place(choice.deformation)} is read as {choice.measure}, which needs no length. Leave --length "
             "out, or name the column of displacements: --column displacement=NAME."
         )
     if not choice.is_strain:
         _refuse(table, choice, "strain_unit", strain_unit)
-    declared = declared_unit(table, choice.deformation)
+    declared = _declared_unit(table, choice.deformation)
     if not choice.is_strain and not units.looks_like_unit(declared):
         declared = ""
     factor = _strain_factor(table, choice, declared, strain_unit)
@@ -102,9 +99,9 @@ def stress_of(
         factor, unit_source = _factor(table, choice.stress, FORCE, "force_unit", force_unit)
         area = dimensions.area
         source = f"engineering stress = column {label} in {unit_source} / {area.value:g} mm2 ({area.source})"
-        shown = units.stress_unit(stress_unit or SHOWN_FOR_FORCES)
+        shown = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES)
         return Load(values * factor / area.value, shown, source, area.value)
-    sections = sorted(dimensions.given - {"length"})
+    sections = sorted(dimensions.set_by_user - {"length"})
     if sections or force_unit is not None:
         unneeded = sections[0] if sections else "force_unit"
         raise InputError(
@@ -119,45 +116,50 @@ def _from_displacement(
     table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
 ) -> tuple[Column, str]:
     factor, unit_source = _factor(table, choice.deformation, LENGTH, "displacement_unit", unit)
-    own = initial_size(table, choice, values) if "length" not in dimensions.known else None
-    length = own or dimensions.length
+    in_column = initial_size(table, choice, values) if "length" not in dimensions.sizes else None
+    length = in_column or dimensions.length
     label = table.label(choice.deformation)
     source = f"stretch = 1 + column {label} in {unit_source} / {length.value:g} mm (length {length.source})"
     return 1 + values * factor / length.value, source
 
 
-def initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> Dimension | None:
-    """Return the length from a column of sizes beside that of displacements (CellScale's machines write one)."""
-    chosen = heading(table.names[choice.deformation])
-    axis, _ = on_axis(chosen.quantity)
-    names = [heading(name) for name in table.names]
-    sizes = [k for k, name in enumerate(names) if on_axis(name.quantity) == (axis, "size") or name.quantity == "size"]
-    if len(sizes) != 1 or names[sizes[0]].unit != chosen.unit or LENGTH.known(chosen.unit) is None:
-        return None
-    (size,) = table.taken(np.arange(1)).numbers(sizes)
-    value = float(size[0] - displacement[0]) * LENGTH.factor(chosen.unit)
-    return Dimension(value, f"from column {table.label(sizes[0])} less the displacement")
+def _declared_unit(table: Table, column: int) -> str:
+    """Return the unit that the heading or the units row states for a column; empty when neither does.
+
+    Raises
+    ------
+    InputError
+        When both state one and they differ.
+    """
+    in_heading = heading(table.names[column]).unit
+    beneath = table.units[column].strip("[]() ")
+    if in_heading and beneath and in_heading != beneath and units.looks_like_unit(in_heading):
+        raise InputError(
+            f"{table.place(column)}: the name says '{in_heading}' but the row of units beneath it says "
+            f"'{beneath}'. Correct the file."
+        )
+    return beneath or in_heading
 
 
-def _factor(table: Table, column: int, kind: Kind, option: str, given: str | None) -> tuple[float, str]:
+def _factor(table: Table, column: int, quantity: Quantity, option: str, unit: str | None) -> tuple[float, str]:
     """Return the factor from a column's unit of force or length, and the words for where it comes from."""
-    declared = declared_unit(table, column)
-    hint = f"give {option} (--{option.replace('_', '-')} {kind.unit})"
-    if given is None:
+    declared = _declared_unit(table, column)
+    hint = f"give {option} (--{option.replace('_', '-')} {quantity.unit})"
+    if unit is None:
         if not declared:
-            raise InputError(f"{table.place(column)}: the file states no unit of {kind.name}; {hint}.")
+            raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")
         try:
-            return kind.factor(declared), f"{declared} (from the file)"
+            return quantity.factor(declared), f"{declared} (from the file)"
         except InputError as error:
             raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
-    factor = kind.factor(given)
-    in_file = kind.known(declared)
+    factor = quantity.factor(unit)
+    in_file = quantity.factor_or_none(declared)
     if in_file is not None and in_file != factor:
         raise InputError(
-            f"{table.place(column)}: {option}='{given}' is given, but the file says '{declared}'. Leave {option} out, "
+            f"{table.place(column)}: {option}='{unit}' is given, but the file says '{declared}'. Leave {option} out, "
             "or correct the file."
         )
-    return factor, f"{given} (as given)"
+    return factor, f"{unit} (as given)"
 
 
 def _refuse(table: Table, choice: ColumnChoice, option: str, value: str | None) -> None:
@@ -169,35 +171,35 @@ def _refuse(table: Table, choice: ColumnChoice, option: str, value: str | None) 
         )
 
 
-def _strain_factor(table: Table, choice: ColumnChoice, declared: str, given: str | None) -> float:
-    place = table.place(choice.deformation)
+def _strain_factor(table: Table, choice: ColumnChoice, declared: str, strain_unit: str | None) -> float:
+    column = table.place(choice.deformation)
     try:
         in_file = units.strain_factor(declared)
     except InputError as error:
-        if given is None:
+        if strain_unit is None:
             hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.is_strain else ""
-            raise InputError(f"{place}: {error}{hint}") from error
+            raise InputError(f"{column}: {error}{hint}") from error
         declared, in_file = "", 1.0
-    if given is None:
+    if strain_unit is None:
         return in_file
-    factor = units.strain_factor(given)
+    factor = units.strain_factor(strain_unit)
     if declared and in_file != factor:
         raise InputError(
-            f"{place}: strain_unit='{given}' is given, but the file says '{declared}'. Leave strain_unit "
+            f"{column}: strain_unit='{strain_unit}' is given, but the file says '{declared}'. Leave strain_unit "
             "(--strain-unit) out, or correct the file."
         )
     return factor
 
 
-def _stress_unit(table: Table, choice: ColumnChoice, given: str | None) -> tuple[units.StressUnit, str]:
+def _stress_unit(table: Table, choice: ColumnChoice, stress_unit: str | None) -> tuple[units.StressUnit, str]:
     """Return the unit of the stresses and the words for where it comes from."""
-    declared = declared_unit(table, choice.stress)
-    if given is not None:
-        unit = units.stress_unit(given)
+    declared = _declared_unit(table, choice.stress)
+    if stress_unit is not None:
+        unit = units.stress_unit(stress_unit)
         in_file = _unit_or_none(declared)
         if in_file and not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
             raise InputError(
-                f"{table.place(choice.stress)}: stress_unit='{given}' is given, but the file says "
+                f"{table.place(choice.stress)}: stress_unit='{stress_unit}' is given, but the file says "
                 f"'{declared}'. Leave stress_unit (--stress-unit) out, or correct the file."
             )
         return unit, f"{unit.name} (as given)"

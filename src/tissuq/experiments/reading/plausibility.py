@@ -1,45 +1,93 @@
-"""Checks that numbers are what their columns are said to be: stretches, strains, signs of stress."""
+"""Checks that numbers are what their columns are read as: stretches, strains, and signs, which are never guessed."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.headings import heading
+from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["check_shear_signs", "check_signs", "check_strain", "check_stretch"]
-
-Column = NDArray[np.float64]
+__all__ = ["check_signs", "check_strain", "check_stretches", "with_compression_negative"]
 
 PLAIN_STRAIN_LIMIT = 10.0
 """A strain without a unit beyond this (1000 %) is taken for percent and asked about."""
 COMPRESSED_LIMIT = 0.5
 """Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
-NOTABLE = 0.1
+NOTABLE_SHARE = 0.1
 """Share of the largest stretch change and stress that rows must reach for their sign to matter."""
+COMPRESSION_WORDS = ("compressive", "stauchung", "druck")
+"""How names of columns begin whose numbers may be positive in compression."""
+NEGLIGIBLE_STRAIN = 0.1
+"""Share of the largest strain up to which strains of the other sign are noise or slack."""
 
 
-def check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
-    """Refuse a column of stretches that are not positive, or that are strains by their size."""
-    name = table.names[choice.deformation] or str(choice.deformation + 1)
-    if choice.is_strain:
-        advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
-    else:
-        advice = (
-            "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
-            f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
-        )
-    row = int(np.argmin(stretch))
-    if stretch[row] <= 0:
-        row = int(np.flatnonzero(stretch <= 0)[0])
-        raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
-    if stretch.max() < COMPRESSED_LIMIT and not choice.is_strain:
+def with_compression_negative(
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool
+) -> MeasuredRows:
+    """Return the rows with strain and stress of compression negative.
+
+    Where the file counts compression as positive, stresses at stretches below 1 change their sign. Where its strains
+    or displacements are positive, too, they do as well.
+
+    Raises
+    ------
+    InputError
+        When it does but the stretches are all above 1, or a column's name says compression and nobody says its sign.
+    """
+    choice = choices[0]
+    if choice.measure == "shear":
+        if compression_positive:
+            raise InputError("compression_positive=True (--compression-positive) has no meaning for a shear stress.")
+        return measured
+    if not compression_positive:
+        _check_names(measured, choices)
+        return measured
+    strain = measured.stretch - 1
+    if choice.measure == "stretch" and (strain >= 0).all():
         raise InputError(
-            f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
-            f"{stretch.max():g}) look like strain, not stretch. {advice}"
+            f"{measured.table.place(choice.deformation)}: compression_positive=True (--compression-positive) is given, "
+            "but no stretch is below 1, so nothing would change; a stretch below 1 is compression. Leave it out."
         )
+    if choice.measure != "stretch" and strain.min() > -NEGLIGIBLE_STRAIN * strain.max():
+        is_positive = float((measured.stress * strain).sum()) > 0
+        stress = -measured.stress if is_positive else measured.stress
+        what = f"signs of {choice.measure} and {choice.load}" if is_positive else f"sign of {choice.measure}"
+        return replace(measured, stretch=1 - strain, stress=stress).with_step(
+            f"{what} changed: compression is positive"
+        )
+    stress = np.where(strain < 0, -measured.stress, measured.stress)
+    return replace(measured, stress=stress).with_step("sign changed at stretch < 1")
+
+
+def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
+    """Refuse columns of stretches that are not positive, or that are strains by their size."""
+    for choice, stretch in zip(choices, measured.stretch, strict=True):
+        if choice.measure != "shear":
+            _check_stretch(measured.table, choice, stretch)
+
+
+def check_signs(measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool) -> None:
+    """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for.
+
+    Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
+    """
+    if choices[0].measure == "shear":
+        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+        return
+    change = measured.stretch - 1
+    alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
+    if not len(alike):
+        return
+    clear = measured.taken(alike)
+    for choice, stretch, stress in zip(choices, clear.stretch, clear.stress, strict=True):
+        _check_signs(clear.table, choice, stretch, stress, compression_positive)
 
 
 def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Column, has_unit: bool) -> None:
@@ -62,20 +110,39 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
         )
 
 
-def check_signs(
+def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
+    name = table.names[choice.deformation] or str(choice.deformation + 1)
+    if choice.is_strain:
+        advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
+    else:
+        advice = (
+            "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
+            f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
+        )
+    row = int(np.argmin(stretch))
+    if stretch[row] <= 0:
+        row = int(np.flatnonzero(stretch <= 0)[0])
+        raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
+    if stretch.max() < COMPRESSED_LIMIT and not choice.is_strain:
+        raise InputError(
+            f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
+            f"{stretch.max():g}) look like strain, not stretch. {advice}"
+        )
+
+
+def _check_signs(
     table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool
 ) -> None:
-    """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for."""
     row = _wrong_sign(stretch, stress, stretch < 1)
     if row is not None:
-        found = f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g}"
+        cell = f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g}"
         if compression_positive:
             raise InputError(
-                f"{found} the stress is already negative in the file. Leave out compression_positive=True "
+                f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
                 "(--compression-positive)."
             )
         raise InputError(
-            f"{found} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
+            f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
             "counts compression as positive, give compression_positive=True (--compression-positive); if the "
             "column of stretches holds strain, give it as strain."
         )
@@ -88,8 +155,7 @@ def check_signs(
         )
 
 
-def check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
-    """Refuse shear stresses that do negative work clearly beyond noise."""
+def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
     row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
     if row is not None:
         raise InputError(
@@ -104,11 +170,24 @@ def _wrong_sign(stretch: Column, stress: Column, rows: NDArray[np.bool_]) -> int
     change = stretch - 1
     work = np.where(rows, stress * change, 0.0)
     notable = (
-        np.abs(change[rows]).max(initial=0.0) >= NOTABLE * np.abs(change).max()
-        and np.abs(stress[rows]).max(initial=0.0) >= NOTABLE * np.abs(stress).max()
+        np.abs(change[rows]).max(initial=0.0) >= NOTABLE_SHARE * np.abs(change).max()
+        and np.abs(stress[rows]).max(initial=0.0) >= NOTABLE_SHARE * np.abs(stress).max()
     )
     return int(np.argmin(work)) if notable and work.sum() < -0.5 * np.abs(work).sum() else None
 
 
 def _quoted(name: str) -> str:
     return f"'{name}'" if " " in name else name
+
+
+def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
+    """Refuse positive numbers in columns whose names say compression."""
+    for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
+        furthest = int(np.argmax(np.abs(stretch - 1)))
+        for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
+            if heading(measured.table.names[column]).quantity.startswith(COMPRESSION_WORDS) and value > 0:
+                raise InputError(
+                    f"{measured.table.place(column, furthest)}: the name says compression and the value is positive. "
+                    "If the machine counts compression as positive, give compression_positive=True "
+                    "(--compression-positive)."
+                )

@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.layout import NUMBER, WHITESPACE, column_names, find_layout, is_comment, split
-from tissuq.experiments.reading.text_file import read_lines
-from tissuq.experiments.reading.workbook import is_workbook, sheet_lines
+from tissuq.experiments.reading.file_lines import is_workbook, read_lines, sheet_lines
+from tissuq.experiments.reading.layout import WHITESPACE, column_names, find_layout, is_comment, split
+from tissuq.experiments.reading.units import NUMBER
 
-__all__ = ["Table", "read_table"]
+__all__ = ["Column", "Table", "read_table"]
 
+Column = NDArray[np.float64]
 Lines = list[tuple[int, str]]
 
-LONG = 10_000
+LONG_FILE = 10_000
 """Lines from which a file is first tried on a fast parser."""
-HEAD = 1000
-"""Lines of it that tell its layout."""
+HEAD_LINES = 1000
+"""Lines of a long file that show its layout."""
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,18 @@ class Table:
 
     def taken(self, rows: NDArray[np.intp]) -> Table:
         """Return the table with only some rows, in that order."""
-        kept = rows.tolist()
+        positions = rows.tolist()
         block = None if self.block is None else self.block[rows]
-        return replace(self, rows=[self.rows[k] for k in kept], lines=[self.lines[k] for k in kept], block=block)
+        return replace(
+            self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions], block=block
+        )
 
     def texts(self, column: int) -> list[str]:
         """Return the cells of a column (counted from 0) as text, empty ones where a row ends before it."""
         cells = (split(row, self.separator) for row in self.rows)
         return [row[column] if column < len(row) else "" for row in cells]
 
-    def numbers(self, columns: Sequence[int]) -> list[NDArray[np.float64]]:
+    def numbers(self, columns: Sequence[int]) -> list[Column]:
         """Return columns (counted from 0) as finite numbers, written with decimal points or decimal commas.
 
         Raises
@@ -165,10 +168,10 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
 
     The layout is found in the first lines, and all below the first row must be numbers in as many columns.
     """
-    if len(lines) < LONG:
+    if len(lines) < LONG_FILE:
         return None
     try:
-        head = _read_every_line(file, lines[:HEAD], skip_rows)
+        head = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
     except InputError:
         return None
     rows = lines[head.lines[0] - 1 :]
@@ -202,9 +205,9 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
     layout = find_layout(texts, separator)
     if layout is None:
         raise _no_table(file, content)
-    first = layout.first_row
+    first_line = content[layout.first_row][0]
     if layout.names is None:
-        header_line, header = _comment_above(filled, content[first][0])
+        header_line, header = _comment_above(filled, first_line)
     else:
         header_line, header = content[layout.names]
     names = column_names(header, layout.width, layout.separator)
@@ -215,9 +218,9 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
         names=_padded(names, width),
         units=_padded(units, width),
         separator=layout.separator,
-        rows=texts[first:],
-        lines=[line for line, _ in content[first:]],
-        above=[each for each in filled if each[0] < content[first][0]],
+        rows=texts[layout.first_row :],
+        lines=[line for line, _ in content[layout.first_row :]],
+        above=[(line, text) for line, text in filled if line < first_line],
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     return table
@@ -235,10 +238,8 @@ def _no_table(file: str, content: Lines) -> InputError:
 
 def _comment_above(filled: Lines, first_line: int) -> tuple[int, str]:
     """Return the comment just above the data as a candidate for the names: numpy.savetxt writes them so."""
-    above = [(line, text) for line, text in filled if line < first_line]
-    if above and is_comment(above[-1][1]):
-        return above[-1][0], above[-1][1].lstrip("# \t")
-    return 0, ""
+    line, text = next(((line, text) for line, text in reversed(filled) if line < first_line), (0, ""))
+    return (line, text.lstrip("# \t")) if is_comment(text) else (0, "")
 
 
 def _padded(cells: list[str], width: int) -> tuple[str, ...]:

@@ -1,15 +1,30 @@
-"""Units of stress and strain as laboratories write them, and their factors to MPa and to 1."""
+"""Units as laboratories write them, and numbers with them: stress in MPa, plain strain, length, area and force."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from tissuq.errors import InputError
 
-__all__ = ["StressUnit", "looks_like_unit", "strain_factor", "stress_unit"]
+__all__ = [
+    "AREA",
+    "FORCE",
+    "LENGTH",
+    "MASSES",
+    "NUMBER",
+    "Quantity",
+    "StressUnit",
+    "looks_like_unit",
+    "number_and_unit",
+    "strain_factor",
+    "stress_unit",
+]
+
+NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 COMMON_STRESS_UNITS = {
     "Pa": 1e-6,
@@ -49,6 +64,10 @@ SYMBOLS = (
     | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
     | {"V", "mV", "deg", "rad", "percent", "pct"}
 )
+
+SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
+MASSES = ("g", "kg")
+"""Units of mass that are written where units of force are meant."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +134,74 @@ def strain_factor(text: str) -> float:
     return STRAIN_UNITS[compact]
 
 
+@dataclass(frozen=True)
+class Quantity:
+    """A kind of quantity: its name, the unit of the values here, and what other units are in it."""
+
+    name: str
+    unit: str
+    factors: Mapping[str, float]
+
+    def factor_or_none(self, text: str) -> float | None:
+        """Return what one unit of that name is in the unit of this quantity; None for other quantities."""
+        return self.factors.get(re.sub(r"[\s^]", "", text).replace("µ", "u").replace("μ", "u").replace("²", "2"))
+
+    def factor(self, text: str) -> float:
+        """Return what one unit of that name is in the unit of this quantity.
+
+        Raises
+        ------
+        InputError
+            When it is not a unit of this quantity.
+
+        Examples
+        --------
+        >>> FORCE.factor("mN")
+        0.001
+        """
+        factor = self.factor_or_none(text)
+        if factor is None and self.name == "force" and text in MASSES:
+            raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {text}f.")
+        if factor is None:
+            raise InputError(f"'{text}' is not a unit of {self.name}; write one of {', '.join(self.factors)}.")
+        return factor
+
+    def value(self, text: str) -> float:
+        """Return a positive number with its unit, such as ``1.5 mm``, in the unit of this quantity.
+
+        Raises
+        ------
+        InputError
+            When the number or its unit is missing, not positive, or not of this quantity.
+
+        Examples
+        --------
+        >>> LENGTH.value("1.5 cm")
+        15.0
+        """
+        number, unit = number_and_unit(text)
+        if number is None or number <= 0:
+            raise InputError(f"'{text}' is not a {self.name}; write a positive number with its unit: '10 {self.unit}'.")
+        if not unit:
+            raise InputError(f"the {self.name} '{text}' has no unit; write it with one, such as '{text} {self.unit}'.")
+        return number * self.factor(unit)
+
+
+LENGTH = Quantity("length", "mm", {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4})
+AREA = Quantity("area", "mm2", {f"{unit}2": factor**2 for unit, factor in LENGTH.factors.items()})
+FORCE = Quantity(
+    "force",
+    "N",
+    {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
+)
+
+
+def number_and_unit(text: str) -> tuple[float | None, str]:
+    """Return the number at the head of a text, if there is one, and what follows it."""
+    match = re.fullmatch(rf"\s*({NUMBER.pattern})\s*\[?\(?([^\d\s\[\]()][^\s\[\]()]*)?[\])]?\s*", text)
+    return (float(match[1].replace(",", ".")), match[2] or "") if match else (None, "")
+
+
 def looks_like_unit(text: str) -> bool:
     """Tell whether a cell beneath a column name reads as a unit of anything: ``[kPa]``, ``%``, ``s``."""
     text = text.strip()
@@ -140,11 +227,8 @@ def _factor_from_pint(name: str) -> float:
                 "the undeformed cross-section (--area)."
             )
         if quantity is not None:
-            raise InputError(f"'{name}' is not a unit of stress (a force over an area). {_CHOICES}")
-    raise InputError(f"the unit '{name}' is not known. {_CHOICES}")
-
-
-_CHOICES = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
+            raise InputError(f"'{name}' is not a unit of stress (a force over an area). {SUGGESTED_UNITS}")
+    raise InputError(f"the unit '{name}' is not known. {SUGGESTED_UNITS}")
 
 
 def _spelled_for_pint(name: str) -> str:

@@ -9,17 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, ModelError
-from tissuq.inference.algebra import Conditional
-from tissuq.inference.bounds import bounded
-from tissuq.inference.conditional import ConditionalGaussian
-from tissuq.inference.enumerators.missed import QUANTILES, has_missed
-from tissuq.inference.enumerators.quadrature import MAX_DIMENSION, Quadrature, integrate
-from tissuq.inference.enumerators.survey import log_prior_density, survey
-from tissuq.inference.enumerators.warp import Warp, warp_along
+from tissuq.inference.enumerators.quadrature import (
+    MAX_DIMENSION,
+    START_PROBABILITIES,
+    Lines,
+    Quadrature,
+    has_missed,
+    integrate,
+)
+from tissuq.inference.enumerators.survey import Warp, log_prior_density, survey, warp_along
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.marginal import Marginal, marginal_of_quadrature
+from tissuq.inference.linear import Conditional, ConditionalGaussian
+from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.inference.threads import one_thread
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
@@ -27,13 +31,15 @@ __all__ = ["AdaptiveCells", "solve_exactly"]
 
 FloatArray = NDArray[np.float64]
 
-TOGETHER = (2000, 200, 40, 5)
+DATA_SETS_AT_ONCE = (2000, 200, 40, 5)
 """Data sets integrated at once, by the number of nonlinear parameters: what bounds the memory."""
-IRRELEVANT = 14.0
+IRRELEVANT_LOG_DROP = 14.0
 """Log density below the largest at which the mass inside the bounds need not be known exactly: e^-14 is a millionth."""
-MOST_ERROR = 0.1
+MAX_LOG_MASS_ERROR = 0.1
 """Error of the log mass within bounds from which the result is refused."""
-HEAVY = 1e-6
+MANY_LINES = 2000
+"""Of a quadrature, beyond which a marginal is tabulated at fewer points."""
+HEAVY_SHARE = 1e-6
 """Share of the posterior, and mass beyond bounds, above which a component's error counts."""
 
 
@@ -88,7 +94,7 @@ def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[Sol
     reason = AdaptiveCells().why_not(models[0])
     if reason:
         raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
-    together = TOGETHER[len(models[0].nonlinear)]
+    together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
     blocks = [models[start : start + together] for start in range(0, len(models), together)]
     with one_thread():
         return [
@@ -143,7 +149,7 @@ class _Integration:
             )
             return np.asarray(np.where(np.isnan(value), -np.inf, value)[0])
 
-        tried = np.array([prior.quantile(QUANTILES) for prior in priors[0][: len(structure)]])
+        tried = np.array([prior.quantile(START_PROBABILITIES) for prior in priors[0][: len(structure)]])
         starts = coordinates(tried.T, is_log[: len(structure)]).T
         bounds = np.column_stack([self.warp.lower[index], self.warp.upper[index]])
         if has_missed(log_density, bounds, coordinates(self.settings[index], is_log), weights, starts):
@@ -166,7 +172,7 @@ class _Integration:
         value = gaussians.log_likelihood + ceiling + log_prior_density(self._priors, h) - log_density
         value = np.where(np.isnan(value), -np.inf, value)
         is_exact = np.zeros(value.shape, dtype=bool)
-        for margin in (0.0, IRRELEVANT):  # the best ones first, which tell what matters
+        for margin in (0.0, IRRELEVANT_LOG_DROP):  # the best ones first, which tell what matters
             floor = self._top if margin else value.max(axis=1, keepdims=True)
             relevant = ~is_exact & (value >= floor - margin) & np.isfinite(value)
             data_set = np.broadcast_to(np.arange(len(value))[:, None], value.shape)[relevant]
@@ -192,7 +198,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     weights = rule.weights[index] if rule else np.ones(1)
     mixture = GaussianMixture(weights, integration.settings[index], gaussians.mean[index], gaussians.root[index])
     mass_outside = box.beyond(mixture.mean, mixture.root)
-    truncated = bounded(mixture, mass_outside, box)
+    truncated = TruncatedMixture.of(mixture, mass_outside, box)
 
     def marginal(symbol: str) -> Marginal:
         if symbol in model.linear:
@@ -200,7 +206,7 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
         assert integration.rule is not None  # noqa: S101 (there is a nonlinear parameter)
         assert integration.warp is not None  # noqa: S101
         side = model.nonlinear.index(symbol)
-        return marginal_of_quadrature(integration.rule, integration.warp, index, side, mixture.settings[:, side])
+        return _marginal_of_quadrature(integration.rule, integration.warp, index, side, mixture.settings[:, side])
 
     linear = f"{', '.join(model.linear)} integrated in closed form" if model.linear else "no linear parameter"
     integrated = f"quadrature over {', '.join(model.nonlinear)}" if model.nonlinear else "nothing left to integrate"
@@ -210,17 +216,47 @@ def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     )
     if any(isinstance(prior, Flat) for prior in model.priors.values()):
         return solution
-    heavy = np.flatnonzero((weights > HEAVY) & (mass_outside.sum(axis=1) > HEAVY))
+    heavy = np.flatnonzero((weights > HEAVY_SHARE) & (mass_outside.sum(axis=1) > HEAVY_SHARE))
     log_mass, error = box.repeated(len(heavy)).log_mass(mixture.mean[heavy], mixture.root[heavy])
-    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY))
-    if error_of_mass > MOST_ERROR:
+    error_of_mass = float(weights[heavy] @ error + weights @ np.minimum(mass_outside.sum(axis=1), HEAVY_SHARE))
+    if error_of_mass > MAX_LOG_MASS_ERROR:
         raise ConvergenceError(
             f"bounds of several linear parameters ({', '.join(model.linear)}) cut so deep that the mass "
             "within them is not known well enough; use the method 'joint', or wider priors."
         )
     if rule:
         evidence = float(rule.log_integral[index])
-        error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT) + error_of_mass)
+        error_of_evidence = float(rule.log_error[index] + np.exp(-IRRELEVANT_LOG_DROP) + error_of_mass)
     else:
         evidence, error_of_evidence = float(gaussians.log_likelihood[index, 0] + log_mass.sum()), error_of_mass
     return replace(solution, log_evidence=evidence, log_evidence_error=error_of_evidence)
+
+
+def _marginal_of_quadrature(rule: Quadrature, warp: Warp, index: int, side: int, values: FloatArray) -> Marginal:
+    """Return the marginal of a nonlinear parameter: the quadrature's own interpolant, other parameters integrated.
+
+    Parameters
+    ----------
+    rule : Quadrature
+        In the coordinates of the warp.
+    warp : Warp
+    index : int
+        The data set's place among those of rule and warp.
+    side : int
+        The parameter's place among the nonlinear ones.
+    values : (M,) array
+        Its values at the points of the rule.
+    """
+    weights, warp = rule.weights[index], warp[index]
+    lines = rule.lines(side, index)
+    heavy = np.abs(lines.series[:, 0] * lines.width) > 1e-8
+    lines = Lines(lines.preceding[heavy], lines.start[heavy], lines.width[heavy], lines.series[heavy])
+    seen = values[weights > 1e-8]
+    low, high = warp.bounds(side)
+    margin = 0.05 * np.ptp(seen)
+    ends = max(low, seen.min() - margin), min(high, seen.max() + margin)
+    points = weighted_grid(values, weights, ends, TABLE_POINTS if len(lines.start) <= MANY_LINES else TABLE_POINTS // 4)
+    coordinates, slope = warp.coordinate(side, points, lines.preceding)
+    density = lines.evaluate(coordinates, slope)
+    cumulative = lines.integrate_to(coordinates)
+    return Marginal.of(*moments_of_values(weights, values), points, density, cumulative)

@@ -15,24 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.inference.bounds import bounded
 from tissuq.inference.box import Boxes
 from tissuq.inference.enumerators.amplitudes import (
-    LIGHT,
+    NEGLIGIBLE_SHARE,
     Points,
     log_prior_of_amplitude,
     log_prior_of_noise,
     noise_grid,
 )
-from tissuq.inference.enumerators.lattice import STEP, Reduced
-from tissuq.inference.enumerators.nodes import OUTER_STEP, Node, single_nodes, weighted_nodes
-from tissuq.inference.enumerators.outer import Outer
+from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Reduced
+from tissuq.inference.enumerators.outer import OUTER_STEP, Node, Outer, single_nodes, weighted_nodes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
-from tissuq.inference.resampling import systematic
+from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
 from tissuq.inference.threads import one_thread
+from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
@@ -41,16 +40,17 @@ __all__ = ["AmplitudeLattice", "solve_energies"]
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-MOST_PRIOR_ERROR = 0.01
-TOUCHED = 1e-10
+MAX_PRIOR_MASS_ERROR = 0.01
+"""Error of the mass of an amplitude's prior, summed on every second point, up to which the lattice serves it."""
+TOUCHED_MASS = 1e-10
 """Mass outside the bounds from which it is taken off a component's weight."""
-REPRESENTED = 3000
+MAX_COMPONENTS = 3000
 """Components, at most, that represent the posterior in draws and predictions."""
-NOISE_ROWS, NOISES = 1000, 400
+MARGINAL_POINTS, MARGINAL_NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
-PULLED = 5
+PULLED_DIVISOR = 5
 """So many times fewer, where priors of linear parameters depend on the noise, too."""
-TAILS = 0.25
+TAILS_POWER = 0.25
 """Power of the weights by which components are taken that must represent the tails, too."""
 
 
@@ -60,7 +60,7 @@ class AmplitudeLattice:
     def why_not(self, model: StatisticalModel) -> str:
         """Return why an energy discrepancy cannot be integrated with the rest of a model; nothing where it can."""
         for symbol in model.energy_symbols:
-            if _lattice_error(model.priors[symbol]) > MOST_PRIOR_ERROR:
+            if _lattice_error(model.priors[symbol]) > MAX_PRIOR_MASS_ERROR:
                 return (
                     f"the prior {model.priors[symbol]} of {symbol} has a bound or is narrow, where a wide positive one "
                     "is"
@@ -77,9 +77,9 @@ def _lattice_error(prior: Prior) -> float:
     if prior.support != (0.0, np.inf):
         return np.inf
     middle = np.log(prior.quantile(0.5))
-    starts = middle + 2 * STEP * np.arange(8)[:, None] / 8
-    amplitudes = np.exp(starts + 2 * STEP * np.arange(-60, 61))
-    masses = (2 * STEP * amplitudes * np.exp(prior.log_density(amplitudes))).sum(axis=1)
+    starts = middle + 2 * LOG_RATIO_STEP * np.arange(8)[:, None] / 8
+    amplitudes = np.exp(starts + 2 * LOG_RATIO_STEP * np.arange(-60, 61))
+    masses = (2 * LOG_RATIO_STEP * amplitudes * np.exp(prior.log_density(amplitudes))).sum(axis=1)
     return float(np.abs(masses - 1).max())
 
 
@@ -131,7 +131,7 @@ class _EnergySums:
     def __init__(self, model: StatisticalModel, nodes: Sequence[Node], log_weights: FloatArray, error: float) -> None:
         self.model, self._nodes = model, nodes
         self._outer = Outer(model)
-        self._step = STEP if len(nodes) == 1 else OUTER_STEP
+        self._step = LOG_RATIO_STEP if len(nodes) == 1 else OUTER_STEP
         points = Points.joined([node.points for node in nodes])
         self._node = np.repeat(np.arange(len(nodes)), [len(node.points.lattice) for node in nodes])
         self._bare = tuple(np.concatenate([getattr(node, name) for node in nodes]) for name in ("mean", "root"))
@@ -139,7 +139,7 @@ class _EnergySums:
         self._box = self._priors.box
         mean, root, _ = self._priors.times(self._bare[0], self._bare[1] * points.noise_sd[:, None, None])
         mass_outside = self._box.beyond(mean, root)
-        near = np.flatnonzero(mass_outside.sum(axis=1) > TOUCHED)
+        near = np.flatnonzero(mass_outside.sum(axis=1) > TOUCHED_MASS)
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
         boxes = self._box.repeated(len(near))
         log_mass[near], error_of_mass[near] = boxes.log_mass(mean[near], root[near])
@@ -148,12 +148,13 @@ class _EnergySums:
         total = np.exp(masses - top).sum()
         self._points, self._weights = points, np.exp(masses - top) / total
         settings = self._settings(points, self._node)
-        self._bounded = bounded(GaussianMixture(self._weights, settings, mean, root), mass_outside, self._box)
+        gaussians = GaussianMixture(self._weights, settings, mean, root)
+        self._truncated = TruncatedMixture.of(gaussians, mass_outside, self._box)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
             of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
-            self._evidence = evidence, float(error + of_sums + self._weights @ error_of_mass + LIGHT)
+            self._evidence = evidence, float(error + of_sums + self._weights @ error_of_mass + NEGLIGIBLE_SHARE)
 
     def solution(self, seed: int) -> Solution:
         """Return the posterior; in its mixture the weights of the discrepancy follow the material's parameters."""
@@ -164,7 +165,7 @@ class _EnergySums:
             self._reason(),
             partial(self._represented, 1.0),
             Marginals.of(self.model, self._marginal),
-            partial(self._represented, TAILS),
+            partial(self._represented, TAILS_POWER),
             seed,
             log_evidence=log_evidence,
             log_evidence_error=error,
@@ -188,9 +189,10 @@ class _EnergySums:
     def _represented(self, power: float) -> GaussianMixture:
         """Return components that stand for all points, taken as often as a power of their weights says."""
         points, node, weights = self._points, self._node, self._weights
-        if len(weights) > REPRESENTED:
+        if len(weights) > MAX_COMPONENTS:
             order = np.lexsort((points.noise_sd, points.first_index, points.second_index, points.lattice, node))
-            representatives = order[systematic((weights**power)[order][None], REPRESENTED)[0]]  # neighbours are alike
+            # In this order neighbours are alike.
+            representatives = order[systematic((weights**power)[order][None], MAX_COMPONENTS)[0]]
             points, node, weights = (
                 points[representatives],
                 node[representatives],
@@ -213,11 +215,11 @@ class _EnergySums:
         mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
-        return bounded(mixture, box.beyond(mean, root), box).components()
+        return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components()
 
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:
-            return self._bounded.marginal(self.model.linear.index(symbol))
+            return self._truncated.marginal(self.model.linear.index(symbol))
         if symbol == "noise_sd":
             return self._noise_marginal()
         values = self._settings(self._points, self._node)[:, self.model.nonlinear.index(symbol)]
@@ -231,10 +233,10 @@ class _EnergySums:
 
     def _noise_marginal(self) -> Marginal:
         """Return the marginal of the noise from its densities given the rest, at some of the points."""
-        is_pulled = self._bounded.is_cut or self._priors.is_gaussian
-        representatives = systematic(self._weights[None], NOISE_ROWS // (PULLED if is_pulled else 1))[0]
+        is_pulled = self._truncated.is_cut or self._priors.is_gaussian
+        representatives = systematic(self._weights[None], MARGINAL_POINTS // (PULLED_DIVISOR if is_pulled else 1))[0]
         points, freedom = self._points[representatives], self.model.experiment.size - len(self.model.linear)
-        logs = np.log(noise_grid(self.model, points, freedom, NOISES // (2 if is_pulled else 1)))
+        logs = np.log(noise_grid(self.model, points, freedom, MARGINAL_NOISES // (2 if is_pulled else 1)))
         noise_sd, step = np.exp(logs), logs[1] - logs[0]
         log_density = -freedom * logs - 0.5 * points.misfit[:, None] / noise_sd**2
         for number in np.unique(self._node[representatives]):

@@ -16,7 +16,7 @@ from tissuq.inference.linear import LinearPriors
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
-__all__ = ["LIGHT", "Points", "Weighing", "log_prior_of_amplitude", "log_prior_of_noise", "noise_grid"]
+__all__ = ["NEGLIGIBLE_SHARE", "Points", "Weighing", "log_prior_of_amplitude", "log_prior_of_noise", "noise_grid"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -26,22 +26,23 @@ NOISE_NODES, NOISE_BELOW, NOISE_ABOVE = 6, 5.0, 20.0
 1 / sqrt(2 freedom); above, further by a multiple of 1 / sqrt(freedom), for its heavy tail."""
 CUT_NODES = 24
 """Values of the noise where its prior cuts or is narrow."""
-IRRELEVANT = 18.0
+IRRELEVANT_LOG_DROP = 18.0
 """Log density below the largest, at the best noise, at which a point of a lattice is left out at once."""
-LIGHT = 1e-6
+NEGLIGIBLE_SHARE = 1e-6
 """Share of the posterior that may be left out."""
-TRIED, HARDLY_PULLED = 8, 0.1
+NOISE_TRIALS, HARDLY_PULLED_RISE = 8, 0.1
 """Values of the noise among which the best is sought where priors pull at linear parameters, and the rise of its
 logarithm up to which they hardly do."""
-MOST_WIDER = 8.0
+MAX_NODES_FACTOR = 8.0
 """Multiple of `CUT_NODES`, at most."""
-HARDLY_CUT = 0.5
+HARDLY_CUT_SHARE = 0.5
 """Share that bounds of linear parameters leave, above which points may be left out before they are looked at."""
-MOST_LAST = 1e-3
+MAX_LAST_SHARE = 1e-3
 """Share of the posterior at the lattice's largest amplitudes from which it is not known what lies beyond."""
-LIKELY, POSSIBLE = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
+LIKELY_PROBABILITIES, POSSIBLE_PROBABILITIES = np.array([1e-3, 1 - 1e-3]), np.array([1e-12, 1 - 1e-12])
 """Probabilities of the noise's prior between which it is likely, and between which it is at all."""
-TINY = 1e-200
+TINY_SQUARE = 1e-200
+"""Stands for a misfit (MPa^2) or a noise of zero in a logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,14 +124,14 @@ class Weighing:
                 at_even = at_even & ((indices % 2 == 0) | (len(grid) == 1))
                 last += mass[of_member_mask & (indices == len(grid) - 1) & (len(grid) > 1)].sum()
             coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[at_even].sum()
-        error = np.inf if last > MOST_LAST * mass.sum() else float(abs(coarse / mass.sum() - 1) ** 1.5)
+        error = np.inf if last > MAX_LAST_SHARE * mass.sum() else float(abs(coarse / mass.sum() - 1) ** 1.5)
         return points[mass >= _least_that_matters(mass)], error
 
     def _roughly(self) -> list[Points]:
         """Return the points that matter of every lattice, each at one noise."""
         points_of_members = [self._best_noise(member) for member in range(len(self._lattices))]
         masses = _masses(points_of_members)
-        least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT))
+        least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT_LOG_DROP))
         return [points[mass >= least_mass] for points, mass in zip(points_of_members, masses, strict=True)]
 
     def _are_cut(self, point_sets: Sequence[Points]) -> bool:
@@ -142,7 +143,7 @@ class Weighing:
                 mean, root = lattice.linear(self._index, points.second_index, points.first_index)
                 ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
                 inside, total = inside + float(mass @ np.exp(ceiling)), total + float(mass.sum())
-        return inside < HARDLY_CUT * total
+        return inside < HARDLY_CUT_SHARE * total
 
     def _best_noise(self, member: int) -> Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
@@ -153,11 +154,11 @@ class Weighing:
             return self._weighed(
                 member, second_index, first_index, misfit, np.full(len(second_index), float(noise.sd({}, 0.0)))
             )
-        likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY), *np.exp(self._ends))
+        likely = np.clip(self._model.priors["noise_sd"].quantile(LIKELY_PROBABILITIES), *np.exp(self._ends))
         most_likely_noise = np.sqrt(misfit / lattice.freedom)
         candidates = [self._weighed(member, second_index, first_index, misfit, np.clip(most_likely_noise, *likely))]
         rise = _rise(candidates[0])
-        for share in np.linspace(0, 1, TRIED)[1:] if rise.max() > HARDLY_PULLED else ():
+        for share in np.linspace(0, 1, NOISE_TRIALS)[1:] if rise.max() > HARDLY_PULLED_RISE else ():
             noise_sd = np.clip(most_likely_noise * np.exp(share * rise), *likely)
             candidates.append(self._weighed(member, second_index, first_index, misfit, noise_sd))
         best = np.argmax([points.log_weight + points.log_inside for points in candidates], axis=0)
@@ -172,7 +173,7 @@ class Weighing:
         """
         member = int(points.lattice[0])
         freedom, ends = self._lattices[member].freedom, self._ends
-        mode = 0.5 * np.log(np.maximum(points.misfit / freedom, TINY))[:, None]
+        mode = 0.5 * np.log(np.maximum(points.misfit / freedom, TINY_SQUARE))[:, None]
         reach_below, reach_above = _reach(freedom)
         low, high = mode - reach_below, mode + _rise(points)[:, None] + reach_above
         if not self._is_pulled and (low >= ends[0]).all() and (high <= ends[1]).all():
@@ -183,7 +184,7 @@ class Weighing:
             keeps = (cut[0] < cut[1]) & (high - low < ends[1] - ends[0])
             low, high = (np.where(keeps, value, end) for value, end in zip(cut, ends, strict=True))
             wider = float((high - low).max()) / (reach_below + reach_above)
-            nodes, cells = gauss_rule(int(CUT_NODES * np.clip(wider, 1, MOST_WIDER)))
+            nodes, cells = gauss_rule(int(CUT_NODES * np.clip(wider, 1, MAX_NODES_FACTOR)))
             logs, cells = low + (high - low) * nodes, (high - low) * cells
         noise_sd = np.exp(logs).ravel()
         rows = np.repeat(np.arange(len(points.misfit)), len(nodes))
@@ -238,7 +239,7 @@ def log_prior_of_noise(model: StatisticalModel, ratios: Mapping[str, float], noi
 def noise_grid(model: StatisticalModel, points: Points, freedom: int, count: int) -> FloatArray:
     """Return values of the noise, evenly spaced in their logarithm, among which it lies given any of the points."""
     low, high = (
-        0.5 * np.log(np.maximum(size / freedom, TINY)) for size in (points.misfit, points.misfit + points.strain)
+        0.5 * np.log(np.maximum(size / freedom, TINY_SQUARE)) for size in (points.misfit, points.misfit + points.strain)
     )
     reach_below, reach_above = _reach(freedom)
     low, high = np.clip([low.min() - reach_below, high.max() + reach_above], *_ends(model, {}))
@@ -249,11 +250,11 @@ def _ends(model: StatisticalModel, ratios: Mapping[str, float]) -> FloatArray:
     """Return the logarithms of the noise between which its priors leave it; of a known one, all."""
     if not model.noise.parameters:
         return np.array([-np.inf, np.inf])
-    low, high = model.priors["noise_sd"].quantile(POSSIBLE)
+    low, high = model.priors["noise_sd"].quantile(POSSIBLE_PROBABILITIES)
     for symbol, ratio in ratios.items():
-        limits = model.priors[symbol].quantile(POSSIBLE) / ratio
+        limits = model.priors[symbol].quantile(POSSIBLE_PROBABILITIES) / ratio
         low, high = max(low, limits[0]), min(high, limits[1])
-    return np.log(np.maximum([low, high], TINY))
+    return np.log(np.maximum([low, high], TINY_SQUARE))
 
 
 def _reach(freedom: int) -> tuple[float, float]:
@@ -264,7 +265,7 @@ def _reach(freedom: int) -> tuple[float, float]:
 
 def _rise(points: Points) -> FloatArray:
     """Return by how much (M,) the logarithm of the noise may rise where priors pull at the linear parameters."""
-    return np.asarray(0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY)))
+    return np.asarray(0.5 * np.log1p(points.strain / np.maximum(points.misfit, TINY_SQUARE)))
 
 
 def _masses(point_sets: Sequence[Points]) -> list[FloatArray]:
@@ -277,7 +278,7 @@ def _masses(point_sets: Sequence[Points]) -> list[FloatArray]:
 def _least_that_matters(mass: FloatArray) -> float:
     """Return the mass below which points hold next to nothing together."""
     order = np.sort(mass)
-    return float(order[np.searchsorted(np.cumsum(order), LIGHT * order.sum())])
+    return float(order[np.searchsorted(np.cumsum(order), NEGLIGIBLE_SHARE * order.sum())])
 
 
 @lru_cache(maxsize=64)

@@ -12,17 +12,17 @@ from math import log, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.inference.algebra import integrated
+from tissuq.inference.linear import integrated
 from tissuq.model.discrepancy import Member, side_by_side
 
-__all__ = ["STEP", "Directions", "Lattice", "Reduced", "Rows"]
+__all__ = ["LOG_RATIO_STEP", "Directions", "Lattice", "Reduced", "Rows"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
 
-STEP = 0.4
+LOG_RATIO_STEP = 0.4
 """Of log g. The posterior of an amplitude that r directions tell has an sd of about 1 / sqrt(2 r) in its logarithm."""
-SMALLEST, LARGEST = 1e-3, 1e6
+MIN_STRESS_RATIO, MAX_STRESS_RATIO = 1e-3, 1e6
 """Ratios of the discrepancy's stress (root mean square) to the noise between which the lattice lies, at least."""
 
 
@@ -122,7 +122,7 @@ class Directions:
         count: int,
         negligible_stress: float,
         unlikely: list[float],
-        step: float = STEP,
+        step: float = LOG_RATIO_STEP,
         shift: float = 0.0,
     ) -> None:
         self.member, self.step = member, step
@@ -206,5 +206,5 @@ class Lattice:
 
 def _grid(size: float, unlikely: float, step: float, shift: float) -> FloatArray:
     """Return the ratios of a block whose terms have a stress of some size (root mean square)."""
-    smallest, largest = min(SMALLEST / size, unlikely) * np.exp(shift), LARGEST / size
+    smallest, largest = min(MIN_STRESS_RATIO / size, unlikely) * np.exp(shift), MAX_STRESS_RATIO / size
     return np.asarray(smallest * np.exp(step * np.arange(int(log(largest / smallest) / step) + 1)))

@@ -19,20 +19,20 @@ __all__ = ["Mutation", "Program", "compiled_program"]
 
 Floats = NDArray[np.float64]
 
-FORGOTTEN = 0.1
+MAX_CORRELATION_WITH_START = 0.1
 """Correlation with the start of a mutation, in any direction, below which the particles count as moved.
 
 With an unknown noise, 0.3 halves the sweeps and doubles the error of the log evidence.
 """
-STOPPED = 1.1
+MAX_GROWTH = 1.1
 """Growth of the squared distance from the start, over the second half of the sweeps, that counts as none."""
 TARGET_ACCEPTANCE = 0.8
-LONGEST_STEP = 1.5
+MAX_STEP_SDS = 1.5
 """Leapfrog steps, in standard deviations, stay below this; the dynamics of a normal density break up at two."""
-LENGTH = 2.0
+TRAJECTORY_SDS = 2.0
 """Longest trajectory in standard deviations: steps are jittered, so that the mean is near a quarter period."""
 MAX_LEAPFROGS = 64
-SHORTEST = 0.1
+MIN_JUMP_SHARE = 0.1
 """Shortest jump along the difference of two particles, as a share of the best length for a normal density."""
 
 
@@ -60,7 +60,7 @@ class Mutation:
         while not moved and len(distances) < self.max_sweeps:
             self.count += 1
             key = jax.random.fold_in(self.key, self.count)
-            leapfrogs = int(np.clip(np.ceil(LENGTH / self.step_size), 1, MAX_LEAPFROGS))
+            leapfrogs = int(np.clip(np.ceil(TRAJECTORY_SDS / self.step_size), 1, MAX_LEAPFROGS))
             # Jittered steps: no period of the dynamics resonates, and short ones enter narrow places.
             sizes = self.step_size * self.generator.uniform(0.2, 1.0, lines.shape[:2])
             # A run jumps along the differences of its neighbour. Its own particles depend on where each one started:
@@ -70,7 +70,7 @@ class Mutation:
             lines, log_likelihoods, acceptance = (np.asarray(array) for array in moves)
             # Pooled over all particles the acceptance is nearly exact, so its steps need no decay.
             self.step_size *= float(np.exp(acceptance[0] - TARGET_ACCEPTANCE))
-            self.step_size = min(self.step_size, LONGEST_STEP)
+            self.step_size = min(self.step_size, MAX_STEP_SDS)
             accepted.append(acceptance)
             whitened_start, whitened_lines = (
                 np.linalg.solve(root, array.reshape(-1, len(root)).T) for array in (start, lines)
@@ -95,9 +95,9 @@ def _has_moved(start: Floats, current: Floats, distances: list[Floats]) -> bool:
     distances.append(np.median(np.abs(current - start), axis=1) ** 2)
     sweeps = len(distances)
     correlations = np.array([np.corrcoef(*pair)[0, 1] for pair in zip(start, current, strict=True)])
-    has_moved = np.abs(correlations) < FORGOTTEN
+    has_moved = np.abs(correlations) < MAX_CORRELATION_WITH_START
     if sweeps >= 4:
-        has_moved |= distances[-1] < STOPPED * distances[(sweeps + 1) // 2 - 1]
+        has_moved |= distances[-1] < MAX_GROWTH * distances[(sweeps + 1) // 2 - 1]
     return bool(has_moved.all())
 
 
@@ -171,7 +171,7 @@ def _jumps(clouds: Floats, generator: np.random.Generator) -> Floats:
     particle, partner = (
         clouds[np.arange(runs)[:, None, None], generator.integers(draws, size=shape)] for _ in range(2)
     )
-    shortened = 2.38 / np.sqrt(2 * dimension) * SHORTEST ** generator.random(shape)
+    shortened = 2.38 / np.sqrt(2 * dimension) * MIN_JUMP_SHARE ** generator.random(shape)
     sizes = np.where(generator.random(shape) < 0.1, 1.0, shortened)[..., None]
     takes_part = (generator.random((*shape, 1)) < 0.5) | (generator.random(particle.shape) < 0.5)
     return np.asarray((particle - partner) * sizes * takes_part)

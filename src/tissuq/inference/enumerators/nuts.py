@@ -36,8 +36,8 @@ MAX_DIVERGENT_SHARE = 0.01
 MIN_BFMI = 0.3
 SEPARATE_RHAT = 1.2
 """An R-hat that slow chains hardly reach, but chains in different modes do."""
-LONGER = "a longer warm-up and more draws or thinning"
-OVERDISPERSION = 1.5
+REMEDY_LONGER = "a longer warm-up and more draws or thinning"
+OVERDISPERSION_SDS = 1.5
 """Standard deviation of the starting points around a mode, in posterior standard deviations."""
 
 
@@ -111,10 +111,10 @@ class NutsDraws(Draws):
         failures = []
         if not self.rhat[worst] < MAX_RHAT:
             fault = f"R-hat is {self.rhat[worst]:.3f} for {self.names[worst]} and must be below {MAX_RHAT}"
-            failures.append((fault, LONGER))
+            failures.append((fault, REMEDY_LONGER))
             if not self.rhat[worst] < SEPARATE_RHAT:
                 failures.append(("the chains stay in different places", "a narrower prior that leaves one mode"))
-        failures += self._small_sizes(MIN_ESS_PER_CHAIN * len(self.values), LONGER)
+        failures += self._small_sizes(MIN_ESS_PER_CHAIN * len(self.values), REMEDY_LONGER)
         if not self.divergences < MAX_DIVERGENT_SHARE * self.energies.size:
             fault = f"{self.divergences} of {self.energies.size} trajectories diverged"
             failures.append((fault, "a target acceptance closer to one, such as 0.99"))
@@ -212,7 +212,7 @@ def _start_around(
 ) -> tuple[Floats, Floats, Floats]:
     """Return a point around a mode, closer at every failure, with its finite log density and gradient."""
     for shrinkage in 0.8 ** np.arange(50):
-        offset = OVERDISPERSION * shrinkage * generator.standard_normal(mode.location.size)
+        offset = OVERDISPERSION_SDS * shrinkage * generator.standard_normal(mode.location.size)
         line = mode.unwhiten(offset)
         value, gradient, _ = derivatives(line)
         if np.isfinite(value) and np.isfinite(gradient).all():

@@ -1,10 +1,11 @@
-"""Adaptive quadrature of positive functions on the unit cube, known through their logarithms."""
+"""Adaptive quadrature of positive functions on the unit cube, and whether they have mass where it did not look."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, reduce
+from itertools import product
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 
-__all__ = ["MAX_DIMENSION", "Lines", "Quadrature", "gauss_rule", "integrate"]
+__all__ = ["MAX_DIMENSION", "START_PROBABILITIES", "Lines", "Quadrature", "gauss_rule", "has_missed", "integrate"]
 
 FloatArray = NDArray[np.float64]
 LogFunction = Callable[[FloatArray], FloatArray]
@@ -20,10 +21,24 @@ LogFunction = Callable[[FloatArray], FloatArray]
 MAX_DIMENSION = 3
 ORDERS = {1: 10, 2: 10, 3: 7}
 """Gauss-Legendre points along each side of a cell, by dimension."""
-FIRST_CELLS = 2
+FIRST_CELLS_PER_SIDE = 2
 """Cells along each side to begin with."""
-TOLERANCE = 1e-3
+RELATIVE_TOLERANCE = 1e-3
+"""Of the interpolation, over the integral, at which cells are no longer halved."""
 MAX_CELLS = 20_000
+
+
+START_PROBABILITIES = np.array([0.15, 0.5, 0.85])
+"""Of the priors, from which climbs start."""
+MAX_EVALUATIONS = 300
+"""Evaluations that a climb may take."""
+MAX_LOG_DROP_OUTSIDE, MAX_LOG_GAIN = 3.0, 5.0
+"""Log density below the quadrature's best point from which a place outside its range has mass that counts, and above
+it that no place may have."""
+HEAVIEST_POINTS = 500
+"""Points, the heaviest, among which the best one is."""
+MIN_WEIGHT_IN_RANGE = 1e-6
+"""Weight of a point that is in no range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +171,7 @@ def integrate(log_function: LogFunction, dimension: int) -> Quadrature:
         integrals, errors = _resolve(cells, top)
         total = integrals.sum(axis=1, keepdims=True)
         error = errors.max(axis=2) / total
-        if (error.sum(axis=1) <= TOLERANCE).all():
+        if (error.sum(axis=1) <= RELATIVE_TOLERANCE).all():
             return _finish(cells, top, integrals, error)
         if cells.log_values.shape[1] > MAX_CELLS:
             raise ConvergenceError(
@@ -169,8 +184,8 @@ def integrate(log_function: LogFunction, dimension: int) -> Quadrature:
 
 
 def _first_cells(log_function: LogFunction, dimension: int) -> Cells:
-    corners = np.indices([FIRST_CELLS] * dimension).reshape(dimension, -1).T / FIRST_CELLS
-    return _evaluated(log_function, corners, np.full(corners.shape, 1 / FIRST_CELLS))
+    corners = np.indices([FIRST_CELLS_PER_SIDE] * dimension).reshape(dimension, -1).T / FIRST_CELLS_PER_SIDE
+    return _evaluated(log_function, corners, np.full(corners.shape, 1 / FIRST_CELLS_PER_SIDE))
 
 
 def _evaluated(log_function: LogFunction, lower: FloatArray, width: FloatArray) -> Cells:
@@ -258,3 +273,47 @@ def _to_legendre(order: int) -> FloatArray:
 def _rule(order: int, dimension: int) -> FloatArray:
     """Return the weights of the tensor Gauss rule on the unit cube, flattened."""
     return np.asarray(reduce(np.multiply.outer, [gauss_rule(order)[1]] * dimension, np.array(1.0)).ravel())
+
+
+def has_missed(
+    log_density: Callable[[FloatArray], FloatArray],
+    bounds: FloatArray,
+    points: FloatArray,
+    weights: FloatArray,
+    starts: FloatArray,
+) -> bool:
+    """Return whether climbs end where the points of a quadrature have no weight.
+
+    Parameters
+    ----------
+    log_density : callable
+        Of places (N, d).
+    bounds : (d, 2) array
+        Of the places, infinite where there is none.
+    points : (M, d) array
+        Of the quadrature.
+    weights : (M,) array
+        Their shares of the mass.
+    starts : (s, k) array
+        Values of the first s coordinates from which to climb; the others start at the best point.
+    """
+    from scipy.optimize import minimize
+
+    heaviest = points[np.argsort(weights)[-HEAVIEST_POINTS:]]
+    heights = log_density(heaviest)
+    best, best_height = heaviest[heights.argmax()], float(heights.max())
+    heavy, sd = points[weights > MIN_WEIGHT_IN_RANGE], np.sqrt(weights @ (points - weights @ points) ** 2)
+    low, high = heavy.min(axis=0) - sd, heavy.max(axis=0) + sd
+    for structure_start in [best[: len(starts)], *product(*starts)]:
+        start = np.concatenate([structure_start, best[len(starts) :]])
+        climb = minimize(
+            _depth, start, (log_density,), "Nelder-Mead", bounds=bounds, options={"maxfev": MAX_EVALUATIONS}
+        )
+        gained, is_outside = -float(climb.fun) - best_height, bool(((climb.x < low) | (climb.x > high)).any())
+        if gained > MAX_LOG_GAIN or (is_outside and gained > -MAX_LOG_DROP_OUTSIDE):
+            return True
+    return False
+
+
+def _depth(point: FloatArray, log_density: Callable[[FloatArray], FloatArray]) -> float:
+    return -float(log_density(point[None])[0])

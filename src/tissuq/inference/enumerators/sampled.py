@@ -18,7 +18,7 @@ from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nu
 from tissuq.inference.enumerators.smc import SmcDraws, SmcSettings, sample_smc
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, marginal_of_points
-from tissuq.inference.resampling import resampled_at_random
+from tissuq.inference.quasi_monte_carlo import resampled_at_random
 from tissuq.inference.solution import Diagnostics, Marginals, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
@@ -27,11 +27,11 @@ __all__ = ["JointNuts", "Nuts", "TemperedSmc", "sample_joint", "sample_nuts_give
 
 FloatArray = NDArray[np.float64]
 
-LARGEST_CORRELATED = 1000
+MAX_CORRELATED = 1000
 """Measurements beyond which a dense covariance at every step of the sampler is out of reach."""
 PRIOR_POINTS = 512
 """Points of the prior among which the sampler starts at the best."""
-EFFECTIVE = 0.5
+MIN_EFFECTIVE_SHARE = 0.5
 """Share of the draws that must stay effective when the bounds of the linear parameters weight them."""
 
 
@@ -133,7 +133,7 @@ def sample_nuts_given(model: StatisticalModel, seed: int = 0, refusal: str = "")
     start = _best_prior_point(model, density, data)
     sampled = sample_nuts(_log_posterior(density), lower, upper, start, settings, model.nonlinear, data)
     conditional = _Given(model, density, data, sampled.values)
-    if conditional.effective < EFFECTIVE:
+    if conditional.effective < MIN_EFFECTIVE_SHARE:
         solution = sample_joint(model, seed, because=f"{because}bounds cut deep into the linear parameters; ")
     else:
         reason = f"{because}NUTS on {', '.join(model.nonlinear)}; {conditional.rest}"
@@ -263,9 +263,9 @@ def _is_improper(model: StatisticalModel) -> bool:
 
 def _check_size(model: StatisticalModel) -> None:
     n = model.experiment.size
-    if model.is_correlated and n > LARGEST_CORRELATED:
+    if model.is_correlated and n > MAX_CORRELATED:
         raise ModelError(
-            f"sampling factorises a {n} x {n} covariance at every step; beyond {LARGEST_CORRELATED} measurements use "
+            f"sampling factorises a {n} x {n} covariance at every step; beyond {MAX_CORRELATED} measurements use "
             "the method 'exact', or thin the data."
         )
 

@@ -19,7 +19,7 @@ from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.convergence import MAX_RHAT, Draws
 from tissuq.inference.coordinates import Box
 from tissuq.inference.enumerators.mutation import Mutation, Program, compiled_program
-from tissuq.inference.resampling import resampled_at_random
+from tissuq.inference.quasi_monte_carlo import resampled_at_random
 
 __all__ = ["SmcDraws", "SmcSettings", "sample_smc"]
 
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 MIN_ESS = 400
 MAX_LOG_EVIDENCE_ERROR = 0.3
 MAX_TEMPERATURES = 1000
-MORE = "more particles"
+REMEDY_MORE = "more particles"
 
 
 @dataclass(frozen=True)
@@ -149,11 +149,11 @@ class SmcDraws(Draws):
         worst = int(np.argmax(self.rhat))
         if not self.rhat[worst] < MAX_RHAT:
             fault = f"R-hat between runs is {self.rhat[worst]:.3f} for {self.names[worst]}"
-            failures.append((f"{fault} and must be below {MAX_RHAT}", MORE))
-        failures += self._small_sizes(MIN_ESS, MORE)
+            failures.append((f"{fault} and must be below {MAX_RHAT}", REMEDY_MORE))
+        failures += self._small_sizes(MIN_ESS, REMEDY_MORE)
         if not self.log_evidence_error < MAX_LOG_EVIDENCE_ERROR:
             fault = f"the standard error of the log evidence is {self.log_evidence_error:.2f}"
-            failures.append((f"{fault} and must be below {MAX_LOG_EVIDENCE_ERROR}", MORE))
+            failures.append((f"{fault} and must be below {MAX_LOG_EVIDENCE_ERROR}", REMEDY_MORE))
         # Particles that hardly moved show in the diagnostics above; on their own they are no failure.
         stuck = np.count_nonzero(~self.moved)
         if failures and stuck:

@@ -40,8 +40,8 @@ class Discrepancy(ABC):
 
     entry_point_group: ClassVar[str] = "tissuq.discrepancies"
     name: ClassVar[str]
-    formula: ClassVar[str]
-    source: ClassVar[str]
+    formula: ClassVar[str] = "formula not stated"
+    source: ClassVar[str] = "source not stated"
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     shape_symbols: ClassVar[tuple[str, ...]] = ()
     """The parameters on which the correlation depends."""

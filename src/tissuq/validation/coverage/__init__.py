@@ -1,7 +1,6 @@
 """Whether intervals hold: campaigns over true materials, designs, noise, formulations and replicates."""
 
-from tissuq.validation.coverage.campaign import run_campaign
+from tissuq.validation.coverage.campaign import run_campaign, summarise, summarise_unseen
 from tissuq.validation.coverage.settings import PRESETS, CoverageSettings, Design, preset
-from tissuq.validation.coverage.summary import summarise, summarise_unseen
 
 __all__ = ["PRESETS", "CoverageSettings", "Design", "preset", "run_campaign", "summarise", "summarise_unseen"]

@@ -19,7 +19,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 from tissuq.posterior.fitting import fit_many
 from tissuq.posterior.posterior import Posterior
-from tissuq.validation.paper.settings import FORMULATIONS
+from tissuq.validation.paper.study import FORMULATIONS
 
 __all__ = ["fit_all", "model_of", "parameters_of", "parts_of"]
 

@@ -1,10 +1,24 @@
-"""What laboratories and testing machines call columns and dimensions of a specimen, in English and German."""
+"""Headings of columns: what laboratories and testing machines call quantities and dimensions, and units beside them."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
-__all__ = ["CYCLE_NAMES", "DIMENSION_NAMES", "ROLES", "SET_NAMES", "STRESS_NAMES", "on_axis", "plain", "role_names"]
+from tissuq.experiments.reading.units import looks_like_unit
+
+__all__ = [
+    "CYCLE_NAMES",
+    "DIMENSION_NAMES",
+    "ROLES",
+    "SET_NAMES",
+    "STRESS_NAMES",
+    "Heading",
+    "heading",
+    "on_axis",
+    "plain",
+    "role_names",
+]
 
 
 def _names(text: str) -> frozenset[str]:
@@ -54,6 +68,33 @@ DIMENSION_NAMES = {
 }
 
 
+UNIT_IN_HEADING = (
+    re.compile(r"(?P<quantity>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]"),
+    re.compile(r"(?P<quantity>.+?)\s*/\s*(?P<unit>.+)"),
+    re.compile(r"(?P<quantity>.+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
+)
+UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[_\s](?P<unit>\S*[^\W\d_]\S*|%)")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column name taken apart: ``Stress [kPa]`` is the quantity ``stress`` in the unit ``kPa``."""
+
+    quantity: str
+    unit: str = ""
+
+
+def heading(name: str) -> Heading:
+    """Take a column name apart into its quantity, in lower case, and its unit."""
+    name = name.strip()
+    match = next(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)), None)
+    if match is None:
+        match = UNIT_AS_SUFFIX.fullmatch(name)
+        if match is None or not looks_like_unit(match["unit"]):
+            return Heading(plain(name))
+    return Heading(plain(match["quantity"]), match["unit"].strip())
+
+
 def plain(name: str) -> str:
     """Return a name in lower case with blanks for hyphens and underscores."""
     return re.sub(r"[\s_-]+", " ", name).strip().lower()
@@ -72,8 +113,8 @@ def on_axis(quantity: str) -> tuple[str, str]:
     >>> on_axis("xforce"), on_axis("stress y"), on_axis("load")
     (('x', 'force'), ('y', 'stress'), ('', 'load'))
     """
-    known = frozenset().union(*ROLES.values(), *STRESS_NAMES.values(), ["size"])
-    for axis, rest in ((quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())):
-        if axis in ("x", "y") and rest in known:
-            return axis, rest
+    names = frozenset().union(*ROLES.values(), *STRESS_NAMES.values(), ["size"])
+    for axis, name in ((quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())):
+        if axis in ("x", "y") and name in names:
+            return axis, name
     return "", quantity

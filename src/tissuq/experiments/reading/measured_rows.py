@@ -1,0 +1,192 @@
+"""The rows of one test on their way to an experiment, with a sentence for every step, and from where they are taut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.units import FORCE, MASSES, number_and_unit, stress_unit
+
+__all__ = ["Dropped", "MeasuredRows", "labelled", "preload_stress"]
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """How many rows a step dropped for the sake of each stress, and why."""
+
+    counts: tuple[int, ...]
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRows:
+    """What is left of the rows of a test after some steps: a stress or several, each with what it is drawn against.
+
+    Parameters
+    ----------
+    table : Table
+        The remaining rows.
+    rows : (n,) array of int
+        Where they stand in the table of the file, counted from 0.
+    stretch : (k, n) array, dimensionless
+        That along the axis of each stress, or the amount of shear.
+    stress : (k, n) array, MPa
+    labels : tuple of k str
+        What the stresses are called; an empty text where there is one.
+    steps : tuple of str
+        What was done so far.
+    dropped : tuple of Dropped
+    """
+
+    table: Table
+    rows: NDArray[np.intp]
+    stretch: Column
+    stress: Column
+    labels: tuple[str, ...] = ("",)
+    steps: tuple[str, ...] = ()
+    dropped: tuple[Dropped, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def course(self) -> Column:
+        """What shows how far the test has gone (n,): its stretch, or the mean of the stretches of its axes."""
+        return np.asarray(self.stretch.mean(axis=0))
+
+    @property
+    def reasons(self) -> list[str]:
+        """How many rows were dropped and why, for each stress."""
+        return [
+            "; ".join(f"{step.counts[number]} dropped: {step.reason}" for step in self.dropped if step.counts[number])
+            for number in range(len(self.labels))
+        ]
+
+    def with_step(self, *sentences: str) -> MeasuredRows:
+        """Return the rows with a sentence about one more step, or one for each stress."""
+        return replace(self, steps=(*self.steps, *labelled(self.labels, sentences)))
+
+    def taken(self, rows: NDArray[np.intp]) -> MeasuredRows:
+        """Return some of the rows."""
+        stretch, stress = self.stretch[:, rows], self.stress[:, rows]
+        return replace(self, table=self.table.taken(rows), rows=self.rows[rows], stretch=stretch, stress=stress)
+
+    def kept(self, rows: NDArray[np.intp], reason: str) -> MeasuredRows:
+        """Return some of the rows, the others dropped for a reason."""
+        count = len(self) - len(rows)
+        if not count:
+            return self
+        counts = (count,) * len(self.labels)
+        return replace(self.taken(rows), dropped=(*self.dropped, Dropped(counts, reason)))
+
+    def taut(self, preload: str, thresholds: Sequence[float], peak: int) -> MeasuredRows:
+        """Return the rows in which every axis carries the preload, with stretches counted from where it first does.
+
+        That is where the absolute stress last rises through its threshold (MPa) on the way to the row ``peak``,
+        interpolated between the rows on either side: there stretch 1 is, and the gauge length with it. Stresses stay
+        as they are.
+
+        Raises
+        ------
+        InputError
+            When no row carries the preload.
+        """
+        pairs = enumerate(thresholds)
+        starts = [_TautStart.of(self, number, preload, threshold, peak) for number, threshold in pairs]
+        is_after = np.arange(len(self)) >= np.array([[start.row] for start in starts])
+        carries = is_after & (np.abs(self.stress) >= np.array(thresholds)[:, None])
+        is_taut = carries.all(axis=0)
+        reason = f"carrying less than {preload}"
+        elsewhere = f"{reason} on the other axis"
+        if not is_taut.any():
+            raise InputError(
+                f"{self.table.file}: no row is left, for all are {elsewhere}. Give a lower --preload, or another "
+                "--cycle."
+            )
+        dropped = [
+            Dropped(tuple(rows.sum(axis=1).tolist()), why)
+            for rows, why in ((~carries, reason), (carries & ~is_taut, elsewhere))
+            if rows.any()
+        ]
+        used = self.taken(np.flatnonzero(is_taut))
+        references = np.array([[start.stretch] for start in starts])
+        used = replace(used, stretch=used.stretch / references, dropped=(*self.dropped, *dropped))
+        return used.with_step(*(start.sentence(preload) for start in starts))
+
+
+def labelled(labels: Sequence[str], texts: Sequence[str]) -> list[str]:
+    """Return texts about every stress: once where it is the same for all, else each with what the stress is called."""
+    if len(set(texts)) == 1:
+        return [texts[0]]
+    return [f"{label}: {text}" for label, text in zip(labels, texts, strict=True) if text]
+
+
+def preload_stress(preload: str, area: float | None) -> float:
+    """Return a preload, a force or a stress with its unit, as a stress in MPa; forces need the area (mm²).
+
+    Raises
+    ------
+    InputError
+        When it is no positive number with a unit of force or stress, or a force where the area is not known.
+
+    Examples
+    --------
+    >>> preload_stress("0.05 N", area=10.0), preload_stress("2 kPa", area=None)
+    (0.005, 0.002)
+    """
+    number, unit = number_and_unit(str(preload))
+    if number is None or number <= 0 or not unit:
+        raise InputError(
+            f"preload must be a positive force or stress with its unit, such as '0.05 N', not '{preload}'."
+        )
+    if FORCE.factor_or_none(unit) is None and unit not in MASSES:
+        return number * stress_unit(unit).to_mpa
+    if area is None:
+        raise InputError(f"preload '{preload}' is a force, but the file gives stresses; give it as a stress.")
+    return number * FORCE.factor(unit) / area
+
+
+@dataclass(frozen=True)
+class _TautStart:
+    """From which row on an axis is taut, the stretch there, and where that is in words."""
+
+    row: int
+    stretch: float
+    place_in_words: str
+
+    @classmethod
+    def of(cls, measured: MeasuredRows, number: int, preload: str, threshold: float, peak: int) -> _TautStart:
+        """Return where the stress of that number reaches a threshold on the way to a row."""
+        table, stretch, size = measured.table, measured.stretch[number], np.abs(measured.stress[number])
+        is_loaded = size[: peak + 1] >= threshold
+        if not is_loaded.any():
+            raise InputError(
+                f"{table.file}: the preload {preload} is not reached: the largest stress is "
+                f"{size[: peak + 1].max():g} MPa, and the preload is {threshold:g} MPa. Give a lower one, and check "
+                "the units of force and area."
+            )
+        slack = np.flatnonzero(~is_loaded)
+        slack = slack[slack < np.flatnonzero(is_loaded)[-1]]
+        if len(slack):
+            row = int(slack[-1]) + 1
+            share = (threshold - size[row - 1]) / (size[row] - size[row - 1])
+            reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
+            start = cls(row, float(reference), f"between lines {table.lines[row - 1]} and {table.lines[row]}")
+        else:
+            words = f"in line {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
+            start = cls(0, float(stretch[0]), words)
+        if start.stretch <= 0:
+            raise InputError(
+                f"{table.file}: where the preload {preload} is reached ({start.place_in_words}), the stretch is "
+                f"{start.stretch:g}, not positive. Check the length of the specimen and the column of displacements."
+            )
+        return start
+
+    def sentence(self, preload: str) -> str:
+        """Return the sentence about this step."""
+        return f"stretch counted from {self.stretch:.6g}, where the preload {preload} is reached {self.place_in_words}"

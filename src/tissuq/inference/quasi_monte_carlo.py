@@ -1,0 +1,175 @@
+"""Sums over few points: evenly spread ones, those of an adapted proposal, and few that stand for many weighted ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import lgamma, log, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "SHIFTS",
+    "Proposal",
+    "adapted",
+    "effective",
+    "even_points",
+    "log_normal",
+    "quasi_random",
+    "resampled_at_random",
+    "systematic",
+]
+
+FloatArray = NDArray[np.float64]
+
+SHIFTS = 8
+"""Shifted copies of the quasi-random points, whose spread tells the error (more, where few points count)."""
+
+
+DEGREES_OF_FREEDOM = 5.0
+"""Of the t distribution: its tails are heavier than those of a posterior."""
+WIDE_SHARE = 0.1
+"""Share of the proposal that stays as wide as the prior, so that no weight is without bound there."""
+LOG_OF_NOTHING = -1e300
+"""Stands for the logarithm of a weight that is zero or not a number."""
+MAX_ROUNDS = 15
+MIN_EFFECTIVE_SHARE = 0.3
+"""Share of a round's points that must be effective for the adaptation to end."""
+
+
+def even_points(dimension: int, count: int) -> FloatArray:
+    """Return evenly spread points (count, d) of the unit cube; every k-th of them are, too."""
+    if dimension == 1:
+        return (np.arange(count)[:, None] + 0.5) / count
+    return np.asarray((0.5 + np.arange(1, count + 1)[:, None] * _steps(dimension)) % 1.0)
+
+
+@lru_cache
+def quasi_random(dimension: int, number: int) -> FloatArray:
+    """Return points (number, d) of the unit cube, shifted copy by shifted copy.
+
+    The tent map makes any integrand periodic, which lets the error fall faster than one over the number of points.
+    """
+    shifts = np.random.default_rng(0).random((SHIFTS, 1, dimension))
+    lattice = shifts + np.arange(1, -(-number // SHIFTS) + 1)[:, None] * _steps(dimension)
+    return np.asarray(np.abs(2 * (lattice % 1.0) - 1)).reshape(-1, dimension)[:number]
+
+
+def _steps(dimension: int) -> FloatArray:
+    """Return the steps (d,) along each side: powers of one over the root of r^(d + 1) = r + 1."""
+    ratio = 2.0
+    for _ in range(64):
+        ratio = (1 + ratio) ** (1 / (dimension + 1))
+    return np.asarray(ratio ** -np.arange(1.0, dimension + 1))
+
+
+def systematic(weights: FloatArray, count: int, offset: float | FloatArray = 0.5) -> NDArray[np.intp]:
+    """Return which points to take, each as often as its weight says, in ascending order: neighbours stay neighbours.
+
+    Parameters
+    ----------
+    weights : (R, n) array
+        Weights of the points of R sets, which need not sum to one.
+    count : int
+        Points to take from each set.
+    offset : float or (R, 1) array
+        Place of the first tick, between zero and one.
+
+    Returns
+    -------
+    (R, count) array
+    """
+    edges = np.cumsum(weights, axis=1)
+    ticks = (np.arange(count) + offset) / count * edges[:, -1:]
+    indices = [np.searchsorted(edge, tick, side="right") for edge, tick in zip(edges, ticks, strict=True)]
+    return np.asarray(np.minimum(indices, edges.shape[1] - 1), dtype=np.intp)
+
+
+def resampled_at_random(log_weights: FloatArray, generator: np.random.Generator) -> NDArray[np.intp]:
+    """Return as many draws of R sets as these have, (R, n), from log weights (R, n) up to a constant for each set."""
+    weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
+    return systematic(weights, weights.shape[1], generator.random((len(weights), 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A mixture of t distributions along some axes, with mean (d,) and root (d, d), and the standard normal."""
+
+    mean: FloatArray
+    root: FloatArray
+
+    def points(self, uniforms: FloatArray) -> FloatArray:
+        """Return the points (N, d) to which evenly spread points (N, d) of the unit cube lead."""
+        from scipy.special import ndtri, stdtrit
+
+        wide = np.arange(len(uniforms)) % round(1 / WIDE_SHARE) == round(0.5 / WIDE_SHARE)
+        heavy = self.mean + stdtrit(DEGREES_OF_FREEDOM, uniforms) @ self.root.T
+        return np.asarray(np.where(wide[:, None], ndtri(uniforms), heavy))
+
+    def log_density(self, points: FloatArray) -> FloatArray:
+        """Return the log density (N,) at points (N, d)."""
+        score = np.linalg.solve(self.root, (points - self.mean).T)
+        half, half_more = 0.5 * DEGREES_OF_FREEDOM, 0.5 * (DEGREES_OF_FREEDOM + 1)
+        log_height = lgamma(half_more) - lgamma(half) - 0.5 * log(DEGREES_OF_FREEDOM * pi)
+        heavy = (log_height - half_more * np.log1p(score**2 / DEGREES_OF_FREEDOM)).sum(axis=0)
+        heavy = heavy - np.log(np.abs(np.diag(self.root))).sum()
+        return np.asarray(np.logaddexp(log(1 - WIDE_SHARE) + heavy, log(WIDE_SHARE) + log_normal(points)))
+
+
+def log_normal(points: FloatArray) -> FloatArray:
+    """Return the log density (N,) of the standard normal at points (N, d)."""
+    return np.asarray(-0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * log(2 * pi))
+
+
+def adapted(log_density: Callable[[FloatArray], FloatArray], dimension: int, count: int | None = None) -> Proposal:
+    """Return a proposal for a density near the standard normal or much narrower, known (N,) at points (N, d).
+
+    Rounds of quasi-random points come nearer to the density: all points so far, weighted by a power of the density over
+    the mixture of all proposals so far, give the next t distribution its mean and covariance; the power is the
+    largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering). ``count`` is the
+    number of points in a round.
+    """
+    count = count or 16 + 16 * dimension
+    least_effective = 4.0 + 4 * dimension
+    proposal = Proposal(np.zeros(dimension), np.eye(dimension))
+    proposals, points, values = [], np.zeros((0, dimension)), np.zeros(0)
+    uniforms = even_points(dimension, count * MAX_ROUNDS)
+    for round_ in range(MAX_ROUNDS):
+        new = proposal.points(uniforms[round_::MAX_ROUNDS])
+        proposals.append(proposal)
+        points = np.concatenate([points, new])
+        values = np.concatenate([values, log_density(new)])
+        mixture = np.logaddexp.reduce(
+            [proposal_of_round.log_density(points) for proposal_of_round in proposals], axis=0
+        ) - log(len(proposals))
+        weights, power = _tempered(
+            np.nan_to_num(values - mixture, nan=LOG_OF_NOTHING, neginf=LOG_OF_NOTHING), least_effective
+        )
+        mean = weights @ points
+        away = points - mean
+        covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
+        proposal = Proposal(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
+        if power == 1 and effective(values[-count:] - proposals[-1].log_density(new)) > MIN_EFFECTIVE_SHARE * count:
+            break
+    return proposal
+
+
+def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:
+    """Return normalised weights to the largest power at most one that leaves ``least`` effective, and that power."""
+    low, high = 0.0, 1.0
+    if effective(log_weights) >= min_effective:
+        low = 1.0
+    else:
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if effective(middle * log_weights) >= min_effective else (low, middle)
+    weights = np.exp(low * (log_weights - log_weights.max()))
+    return weights / weights.sum(), low
+
+
+def effective(log_weights: FloatArray) -> float:
+    """Return the effective number of weighted points."""
+    weights = np.exp(log_weights - log_weights.max())
+    return float(weights.sum() ** 2 / (weights**2).sum())

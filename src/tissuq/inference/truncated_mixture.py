@@ -1,0 +1,287 @@
+"""A mixture of Gaussians within bounds of the linear parameters: what these cut, its marginals, and draws within."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.inference.box import NEGLIGIBLE_MASS, TOUCHED_MASS, Boxes, lower_triangle
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.marginal import (
+    MIXTURE_NODES,
+    HermiteCubics,
+    Marginal,
+    blended,
+    marginal_of_points,
+    moments_of_values,
+    refined,
+    weighted_grid,
+)
+from tissuq.inference.nested import MAX_NESTED, nested_log_density, nested_points
+from tissuq.inference.quasi_monte_carlo import quasi_random
+from tissuq.parameters.normal_interval import log_interval
+
+__all__ = ["TruncatedMixture"]
+
+FloatArray = NDArray[np.float64]
+
+MIN_DRAWS = 4000
+"""Draws, at least, that represent what bounds cut, in predictions and in a posterior's draws."""
+MAX_COMPONENTS = 200
+"""Components, at most, whose marginals within several bounds are computed."""
+MIN_POINTS = 200_000
+"""Points, at least, that stand for all of them together where more bounds cut than can be integrated."""
+FEW_GAUSSIANS = 60
+"""Up to which Gaussians that are nearly the same are not merged."""
+SAME_GAUSSIAN = 0.005
+"""Difference in mean (sd) and sd (relative) up to which Gaussians that a bound cuts are taken together."""
+MAX_VALUES = 300_000
+"""Values of single Gaussians, at most, from which the density of a cut mixture is computed."""
+FAR_SDS = 15.0
+"""Standard deviations beyond a bound from which a cut Gaussian's variance is taken from its expansion."""
+
+
+@dataclass(frozen=True, eq=False)
+class TruncatedMixture:
+    """A mixture within bounds, in three groups of components, by what bounds do to them.
+
+    Attributes
+    ----------
+    gaussians : GaussianMixture
+        Gaussian before the bounds cut them; weights after that.
+    touched : (M, p) array
+        Bounds of which parameters cut which component.
+    box : Boxes
+        The bounds (1, p).
+    """
+
+    gaussians: GaussianMixture
+    touched: NDArray[np.bool_]
+    box: Boxes
+
+    @classmethod
+    def of(cls, gaussians: GaussianMixture, mass_beyond: FloatArray, box: Boxes) -> TruncatedMixture:
+        """Return Gaussians with weights after the cut, given the masses (M, p) beyond the bounds of each parameter.
+
+        Components that together have less than 1e-8 of the posterior outside the bounds count as free.
+        """
+        loss = gaussians.weights * mass_beyond.sum(axis=1)
+        order = np.argsort(loss)
+        is_cut = np.zeros(len(loss), dtype=bool)
+        is_cut[order[np.cumsum(loss[order]) > NEGLIGIBLE_MASS]] = True
+        return cls(gaussians, is_cut[:, None] & (mass_beyond > TOUCHED_MASS), box)
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether any bound matters."""
+        return bool(self.touched.any())
+
+    @cached_property
+    def free(self) -> GaussianMixture:
+        """The components that no bound cuts."""
+        return self.gaussians[self.touched.sum(axis=1) == 0]
+
+    @cached_property
+    def cut(self) -> dict[int, GaussianMixture]:
+        """The components that bounds of one parameter cut, by its index."""
+        is_single = self.touched.sum(axis=1) == 1
+        indices = np.flatnonzero(self.touched[is_single].any(axis=0))
+        return {int(index): self.gaussians[is_single & self.touched[:, index]] for index in indices}
+
+    @cached_property
+    def crossed(self) -> GaussianMixture:
+        """The components that bounds of several parameters cut."""
+        return self.gaussians[self.touched.sum(axis=1) > 1]
+
+    def components(self) -> GaussianMixture:
+        """Return all as one mixture: Gaussians, and draws within the bounds from what these cut."""
+        mixture = self.free
+        for gaussians in (*self.cut.values(), self.crossed):
+            if len(gaussians):
+                mixture = mixture.joined(self._drawn(gaussians))
+        return mixture
+
+    def marginal(self, index: int) -> Marginal:
+        """Return the marginal of one linear parameter: in closed form where at most one bound cuts."""
+        marginals = [(self.free.weights.sum(), self.free.marginal(index))] if self.free.weights.sum() > 0 else []
+        for cut_index, gaussians in self.cut.items():
+            if gaussians.weights.sum() >= NEGLIGIBLE_MASS * 100:
+                marginal = _marginal_of_cut(gaussians, index, cut_index, self._bounds(cut_index))
+                marginals.append((gaussians.weights.sum(), marginal))
+        if len(self.crossed):
+            marginals += self._crossed_marginals(index)
+        return blended(marginals, self._bounds(index))
+
+    def _bounds(self, index: int) -> tuple[float, float]:
+        return float(self.box.lower[0, index]), float(self.box.upper[0, index])
+
+    def _crossed_marginals(self, index: int) -> list[tuple[float, Marginal]]:
+        """Return marginals of what several bounds cut, with their weights: by which bounds these are."""
+        thinned, share = self.crossed.thinned(MAX_COMPONENTS), self.crossed.weights.sum()
+        active = self._boxes(thinned).beyond(thinned.mean, thinned.root) > TOUCHED_MASS
+        active[:, index] = True
+        marginals = []
+        for pattern in np.unique(active, axis=0):
+            gaussians = thinned[(active == pattern).all(axis=1)]
+            order = np.array([index, *(k for k in np.flatnonzero(pattern) if k != index)])
+            if len(order) > MAX_NESTED:
+                points = self._points(gaussians)
+                marginal = marginal_of_points(points.mean[:, index], points.weights, self._bounds(index))
+            else:
+                low, high = ((ends[0] - gaussians.mean)[:, order] for ends in (self.box.lower, self.box.upper))
+                triangle = lower_triangle(gaussians.root[:, order])
+                marginal = _marginal_of_crossed(gaussians.weights, gaussians.mean[:, index], triangle, low, high)
+            marginals.append((share * gaussians.weights.sum(), marginal))
+        return marginals
+
+    def _boxes(self, gaussians: GaussianMixture) -> Boxes:
+        return self.box.repeated(len(gaussians))
+
+    def _drawn(self, gaussians: GaussianMixture) -> GaussianMixture:
+        """Return draws within the bounds, as components without extent."""
+        thinned = gaussians.thinned(MIN_DRAWS)
+        count, p = thinned.mean.shape
+        draws = -(-MIN_DRAWS // count)
+        uniforms = quasi_random(p, count * draws).reshape(count, draws, p)
+        points = self._boxes(thinned).draws(thinned.mean, thinned.root, uniforms)
+        return _of_points(thinned, gaussians.weights.sum() * np.ones(points.shape[:2]) / points.shape[1], points)
+
+    def _points(self, gaussians: GaussianMixture) -> GaussianMixture:
+        """Return weighted points within the bounds."""
+        number = max(64, MIN_POINTS // len(gaussians))
+        log_shares, points = self._boxes(gaussians).points(gaussians.mean, gaussians.root, number)
+        shares = np.exp(log_shares - log_shares.max(axis=1, keepdims=True))
+        return _of_points(gaussians, shares / shares.sum(axis=1, keepdims=True), points)
+
+
+def _of_points(gaussians: GaussianMixture, shares: FloatArray, points: FloatArray) -> GaussianMixture:
+    """Return components without extent: points (M, R, p) that have shares (M, R) of the weights of M Gaussians."""
+    weights = (gaussians.weights[:, None] * shares).ravel()
+    rows, p = np.repeat(np.arange(len(points)), points.shape[1]), points.shape[2]
+    return replace(gaussians[rows], weights=weights, mean=points.reshape(-1, p), root=np.zeros((len(rows), p, p)))
+
+
+def _marginal_of_cut(gaussians: GaussianMixture, index: int, cut_index: int, ends: tuple[float, float]) -> Marginal:
+    """Return the marginal of one parameter of Gaussians that the bounds of one parameter cut, in closed form.
+
+    Parameters
+    ----------
+    gaussians : GaussianMixture
+        Gaussian before the cut; weights after it.
+    index, cut_index : int
+        Of the parameter whose marginal is wanted, and of the one with bounds.
+    ends : tuple of float
+        The bounds.
+    """
+    weights, means, covariances = _merged(gaussians, (index, cut_index))
+    sd, sd_cut = (np.sqrt(covariances[:, k, k]) for k in (index, cut_index))
+    low, high = ((end - means[:, cut_index]) / sd_cut for end in ends)
+    log_mass = log_interval(low, high)
+    shift, shrink = _cut_moments(low, high, log_mass)
+    along = covariances[:, index, cut_index] / sd_cut
+    cut_mean = means[:, index] + along * shift
+    cut_variance = np.maximum(sd**2 - along**2 * (1 - shrink), 0.0)
+    mean = float(weights @ cut_mean)
+    variance = float(weights @ (cut_variance + (cut_mean - mean) ** 2))
+    scores = np.linspace(-25, 25, 51)  # what a bound leaves may have an exponential tail
+    spread = cut_mean[:, None] + np.sqrt(cut_variance)[:, None] * scores
+    limits = ends if index == cut_index else (-np.inf, np.inf)
+    reach = max(spread.min(), limits[0]), min(spread.max(), limits[1])
+    shares = weights[:, None] * np.exp(-np.abs(scores))
+    count = max(2 * MIXTURE_NODES, min(4 * MIXTURE_NODES, MAX_VALUES // len(weights)))
+    coarse = weighted_grid(np.clip(spread, *reach).ravel(), shares.ravel(), reach, count)
+    scores = (coarse - means[:, index, None]) / sd[:, None]
+    log_density = -0.5 * scores**2 - np.log(sd * np.sqrt(2 * np.pi))[:, None] - log_mass[:, None]
+    rise = -scores
+    if index != cut_index:
+        correlation = np.clip(along / sd, -1 + 1e-12, 1 - 1e-12)[:, None]
+        complement = np.sqrt(1 - correlation**2)
+        low_given, high_given = ((end[:, None] - correlation * scores) / complement for end in (low, high))
+        log_given = log_interval(low_given, high_given)
+        log_density += log_given
+        rise += correlation / complement * (_height(low_given, log_given) - _height(high_given, log_given))
+    heights = weights[:, None] * np.exp(log_density)
+    smooth = HermiteCubics(coarse, heights.sum(axis=0), (heights * rise / sd[:, None]).sum(axis=0))
+    points = refined(coarse)
+    return Marginal.of(mean, float(np.sqrt(variance)), points, smooth(points), smooth.integral(points))
+
+
+def _marginal_of_crossed(
+    weights: FloatArray, means: FloatArray, triangle: FloatArray, low: FloatArray, high: FloatArray
+) -> Marginal:
+    """Return the marginal of the first parameter of M Gaussians that bounds of several parameters cut.
+
+    Parameters
+    ----------
+    weights, means : (M,) arrays
+        Of the Gaussians after the cut, and of the parameter before it.
+    triangle : (M, k, k) array
+        Lower triangles L of the covariances L L'.
+    low, high : (M, k) arrays
+        Bounds, from the means.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    scale = triangle[:, 0, :1]
+    scores, log_terms = nested_points(triangle, low, high)
+    top = log_terms.max(axis=1, keepdims=True)
+    log_mass = top + np.log(np.exp(log_terms - top).sum(axis=1, keepdims=True))
+    shares = (weights / weights.sum())[:, None] * np.exp(log_terms - log_mass)
+    values = means[:, None] + scale * scores
+    mean, sd = moments_of_values(shares, values)
+    coarse = weighted_grid(values.ravel(), shares.ravel(), (values.min(), values.max()), 2 * MIXTURE_NODES)
+    scores = (coarse - means[:, None]) / scale
+    log_density = nested_log_density(triangle, low, high, scores)[0] - log_mass
+    is_inside = (scores >= low[:, :1] / scale) & (scores <= high[:, :1] / scale)
+    density = (weights / weights.sum() / scale[:, 0]) @ np.where(is_inside, np.exp(log_density), 0.0)
+    smooth, points = PchipInterpolator(coarse, density), refined(coarse)
+    return Marginal.of(mean, sd, points, smooth(points), smooth.antiderivative()(points))
+
+
+def _cut_moments(low: FloatArray, high: FloatArray, log_mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return means and variances of standard normal variables between bounds.
+
+    Far beyond a bound the usual formula cancels; what is left there is nearly exponential.
+    """
+    at_low, at_high = _height(low, log_mass), _height(high, log_mass)
+    mean = at_low - at_high
+    pull = np.where(np.isfinite(low), low, 0.0) * at_low - np.where(np.isfinite(high), high, 0.0) * at_high
+    nearest = np.maximum(low, -high)
+    far = np.maximum(nearest, FAR_SDS)
+    is_far = (nearest > FAR_SDS) & (far * (high - low) > 40)
+    return mean, np.where(is_far, far**-2 * (1 - 6 * far**-2 + 50 * far**-4), 1 + pull - mean**2)
+
+
+def _height(score: FloatArray, log_mass: FloatArray) -> FloatArray:
+    """Return the standard normal density over a mass."""
+    return np.asarray(np.exp(-0.5 * score**2 - log_mass) / np.sqrt(2 * np.pi))
+
+
+def _merged(gaussians: GaussianMixture, index_pair: tuple[int, int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return weights, means and covariances, Gaussians that are nearly the same in two parameters merged to one."""
+    weights, means, covariances = gaussians.weights / gaussians.weights.sum(), gaussians.mean, gaussians.covariance
+    if len(weights) <= FEW_GAUSSIANS:
+        return weights, means, covariances
+    seen = weights > 1e-9 * weights.max()
+    weights, means, covariances = weights[seen] / weights[seen].sum(), means[seen], covariances[seen]
+    sds = np.sqrt(covariances[:, index_pair, index_pair])
+    means_of_pair = means[:, index_pair]
+    bins = np.hstack(
+        [
+            (means_of_pair - means_of_pair.min(axis=0)) / (SAME_GAUSSIAN * sds),
+            np.log(sds / sds.min(axis=0)) / SAME_GAUSSIAN,
+        ]
+    ).astype(int)
+    _, group = np.unique(bins, axis=0, return_inverse=True)
+    group = group.ravel()
+    total = np.asarray(np.bincount(group, weights), dtype=np.float64)
+    mean = np.zeros((len(total), means.shape[1]))
+    np.add.at(mean, group, weights[:, None] * means)
+    mean /= total[:, None]
+    away = means - mean[group]
+    covariance = np.zeros((len(total), *covariances.shape[1:]))
+    np.add.at(covariance, group, weights[:, None, None] * (covariances + away[:, :, None] * away[:, None, :]))
+    return total, mean, covariance / total[:, None, None]
