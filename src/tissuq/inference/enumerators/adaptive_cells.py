@@ -27,7 +27,7 @@ from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["AdaptiveCells", "solve_exactly"]
+__all__ = ["AdaptiveCells"]
 
 FloatArray = NDArray[np.float64]
 
@@ -60,48 +60,43 @@ class AdaptiveCells:
             )
         return ""
 
-    def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
-        """Return the posteriors of models on the same stretches, all integrated together."""
-        return solve_exactly(models, seed)
+    def solve(self, models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+        """Return posterior and evidence of models with at most three nonlinear parameters each.
 
+        Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
+        linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
+        off more, they are integrated numerically. The error given with the evidence is that of the
+        quadrature and of the mass within the bounds.
 
-def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
-    """Return posterior and evidence of models with at most three nonlinear parameters each.
+        Parameters
+        ----------
+        models : sequence of StatisticalModel
+            With the same material, discrepancy and noise on the same stretches: they share every factorisation.
+        seed : int
+            Of the draws; nothing else is random.
 
-    Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
-    linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
-    off more, they are integrated numerically. The error given with the evidence is that of the
-    quadrature and of the mass within the bounds.
+        Raises
+        ------
+        ModelError
+            When a model has more than three nonlinear parameters, or noise and discrepancy without closed form.
+        ConvergenceError
+            When the quadrature does not reach its tolerance.
 
-    Parameters
-    ----------
-    models : sequence of StatisticalModel
-        With the same material, discrepancy and noise on the same stretches: they share every factorisation.
-    seed : int
-        Of the draws; nothing else is random.
-
-    Raises
-    ------
-    ModelError
-        When a model has more than three nonlinear parameters, or noise and discrepancy without closed form.
-    ConvergenceError
-        When the quadrature does not reach its tolerance.
-
-    References
-    ----------
-    Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
-    """
-    reason = AdaptiveCells().why_not(models[0])
-    if reason:
-        raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
-    together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
-    blocks = [models[start : start + together] for start in range(0, len(models), together)]
-    with one_thread():
-        return [
-            _solution(integration, index, seed)
-            for integration in map(_Integration, blocks)
-            for index in range(len(integration.models))
-        ]
+        References
+        ----------
+        Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
+        """
+        reason = self.why_not(models[0])
+        if reason:
+            raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
+        together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
+        blocks = [models[start : start + together] for start in range(0, len(models), together)]
+        with one_thread():
+            return [
+                _solution(integration, index, seed)
+                for integration in map(_Integration, blocks)
+                for index in range(len(integration.models))
+            ]
 
 
 class _Integration:
