@@ -15,13 +15,12 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.model.compatibility import check_linearity, check_parts, check_separable
-from tissuq.model.condensed import Condensed, condensed, is_condensed
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
 from tissuq.model.error_model import ErrorModel
 from tissuq.model.measurement_errors import FittedErrors, Tolerances
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.scales import default_boxes, default_prior, off_zero, support
-from tissuq.model.statistics import CHUNK, Statistics, upper_triangle
+from tissuq.model.statistics import CHUNK, Condensed, Statistics, condensed, is_condensed, upper_triangle
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, Prior
 

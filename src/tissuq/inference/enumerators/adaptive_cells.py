@@ -17,7 +17,14 @@ from tissuq.inference.enumerators.quadrature import (
     has_missed,
     integrate,
 )
-from tissuq.inference.enumerators.survey import Warp, log_prior_density, survey, warp_along
+from tissuq.inference.enumerators.survey import (
+    Warp,
+    coordinates_of,
+    log_prior_density,
+    parameters_of,
+    survey,
+    warp_along,
+)
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
@@ -127,11 +134,8 @@ class _Integration:
         is_log, priors = self.warp.is_log, self._priors[index : index + 1]
         conditional, structure = ConditionalGaussian(self.models[index : index + 1]), self.models[0].structure
 
-        def coordinates(h: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
-            return np.where(is_log, np.log(np.where(is_log, h, 1.0)), h)
-
         def log_density(g: FloatArray) -> FloatArray:
-            h = np.where(is_log, np.exp(np.where(is_log, g, 0.0)), g)[None]
+            h = parameters_of(g, is_log)[None]
             try:
                 gaussians = conditional(h)
             except (ConvergenceError, np.linalg.LinAlgError):  # where columns depend on each other, far away
@@ -145,9 +149,9 @@ class _Integration:
             return np.asarray(np.where(np.isnan(value), -np.inf, value)[0])
 
         tried = np.array([prior.quantile(START_PROBABILITIES) for prior in priors[0][: len(structure)]])
-        starts = coordinates(tried.T, is_log[: len(structure)]).T
+        starts = coordinates_of(tried.T, is_log[: len(structure)]).T
         bounds = np.column_stack([self.warp.lower[index], self.warp.upper[index]])
-        if has_missed(log_density, bounds, coordinates(self.settings[index], is_log), weights, starts):
+        if has_missed(log_density, bounds, coordinates_of(self.settings[index], is_log), weights, starts):
             raise ConvergenceError(
                 f"the posterior of {', '.join(structure)} is a ridge too thin for quadrature beside this noise: use "
                 "the method 'nuts', or give a narrow prior of one of them."
