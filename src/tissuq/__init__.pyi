@@ -20,7 +20,7 @@ from tissuq.mechanics import (
     load_material as load_material,
     simulate as simulate,
 )
-from tissuq.mechanics.fibres import FibreMaterial as FibreMaterial
+from tissuq.mechanics.laws.fibres import FibreMaterial as FibreMaterial
 from tissuq.mechanics.material import Material as Material, StretchMaterial as StretchMaterial, materials as materials
 from tissuq.mechanics.user_law import FunctionLaw as FunctionLaw
 from tissuq.model.discrepancy import discrepancies as discrepancies

@@ -21,7 +21,7 @@ from closed_forms import (
 )
 from loading import sheared
 from tissuq.mechanics import engineering_stress, initial_shear_modulus
-from tissuq.mechanics.contract import checked
+from tissuq.mechanics.user_law import checked
 
 EVERY_MATERIAL = pytest.mark.parametrize("material", EVERY, ids=lambda material: material.name)
 EVERY_ISOTROPIC = pytest.mark.parametrize("material", ISOTROPIC, ids=lambda material: material.name)

@@ -12,8 +12,7 @@ from closed_forms import EVERY, has_stress
 from loading import MEASURED, PAIRS, SHEAR
 from tissuq.experiments.modes import Biaxial, Planar, SimpleShear, SimpleShearNormal, Uniaxial
 from tissuq.mechanics import engineering_stress, initial_shear_modulus, material_named, stress_basis
-from tissuq.mechanics.complex_step import complex_step_stress
-from tissuq.mechanics.stress import differentiator, path_energy, traced_stress_basis
+from tissuq.mechanics.stress import complex_step_stress, differentiator, path_energy, traced_stress_basis
 
 LAWS = {"standard-fibres": [0.7], "exponential-fibres": [0.7, 1.3], "dispersed-fibres": [0.7, 1.3, 0.1]}
 EVERY_LAW = pytest.mark.parametrize("law", LAWS)

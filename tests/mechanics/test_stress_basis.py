@@ -11,8 +11,7 @@ import tissuq as tq
 from loading import MEASURED
 from tissuq.experiments.modes import Equibiaxial, Planar, SimpleShearNormal, Uniaxial
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3, StretchMaterial, stress_basis, traced_stress_basis
-from tissuq.mechanics.complex_step import complex_step_stress
-from tissuq.mechanics.stress import differentiator
+from tissuq.mechanics.stress import complex_step_stress, differentiator
 
 jax = differentiator()
 

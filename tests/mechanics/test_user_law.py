@@ -130,7 +130,7 @@ def test_a_law_that_is_wrong_by_a_thousandth_is_found(laws, law, claim):
         ("laws.py:rooted", "the energy is finite"),
         ("laws.py:valued", r"its argument 'mu=1.0' is not plain.*Write a function"),
         ("laws.py:misnamed", r"has the arguments x, y, mu\. Write a function W\(I1, I2"),
-        ("laws.py:Nameless", "lacks name, formula, source, parameters"),
+        ("laws.py:Nameless", "lacks name, parameters"),
         ("laws.py:number", r"no material \(it is 3\)"),
         ("laws.py:gone", "nothing named 'gone'; it defines exponential, logarithmic, Simple"),
         ("failing.py:W", "'failing.py' fails, line 2: ValueError: not today"),

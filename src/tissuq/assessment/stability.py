@@ -15,8 +15,8 @@ from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loa
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
-from tissuq.mechanics.complex_step import MOST_VALUES
 from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
+from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
 
@@ -245,7 +245,7 @@ def _curves(model: StatisticalModel, mixture: GaussianMixture) -> Curves:
 
     def stresses(states: States) -> FloatArray:
         # The same blocks, and so the same draws, at any points.
-        count = MOST_VALUES // (20 * POINTS_PER_SIDE * len(model.column_symbols))
+        count = MAX_COMPLEX_STEP_VALUES // (20 * POINTS_PER_SIDE * len(model.column_symbols))
         count = count if model.bent_symbols else DRAWS_PER_BLOCK
         blocks = np.array_split(np.arange(len(mixture.weights)), -(-len(mixture.weights) // max(1, count)))
         curves = [drawn_curves(model, mixture[block], states, seed) for seed, block in enumerate(blocks)]

@@ -101,7 +101,7 @@ def _print_kinds(title: str, kinds: Iterable[type[Material] | type[Discrepancy] 
 def check(material: Annotated[str, typer.Argument(help="Your own law.py:Name, or the name of any material.")]) -> None:
     """Check a material: zero at the reference, derivatives, what is linear; status 2 where it fails."""
     from tissuq.mechanics import material_named
-    from tissuq.mechanics.contract import checked
+    from tissuq.mechanics.user_law import checked
 
     law = material_named(material, laws=True)
     print(f"{law.name}\n    {law.formula}")

@@ -25,15 +25,15 @@ class Mixture(Form):
     summands: tuple[Form, ...]
 
     def holds(self, material: Material) -> bool:
-        if not isinstance(material, MaterialSum) or len(material.parts) != len(self.summands):
+        if not isinstance(material, MaterialSum) or len(material.summands) != len(self.summands):
             return False
-        return all(form.holds(summand) for form, summand in zip(self.summands, material.parts, strict=True))
+        return all(form.holds(summand) for form, summand in zip(self.summands, material.summands, strict=True))
 
     def constants(self, material: Material, values: Sequence[float]) -> Constants:
         assert isinstance(material, MaterialSum)  # noqa: S101 (what it holds)
         constants: Constants = {}
         remaining = list(values)
-        for form, summand in zip(self.summands, material.parts, strict=True):
+        for form, summand in zip(self.summands, material.summands, strict=True):
             count = len(summand.parameters)
             numbers, remaining = form.constants(summand, remaining[:count]), remaining[count:]
             constants |= {f"{form.keyword}_{name}": value for name, value in numbers.items()}

@@ -85,7 +85,7 @@ def parts_of(ensemble: Ensemble) -> Iterator[tuple[Material, FloatArray]]:
     """Return the materials that draws are sums of, one by one, with their values (N, k)."""
     for index, (material, _) in enumerate(ensemble[0].parts):
         values = np.array([draw.parts[index][1] for draw in ensemble])
-        materials = material.parts if isinstance(material, MaterialSum) else (material,)
+        materials = material.summands if isinstance(material, MaterialSum) else (material,)
         ends = pairwise(accumulate((len(material.parameters) for material in materials), initial=0))
         yield from ((material, values[:, start:end]) for material, (start, end) in zip(materials, ends, strict=True))
 

@@ -1,7 +1,7 @@
 """What the material says: strain energies, and stress as their derivative along a loading mode."""
 
-from tissuq.mechanics.fibres import FibreMaterial
 from tissuq.mechanics.laws import MooneyRivlin, NeoHookean, Ogden1, Ogden2, Ogden3, Yeoh
+from tissuq.mechanics.laws.fibres import FibreMaterial
 from tissuq.mechanics.material import Material, StretchMaterial
 from tissuq.mechanics.named import material_named
 from tissuq.mechanics.simulate import simulate

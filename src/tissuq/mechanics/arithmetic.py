@@ -63,5 +63,5 @@ def log_left(ratio: Any) -> Any:
 
     A logarithm by itself has a finite derivative beyond the pole, and a material that has locked would have a stress.
     """
-    own = library(ratio)
-    return own.log1p(-ratio * own.where(ratio.real < 1, 1.0, nan))
+    arrays = library(ratio)
+    return arrays.log1p(-ratio * arrays.where(ratio.real < 1, 1.0, nan))

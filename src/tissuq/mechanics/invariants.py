@@ -31,18 +31,18 @@ def invariant_rates(states: States) -> tuple[FloatArray, FloatArray]:
 
 def largest_invariants(states: States) -> tuple[float, float]:
     """Return the largest I1 - 3 and I2 - 3 of states."""
-    first, second = invariants(states)
-    return float(first.max()), float(second.max())
+    I1, I2 = invariants(states)
+    return float(I1.max()), float(I2.max())
 
 
-def farthest_stretch(mode: LoadingMode, most: Sequence[float], sign: int) -> float:
-    """Return the stretch of a mode, above (sign 1) or below (-1) its rest, where I1 - 3 or I2 - 3 reaches ``most``."""
+def farthest_stretch(mode: LoadingMode, limits: Sequence[float], sign: int) -> float:
+    """Return the stretch of a mode, above (sign 1) or below (-1) its rest, where I1 - 3 or I2 - 3 reaches its limit."""
     (control,) = mode.controls
     farthest = LARGEST_STRETCH - 1
     low, high = 0.0, farthest if sign > 0 else min(farthest, control.reference - control.above)
     for _ in range(60):
         middle = 0.5 * (low + high)
         reached = largest_invariants(mode.paths[0].at(mode.excursion([sign * middle])))  # the same on every path
-        is_inside = all(value <= limit for value, limit in zip(reached, most, strict=True))
+        is_inside = all(value <= limit for value, limit in zip(reached, limits, strict=True))
         low, high = (middle, high) if is_inside else (low, middle)
     return float(mode.excursion(sign * low))

@@ -1,19 +1,21 @@
-"""Materials: strain-energy densities of the invariants or of the principal stretches, with named parameters."""
+"""Materials: strain energies of the invariants or of the principal stretches, with named parameters, and their sums."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import accumulate, chain, combinations, pairwise
 from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
 
+from tissuq.errors import ModelError
 from tissuq.experiments.modes import Deformation
 from tissuq.parameters.parameter import Parameter
 from tissuq.registry import variants
 
-__all__ = ["Material", "StretchMaterial", "materials"]
+__all__ = ["Material", "MaterialSum", "StretchMaterial", "materials"]
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,8 @@ class Material(ABC):
     needs_matrix: ClassVar[bool] = False
     """Whether it has no stiffness of its own at the reference, so that it is only part of a sum."""
 
-    def __add__(self, other: Material) -> Material:
-        from tissuq.mechanics.laws.sums import added
-
-        return added(self, other)
+    def __add__(self, material: Material) -> Material:
+        return MaterialSum.of(self, material)
 
     @abstractmethod
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
@@ -48,8 +48,8 @@ class Material(ABC):
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         """Return the same energy (MPa) from the three principal stretches: what stress is derived from."""
-        first, second, third = (stretch * stretch for stretch in stretches)
-        return self.strain_energy(first + second + third, first * second + second * third + third * first, values)
+        x, y, z = (stretch * stretch for stretch in stretches)
+        return self.strain_energy(x + y + z, x * y + y * z + z * x, values)
 
     def energy_of(self, deformation: Deformation, values: Any) -> Any:
         """Return the same energy (MPa) of a deformation; a material with directions sees more than the stretches."""
@@ -76,10 +76,101 @@ class StretchMaterial(Material):
         spread = np.maximum(I1**2 - 3 * I2, 0)  # squared stretches solve x^3 - I1 x^2 + I2 x - 1 = 0
         skew = 2 * I1**3 - 9 * I1 * I2 + 27
         angle = np.arctan2(np.sqrt(np.maximum(4 * spread**3 - skew**2, 0)), skew)
-        first, second, third = (
-            np.sqrt((I1 + 2 * np.sqrt(spread) * np.cos((angle - turn) / 3)) / 3) for turn in (0, 2 * pi, 4 * pi)
+        x, y, z = (np.sqrt((I1 + 2 * np.sqrt(spread) * np.cos((angle - turn) / 3)) / 3) for turn in (0, 2 * pi, 4 * pi))
+        return self.energy((x, y, z), values)
+
+
+@dataclass(frozen=True)
+class MaterialSum(Material):
+    """The sum of the energies of some materials, whose parameters follow each other.
+
+    Different parameters with the same symbol get the place of their material, mu_1 and mu_2. The same parameter in two
+    materials (C10 of two polynomials, Jm of two that lock) is refused.
+    """
+
+    summands: tuple[Material, ...]
+
+    @classmethod
+    def of(cls, *materials: Material) -> MaterialSum:
+        """Return the sum of materials; the summands of sums become its own.
+
+        Raises
+        ------
+        ModelError
+            When two of them have the same parameter.
+        """
+        nested = (material.summands if isinstance(material, MaterialSum) else (material,) for material in materials)
+        return cls(tuple(chain.from_iterable(nested)))
+
+    def __post_init__(self) -> None:
+        for material, later in combinations(self.summands, 2):
+            shared = [parameter.symbol for parameter in material.parameters if parameter in later.parameters]
+            if shared:
+                raise ModelError(
+                    f"the sum '{self.name}' would have {', '.join(shared)} twice, of '{material.name}' and of "
+                    f"'{later.name}'. Leave one of them out, or write the sum as a material of your own in which "
+                    "their symbols differ."
+                )
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """The names of its summands, joined."""
+        return "+".join(material.name for material in self.summands)
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """The formulas of its summands, joined."""
+        return " + ".join(material.formula for material in self.summands)
+
+    @property
+    def source(self) -> str:  # type: ignore[override]
+        """The sources of its summands, joined."""
+        return "; ".join(material.source for material in self.summands)
+
+    @property
+    def caution(self) -> str:  # type: ignore[override]
+        """The cautions of its summands, and what the sum adds."""
+        of_sum = "The initial shear modulus is the sum of those of the parts."
+        return " ".join([*(material.caution for material in self.summands if material.caution), of_sum])
+
+    @property
+    def is_isotropic(self) -> bool:  # type: ignore[override]
+        """Whether all summands are."""
+        return all(material.is_isotropic for material in self.summands)
+
+    @property
+    def needs_matrix(self) -> bool:  # type: ignore[override]
+        """Whether all summands do."""
+        return all(material.needs_matrix for material in self.summands)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        """The parameters of its summands."""
+        symbols = [parameter.symbol for material in self.summands for parameter in material.parameters]
+        return tuple(
+            replace(parameter, symbol=f"{parameter.symbol}_{number}")
+            if symbols.count(parameter.symbol) > 1
+            else parameter
+            for number, material in enumerate(self.summands, start=1)
+            for parameter in material.parameters
         )
-        return self.energy((first, second, third), values)
+
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
+        return sum(material.strain_energy(I1, I2, share) for material, share in self._shares(values))
+
+    def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
+        return sum(material.energy(stretches, share) for material, share in self._shares(values))
+
+    def energy_of(self, deformation: Deformation, values: Any) -> Any:
+        return sum(material.energy_of(deformation, share) for material, share in self._shares(values))
+
+    def why_not(self, deformation: Deformation) -> str:
+        return next(filter(None, (material.why_not(deformation) for material in self.summands)), "")
+
+    def _shares(self, values: Any) -> list[tuple[Material, Any]]:
+        """Return every summand with its values."""
+        ends = pairwise(accumulate((len(material.parameters) for material in self.summands), initial=0))
+        return [(material, values[start:end]) for material, (start, end) in zip(self.summands, ends, strict=True)]
 
 
 def materials() -> dict[str, type[Material]]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from tissuq.errors import ModelError
-from tissuq.mechanics.fibres import FibreMaterial
+from tissuq.mechanics.laws.fibres import FibreMaterial
 from tissuq.mechanics.laws.ogden import Ogden
 from tissuq.mechanics.laws.polynomial import Rivlin
-from tissuq.mechanics.laws.sums import added
-from tissuq.mechanics.material import Material
+from tissuq.mechanics.material import Material, MaterialSum
 from tissuq.mechanics.user_law import LAW, as_material, load_material
 from tissuq.registry import find, load_plugins, variants
 
@@ -22,7 +21,7 @@ SUMS = {
 """Sums that have a name in the literature."""
 FORMS = (
     *(family.form for family in FAMILIES),
-    *(f"{name} ({parts})" for name, parts in SUMS.items()),
+    *(f"{name} ({summands})" for name, summands in SUMS.items()),
     "gent+mooney-rivlin (a sum of any)",
     "law.py:Name (a law of your own)",
 )
@@ -52,9 +51,9 @@ def material_named(material: str | Material, *, laws: bool = False) -> Material:
     """
     if isinstance(material, Material):
         return material
-    names = [SUMS.get(part.strip(), part) for part in material.split("+")]
-    parts = [_single(part.strip(), laws) for part in "+".join(names).split("+")]
-    return added(*parts) if len(parts) > 1 else parts[0]
+    names = [SUMS.get(name.strip(), name) for name in material.split("+")]
+    summands = [_single(name.strip(), laws) for name in "+".join(names).split("+")]
+    return MaterialSum.of(*summands) if len(summands) > 1 else summands[0]
 
 
 def _single(name: str, laws: bool) -> Material:
@@ -66,9 +65,9 @@ def _single(name: str, laws: bool) -> Material:
             "the command line, or tissuq.load_material(...) in Python."
         )
     for family in FAMILIES:
-        found = family.named(name)
-        if found is not None:
-            return found
+        member = family.named(name)
+        if member is not None:
+            return member
     if name not in variants(Material):
         for plugin in load_plugins(Material.entry_point_group, as_material, name):
             return plugin

@@ -32,22 +32,23 @@ class Pieces(NamedTuple):
     step: Any
     coefficients: Any
 
-    def __call__(self, place: Any) -> Any:
+    def __call__(self, coordinate: Any) -> Any:
         """Return the function's values."""
-        own, count = library(place), self.coefficients.shape[-1]
+        arrays, count = library(coordinate), self.coefficients.shape[-1]
         end = self.start + count * self.step
-        inside = own.where(place.real < self.start, self.start, own.where(place.real > end, end, place))
-        piece = own.clip(own.floor((inside.real - self.start) / self.step), 0, count - 1).astype(int)
+        inside = arrays.where(coordinate.real > end, end, coordinate)
+        inside = arrays.where(coordinate.real < self.start, self.start, inside)
+        piece = arrays.clip(arrays.floor((inside.real - self.start) / self.step), 0, count - 1).astype(int)
         u = inside - (self.start + piece * self.step)
-        a, b, c, d, e = (own.asarray(each)[piece] for each in self.coefficients)
+        a, b, c, d, e = (arrays.asarray(power)[piece] for power in self.coefficients)
         value = (((a * u + b) * u + c) * u + d) * u + e
         slope = ((4 * a * u + 3 * b) * u + 2 * c) * u + d
-        return value + slope * (place - inside)
+        return value + slope * (coordinate - inside)
 
-    def slope(self, place: FloatArray) -> FloatArray:
-        """Return the function's slope at places (n,)."""
+    def slope(self, coordinate: FloatArray) -> FloatArray:
+        """Return the function's slope at coordinates (n,)."""
         count = self.coefficients.shape[-1]
-        inside = np.clip((place - self.start) / self.step, 0, count)
+        inside = np.clip((coordinate - self.start) / self.step, 0, count)
         piece = np.minimum(inside.astype(int), count - 1)
         u = (inside - piece) * self.step
         a, b, c, d, _ = self.coefficients[:, piece]
@@ -58,9 +59,9 @@ def pieces(knots: FloatArray, slopes: FloatArray) -> list[Pieces]:
     """Return functions that vanish at zero from their slopes (g, N) at knots (g,) of equal distances around zero."""
     from scipy.interpolate import CubicSpline
 
-    every = CubicSpline(knots, slopes).antiderivative()
-    coefficients = every.c.copy()
-    coefficients[-1] -= every(0.0)
+    functions = CubicSpline(knots, slopes).antiderivative()
+    coefficients = functions.c.copy()
+    coefficients[-1] -= functions(0.0)
     step = float(knots[-1] - knots[0]) / (len(knots) - 1)
     return [Pieces(float(knots[0]), step, coefficients[..., n]) for n in range(slopes.shape[1])]
 
@@ -74,6 +75,6 @@ class PiecewiseEnergy(NamedTuple):
 
     def __call__(self, stretches: tuple[Any, Any, Any]) -> Any:
         """Return the energy (MPa) of principal stretches whose product is one."""
-        one, two, three = (stretch * stretch for stretch in stretches)
-        of_invariants = self.first(one + two + three - 3) + self.second(one * two + two * three + three * one - 3)
+        x, y, z = (stretch * stretch for stretch in stretches)
+        of_invariants = self.first(x + y + z - 3) + self.second(x * y + y * z + z * x - 3)
         return of_invariants + sum(self.logarithm(log(stretch)) for stretch in stretches)

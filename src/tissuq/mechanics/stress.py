@@ -1,4 +1,4 @@
-"""The one stress function: the derivative of any strain energy along any path."""
+"""The one stress function: the derivative of any strain energy along any path, by an imaginary step or by JAX."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode, Path, SimpleShear, States
-from tissuq.experiments.modes.path import UNMEASURED
-from tissuq.mechanics.complex_step import complex_step_stress
+from tissuq.experiments.modes.path import STEP, UNMEASURED
 from tissuq.mechanics.material import Material
 
 __all__ = [
+    "MAX_COMPLEX_STEP_VALUES",
+    "complex_step_stress",
     "engineering_stress",
     "initial_shear_modulus",
     "path_energy",
@@ -26,6 +27,13 @@ __all__ = [
 ]
 
 FloatArray = NDArray[np.float64]
+
+MAX_COMPLEX_STEP_VALUES = 10_000
+"""Number of stresses from which compiled derivatives are quicker."""
+REAL_STEP = 1e-5
+"""Step of the stretch for a difference quotient."""
+AGREEMENT = 1e-6
+"""Relative difference from a real difference quotient beyond which an energy is not differentiable this way."""
 
 
 def path_energy(material: Material, path: Path, point: Any, values: Any, step: Any = 0.0) -> Any:
@@ -76,9 +84,9 @@ def stresses_at(material: Material, states: States, values: ArrayLike) -> FloatA
     is_borne = np.isfinite(curves).all(axis=0)
     if not is_borne.all():
         symbols = ", ".join(parameter.symbol for parameter in material.parameters)
-        beyond = states.abscissa[~is_borne][0]
+        stretch = states.abscissa[~is_borne][0]
         raise ModelError(
-            f"material '{material.name}' has no finite stress at a stretch of {beyond:g} with the "
+            f"material '{material.name}' has no finite stress at a stretch of {stretch:g} with the "
             f"values of {symbols} that it was given: it has locked, or its energy is too large for a number."
         )
     return curves if values.ndim == 2 else np.asarray(curves[0])
@@ -140,12 +148,41 @@ def traced_stress_basis(material: Material, states: States, nonlinear: Any) -> A
     return jnp.concatenate([column for _, column in columns])[order] if len(columns) > 1 else columns[0][1]
 
 
+def complex_step_stress(material: Material, states: States, values: FloatArray) -> FloatArray | None:
+    """Return engineering stresses (m, n) at states (n,) for parameter values (m, k), or None.
+
+    None where there are many, or where the energy is not analytic arithmetic of NumPy arrays: written with jax.numpy,
+    or with absolute values, branches or the like, which a real difference quotient shows.
+    """
+    if len(states) * len(values) > MAX_COMPLEX_STEP_VALUES:
+        return None
+    parameters = values.T[:, :, None]
+
+    def energy_at(step: Any) -> Any:
+        return material.energy_of(states.moved(step), parameters)
+
+    try:
+        with np.errstate(all="ignore"):
+            at_step, forward, backward = (energy_at(step) for step in (1j * STEP, REAL_STEP, -REAL_STEP))
+    except (TypeError, ValueError):
+        return None
+    energies = at_step, forward, backward
+    if not all(isinstance(energy, np.ndarray) for energy in energies) or not np.iscomplexobj(at_step):
+        return None
+    slope = np.broadcast_to(at_step.imag / STEP, (len(values), len(states)))
+    quotient = np.broadcast_to((forward - backward) / (2 * REAL_STEP), slope.shape)
+    size = np.maximum(np.abs(slope), np.abs(slope).max(axis=1, keepdims=True, initial=0.0) * 1e-2)
+    if not (np.abs(slope - quotient) <= AGREEMENT * size + 1e-300).all():
+        return None
+    return np.asarray(slope / states.loaded_axes)
+
+
 def _check_nonlinear(material: Material, shape: tuple[int, ...]) -> None:
-    others = [parameter.symbol for parameter in material.parameters if not parameter.is_linear]
-    if shape != (len(others),):
+    symbols = [parameter.symbol for parameter in material.parameters if not parameter.is_linear]
+    if shape != (len(symbols),):
         raise ModelError(
             f"the stress of material '{material.name}' is linear in its parameters only at given values of "
-            f"{', '.join(others) or 'nothing else'}, so its basis needs {len(others)} of them: "
+            f"{', '.join(symbols) or 'nothing else'}, so its basis needs {len(symbols)} of them: "
             f"it was given the shape {shape}."
         )
 

@@ -20,9 +20,9 @@ from tissuq.experiments.modes import LoadingMode, Path, States, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import Material, StretchMaterial, stress_basis
-from tissuq.mechanics.complex_step import MOST_VALUES
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
 from tissuq.mechanics.pieces import PiecewiseEnergy, pieces
+from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy.blocks import Coordinates
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.seeds import check_seed
@@ -210,7 +210,7 @@ def _of_material(material: Material, values: FloatArray, states: States) -> Floa
     is_linear = np.array([parameter.is_linear for parameter in material.parameters])
     if is_linear.all():
         return np.asarray(values @ stress_basis(material, states).T)
-    count = max(1, MOST_VALUES // (len(states) * int(is_linear.sum())))
+    count = max(1, MAX_COMPLEX_STEP_VALUES // (len(states) * int(is_linear.sum())))
     blocks = [values[start : start + count] for start in range(0, len(values), count)]
     bases = (stress_basis(material, states, block[:, ~is_linear]) for block in blocks)
     pairs = zip(bases, blocks, strict=True)

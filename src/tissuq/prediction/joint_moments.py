@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.mechanics.complex_step import MOST_VALUES
+from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import (
     basis_of,
@@ -69,7 +69,7 @@ def _basis(model: StatisticalModel, components: GaussianMixture, states: States)
     """Return the basis of the mean stress; where it depends on settings, few of these at once, without a compiler."""
     if not model.bent_symbols:
         return basis_of(model, states, components.settings)
-    count = max(1, MOST_VALUES // (len(states) * len(model.column_symbols)))
+    count = max(1, MAX_COMPLEX_STEP_VALUES // (len(states) * len(model.column_symbols)))
     starts = range(0, len(components.settings), count)
     return np.concatenate([basis_of(model, states, components.settings[start : start + count]) for start in starts])
 

@@ -80,12 +80,12 @@ def test_a_sum_has_the_parameters_of_its_parts_and_their_places_where_symbols_ar
     total = material_named("demiray") + material_named("veronda-westmann")
     assert [p.symbol for p in total.parameters] == ["mu_1", "b_1", "mu_2", "b_2"]
     assert total == material_named("demiray + veronda-westmann")
-    alone = [engineering_stress(part, Uniaxial(), STRETCH, [0.7, 0.3]) for part in total.parts]
+    alone = [engineering_stress(part, Uniaxial(), STRETCH, [0.7, 0.3]) for part in total.summands]
     found = engineering_stress(total, Uniaxial(), STRETCH, [0.7, 0.3, 0.7, 0.3])
     np.testing.assert_allclose(found, sum(alone), rtol=1e-13)
-    assert len((total + material_named("hencky")).parts) == 3
+    assert len((total + material_named("hencky")).summands) == 3
     assert total.strain_energy(5.0, 4.0, [0.7, 0.3, 0.7, 0.3]) == pytest.approx(
-        sum(part.strain_energy(5.0, 4.0, [0.7, 0.3]) for part in total.parts), rel=1e-14
+        sum(part.strain_energy(5.0, 4.0, [0.7, 0.3]) for part in total.summands), rel=1e-14
     )
 
 

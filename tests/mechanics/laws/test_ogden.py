@@ -70,7 +70,7 @@ def test_the_initial_shear_modulus_is_the_sum_of_the_moduli(material):
 def test_energy_and_stress_vanish_exactly_at_the_reference(material):
     values = np.arange(1.0, 1 + len(material.parameters)) / 3
     for mode in CLOSED:
-        assert path_energy(material, mode, 1.0, values) == 0.0
+        assert path_energy(material, mode.path, 1.0, values) == 0.0
         assert engineering_stress(material, mode, [1.0], values) == pytest.approx(0.0, abs=1e-15)
 
 

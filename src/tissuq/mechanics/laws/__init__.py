@@ -8,9 +8,9 @@ from tissuq.mechanics.laws.gent import Gent, GentGent
 from tissuq.mechanics.laws.knowles import Knowles
 from tissuq.mechanics.laws.ogden import Ogden, Ogden1, Ogden2, Ogden3
 from tissuq.mechanics.laws.polynomial import Biderman, Isihara, MooneyRivlin, NeoHookean, Rivlin, Yeoh
-from tissuq.mechanics.laws.sums import MaterialSum
 from tissuq.mechanics.laws.valanis_landel import Hencky, PengLandel, ValanisLandel
 from tissuq.mechanics.laws.van_der_waals import VanDerWaals
+from tissuq.mechanics.material import MaterialSum
 
 __all__ = [
     "ArrudaBoyce",

@@ -34,7 +34,7 @@ class ExtendedTube(StretchMaterial):
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
         crosslinks, confinement, limit, beta = values
-        x = sum(each * each for each in stretches) - 3
+        x = sum(stretch * stretch for stretch in stretches) - 3
         chains = (1 - 1 / limit) * x / (1 - x / limit) + log_left(x / limit)
-        tube = sum(each**-beta for each in stretches) - 3
+        tube = sum(stretch**-beta for stretch in stretches) - 3
         return 0.5 * crosslinks * chains + 2 * confinement / beta**2 * tube

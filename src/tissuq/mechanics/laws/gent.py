@@ -46,5 +46,5 @@ class GentGent(Material):
     )
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
-        first, second, limit = values
-        return -0.5 * first * limit * log_left((I1 - 3) / limit) + 1.5 * second * log(I2 / 3)
+        mu1, mu2, limit = values
+        return -0.5 * mu1 * limit * log_left((I1 - 3) / limit) + 1.5 * mu2 * log(I2 / 3)

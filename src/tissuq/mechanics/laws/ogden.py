@@ -14,17 +14,17 @@ from tissuq.parameters.priors import Uniform
 
 __all__ = ["Ogden", "Ogden1", "Ogden2", "Ogden3"]
 
-LARGEST = 40.0
+LARGEST_EXPONENT = 40.0
 """Reported for soft tissue: about 10 to 25 for skin and fat, about -20 for brain."""
-SMALLEST = 0.5
+SMALLEST_EXPONENT = 0.5
 """An exponent of zero divides zero by zero."""
 
 MAX_TERMS = 20
 """Far more than measurements tell apart."""
 
-POSITIVE = (SMALLEST, LARGEST)
-NEGATIVE = (-LARGEST, -SMALLEST)
-SMALL, LARGE = (SMALLEST, 3.0), (3.0, LARGEST)
+POSITIVE = (SMALLEST_EXPONENT, LARGEST_EXPONENT)
+NEGATIVE = (-LARGEST_EXPONENT, -SMALLEST_EXPONENT)
+SMALL, LARGE = (SMALLEST_EXPONENT, 3.0), (3.0, LARGEST_EXPONENT)
 
 CAUTION = (
     "Here W has factors 2 mu/alpha^2 (as in Abaqus, FElupe), so the initial shear modulus is the sum of mu. Other "
@@ -161,5 +161,5 @@ class Ogden(_Ogden):
 
 def _intervals(count: int) -> list[tuple[float, float]]:
     """Return intervals of equal ratio from the smallest to the largest exponent."""
-    ratio = LARGEST / SMALLEST
-    return list(pairwise(SMALLEST * ratio ** (place / count) for place in range(count + 1))) if count else []
+    ratio = LARGEST_EXPONENT / SMALLEST_EXPONENT
+    return list(pairwise(SMALLEST_EXPONENT * ratio ** (end / count) for end in range(count + 1))) if count else []

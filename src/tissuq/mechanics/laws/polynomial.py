@@ -142,16 +142,15 @@ class Rivlin(Material):
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         """One for each term."""
-        known = {each.symbol: each for each in (C10, C01, C20, C30)}
-        return tuple(
-            known.get(term) or Parameter(term, f"coefficient of {_product(*map(int, term[1:]))}") for term in self.terms
-        )
+        shared = {parameter.symbol: parameter for parameter in (C10, C01, C20, C30)}
+        names = {term: f"coefficient of {_product(*map(int, term[1:]))}" for term in self.terms}
+        return tuple(shared.get(term) or Parameter(term, name) for term, name in names.items())
 
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         x, y = I1 - 3, I2 - 3
-        return sum(values[place] * x ** int(term[1]) * y ** int(term[2]) for place, term in enumerate(self.terms))
+        return sum(values[k] * x ** int(term[1]) * y ** int(term[2]) for k, term in enumerate(self.terms))
 
 
-def _product(first: int, second: int) -> str:
-    powers = (("I1", first), ("I2", second))
+def _product(power_1: int, power_2: int) -> str:
+    powers = (("I1", power_1), ("I2", power_2))
     return " ".join(f"({invariant} - 3)" + (f"^{power}" if power > 1 else "") for invariant, power in powers if power)

@@ -25,7 +25,7 @@ class ValanisLandel(StretchMaterial):
     parameters = _modulus("Valanis and Landel's law")
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
-        return 2 * values[0] * sum(each * log(each) - each + 1 for each in stretches)
+        return 2 * values[0] * sum(stretch * log(stretch) - stretch + 1 for stretch in stretches)
 
 
 class PengLandel(StretchMaterial):
@@ -40,7 +40,7 @@ class PengLandel(StretchMaterial):
     parameters = _modulus("Peng and Landel's law")
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
-        logs = [log(each) for each in stretches]
+        logs = [log(stretch) for stretch in stretches]
         return 3 * values[0] * (sum(stretches) - 3 - sum(e * (1 + e * (1 / 6 - e * (1 / 18 - e / 216))) for e in logs))
 
 
@@ -53,4 +53,4 @@ class Hencky(StretchMaterial):
     parameters = _modulus("Hencky's law")
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any) -> Any:
-        return values[0] * sum(log(each) ** 2 for each in stretches)
+        return values[0] * sum(log(stretch) ** 2 for stretch in stretches)

@@ -39,18 +39,18 @@ class VanDerWaals(Material):
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, attraction, limit = values
         x = I1 - 3
-        own = library(x)
-        root = sqrt(own.where(x.real > SMALLEST, x, SMALLEST))
+        arrays = library(x)
+        root = sqrt(arrays.where(x.real > SMALLEST, x, SMALLEST))
         network = 0.5 * x * _stiffening(root / sqrt(limit))
         return mu * network - 2 / 3 * 0.5**1.5 * attraction * x * root
 
 
 def _stiffening(h: Any) -> Any:
     """Return -2 (ln(1 - h) + h) / h^2, one at zero."""
-    own = library(h)
+    arrays = library(h)
     is_small = h.real < SERIES
-    small, large = own.where(is_small, h, SERIES), own.where(is_small, SERIES, h)
+    small, large = arrays.where(is_small, h, SERIES), arrays.where(is_small, SERIES, h)
     series = small * 0
     for power in range(TERMS, -1, -1):
         series = series * small + 2 / (power + 2)
-    return own.where(is_small, series, -2 * (log_left(large) + large) / large**2)
+    return arrays.where(is_small, series, -2 * (log_left(large) + large) / large**2)
