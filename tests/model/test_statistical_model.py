@@ -171,7 +171,7 @@ def test_auto_asks_nuts_with_the_reason_where_quadrature_does_not_reach_its_tole
         raise Asked(refusal)
 
     monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
-    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_nuts_given", asked)
+    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_by_nuts", asked)
     with pytest.raises(Asked, match="quadrature did not reach its tolerance"):
         tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
 

@@ -123,7 +123,7 @@ class _Integration:
             self.settings = self.warp.parameters(self.rule.points)[0]
         else:
             self.settings = np.zeros((len(models), 1, 0))
-        self.given = self.conditional(self.settings)
+        self.gaussians = self.conditional(self.settings)
         if self.rule and len(models[0].structure) > 1:
             for index in range(len(models)):
                 self._check_found(index, self.rule.weights[index])
@@ -192,7 +192,7 @@ def _ceiling(conditional: ConditionalGaussian, gaussians: Conditional) -> FloatA
 
 def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     """Return the posterior of one of the data sets."""
-    model, rule, gaussians = integration.models[index], integration.rule, integration.given
+    model, rule, gaussians = integration.models[index], integration.rule, integration.gaussians
     box = integration.conditional.boxes[[index]]
     weights = rule.weights[index] if rule else np.ones(1)
     mixture = GaussianMixture(weights, integration.settings[index], gaussians.mean[index], gaussians.root[index])

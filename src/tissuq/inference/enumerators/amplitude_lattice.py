@@ -204,7 +204,7 @@ class _EnergySums:
                 of_member = np.flatnonzero((node == number) & (points.lattice == member))
                 amplitudes = points.amplitudes[of_member][:, list(self.model.energy_members[member].amplitude_indices)]
                 reduced = Reduced(rows, features[member])
-                linear_mean, linear_root = reduced.everything(0, amplitudes, points.noise_sd[of_member])
+                linear_mean, linear_root = reduced.linear_and_weights(0, amplitudes, points.noise_sd[of_member])
                 linear_mean, linear_root, _ = self._priors.times(linear_mean, linear_root)
                 q = linear_mean.shape[1]
                 mean[of_member, :q], root[of_member, :q, :q] = linear_mean, linear_root

@@ -65,7 +65,9 @@ class Reduced:
         basis, self._triangle = np.linalg.qr(columns)
         self._data = basis.T @ rows.stresses
 
-    def everything(self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def linear_and_weights(
+        self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return means (M, q) and roots (M, q, q) of the material's parameters and the discrepancy's weights.
 
         For any amplitudes (M, blocks) and noise (M,).
