@@ -134,7 +134,11 @@ def test_the_material_and_the_discrepancy_can_be_chosen(cli, here, specimen):
     assert "specimen: yeoh" in said.out
 
 
-def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(cli, here, specimen):
+@pytest.mark.parametrize("names", [["none", "quadratic", "yeoh"], pytest.param(None, marks=pytest.mark.slow)])
+def test_discrepancies_that_cannot_be_fitted_are_told_when_all_are_asked_for(cli, here, specimen, monkeypatch, names):
+    """The short version has three discrepancies, of which one can be fitted."""
+    if names:
+        monkeypatch.setattr("tissuq.studies.specimen._every", lambda: names)
     said = cli("fit", specimen, "--material", "yeoh", "--discrepancy", "all", "--noise-sd", 1, "--no-figures")
     assert said.status == 0, said.err
     fitted = [row["formulation"] for row in summary_of(here / "runs" / "specimen")]

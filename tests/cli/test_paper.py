@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import tissuq as tq
+
 from .conftest import command, without_wall_times
 
 FORMULATIONS = ["none", "constant", "linear", "quadratic", "mooney-rivlin", "yeoh", "gp"]
@@ -144,10 +146,32 @@ def test_arviz_summarises_and_cross_validates_every_posterior(paper_run, name):
         )
 
 
+BASE = "points = 8\nseed = 4\n[priors.c]\ndistribution = 'uniform'\nlow = 0\nhigh = 3\n"
+OPTIONS = ["--seed", 5, "--prior", "S=half-normal(2)", "--stretch-range", "0.8:1.6", "--no-figures"]
+
+
+def test_options_on_the_command_line_prevail_over_the_file_before_the_study(cli, here, monkeypatch):
+    found = []
+
+    def run(settings, step):
+        found.append(settings)
+        raise tq.InputError("no further")
+
+    monkeypatch.setattr("tissuq.validation.paper.run_paper", run)
+    (here / "base.toml").write_text(BASE)
+    said = cli("paper", "--config", "base.toml", *OPTIONS, "--out", "run")
+    assert said.err == "tissuq: no further\n"
+    settings = found[0].model_dump()
+    assert (settings["points"], settings["seed"]) == (8, 5)
+    assert (settings["stretch_low"], settings["stretch_high"]) == (0.8, 1.6)
+    assert settings["priors"]["c"]["high"] == 3
+    assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
+
+
+@pytest.mark.slow
 def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_priors(cli, here):
-    (here / "base.toml").write_text("points = 8\nseed = 4\n[priors.c]\ndistribution = 'uniform'\nlow = 0\nhigh = 3\n")
-    options = ["--seed", 5, "--prior", "S=half-normal(2)", "--stretch-range", "0.8:1.6", "--no-figures"]
-    said = cli("paper", "--config", "base.toml", *options, "--out", "run")
+    (here / "base.toml").write_text(BASE)
+    said = cli("paper", "--config", "base.toml", *OPTIONS, "--out", "run")
     assert said.status == 0, said.err
     settings = tomllib.loads((here / "run" / "run.toml").read_text())
     assert (settings["points"], settings["seed"]) == (8, 5)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.studies import population
+from tissuq.studies.population import PopulationSettings
 
 from .conftest import STRETCH, command
 
@@ -107,8 +109,8 @@ def test_a_run_is_repeated_from_its_own_folder_and_from_one_file(population_run)
     assert recipe["files"] == ["input/all.csv"]
 
 
-def test_specimens_may_be_tested_in_several_modes(cli, here):
-    """Files say their mode by a comment or by their name; a run folder keeps both."""
+def write_modes(here):
+    """Three specimens with an uniaxial and a planar test, and one with a planar test alone."""
     for k, modulus in enumerate(MODULI_KPA[:3]):
         (here / "all" / f"S{k}").mkdir(parents=True)
         (here / "all" / f"S{k}" / "first.csv").write_text(
@@ -118,6 +120,37 @@ def test_specimens_may_be_tested_in_several_modes(cli, here):
         (here / "all" / f"S{k}" / "planar.csv").write_text("\n".join(["stretch,stress_kPa", *lines]) + "\n")
     lines = ["# mode: planar", "stretch,stress_kPa", *(f"{a},{100 * (a - a**-3):.3f}" for a in STRETCH)]
     (here / "all" / "S3.csv").write_text("\n".join(lines) + "\n")
+
+
+def write_units(here):
+    """Three specimens, of which only the first file states the unit of stress."""
+    for k, modulus in enumerate(MODULI_KPA[:3]):
+        unit = "" if k else "_kPa"
+        (here / f"S{k}.csv").write_text("\n".join([f"stretch,stress{unit}", *rows_of(modulus, k)]) + "\n")
+
+
+UNITS_ASSUMED = "S1, S2: the file states no unit of stress, so MPa was assumed"
+
+
+def test_files_say_their_mode_by_a_comment_or_by_their_name(here):
+    """The short version, without a fit."""
+    write_modes(here)
+    readings = PopulationSettings(files=("all",)).readings()
+    modes = {name: [reading.experiment.mode.name for reading in own] for name, own in readings.items()}
+    assert modes == {key: ["uniaxial", "planar"] for key in ("S0", "S1", "S2")} | {"S3": ["planar"]}
+
+
+def test_warnings_about_files_are_told_with_their_specimens(here):
+    """The short version, without a fit."""
+    write_units(here)
+    readings = PopulationSettings(files=("S0.csv", "S1.csv", "S2.csv")).readings()
+    assert any(text.startswith(UNITS_ASSUMED) for text in population._data_warnings(readings))
+
+
+@pytest.mark.slow
+def test_specimens_may_be_tested_in_several_modes(cli, here):
+    """Files say their mode by a comment or by their name; a run folder keeps both."""
+    write_modes(here)
     said = cli("population", "all", *OPTIONS, "--no-figures", "--out", "run")
     assert said.status == 0, said.err
     assert {row["mode"] for row in table(here / "run" / "data.csv")} == {"uniaxial", "planar"}
@@ -129,13 +162,12 @@ def test_specimens_may_be_tested_in_several_modes(cli, here):
     assert (here / "again" / "population.csv").read_bytes() == (here / "run" / "population.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_warnings_about_files_are_shown_with_their_specimens(cli, here):
-    for k, modulus in enumerate(MODULI_KPA[:3]):
-        unit = "" if k else "_kPa"
-        (here / f"S{k}.csv").write_text("\n".join([f"stretch,stress{unit}", *rows_of(modulus, k)]) + "\n")
+    write_units(here)
     said = cli("population", "S0.csv", "S1.csv", "S2.csv", "--discrepancy", "none", "--no-figures")
     assert said.status == 0, said.err
-    assert "S1, S2: the file states no unit of stress, so MPa was assumed" in " ".join(said.out.split())
+    assert UNITS_ASSUMED in " ".join(said.out.split())
 
 
 @pytest.mark.parametrize(

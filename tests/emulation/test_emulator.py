@@ -5,7 +5,7 @@ import pytest
 
 from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden, runs_at
 from tissuq.emulation import ForwardRuns, emulate
-from tissuq.emulation.basis import basis_of, output_moments
+from tissuq.emulation.emulator import basis_of, output_moments
 from tissuq.emulation.runs import space_filling
 from tissuq.errors import InputError, ModelError
 from tissuq.parameters.priors import LogNormal, LogUniform, Normal, Uniform

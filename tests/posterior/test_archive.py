@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import gallery
 import tissuq as tq
 from tissuq.mechanics.arithmetic import expm1
 from tissuq.prediction.densities import leave_one_out
@@ -41,12 +42,19 @@ FITS = {
     "proportional": lambda: tq.fit(measured(), discrepancy="none", noise="proportional"),
     "autoregressive": lambda: tq.fit(measured(), discrepancy="none", noise="autoregressive"),
     "nuts": lambda: tq.fit(measured(), discrepancy="linear", method="nuts"),
-    "joint": lambda: tq.fit(measured(), discrepancy="none", noise_sd=0.02, method="joint"),
+    "joint": gallery.sampled_jointly,
     "stable": lambda: tq.fit(measured(), discrepancy="auto", noise_sd=0.02, stable_in="uniaxial"),
 }
 
 
-@pytest.fixture(scope="module", params=FITS)
+SLOW = ("nuts",)
+"""Of two posteriors that are sampled, the other is in the quick tests."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in FITS],
+)
 def pair(request, tmp_path_factory):
     """A posterior, and what comes back from the file in which it was saved."""
     posterior, path = FITS[request.param](), tmp_path_factory.mktemp("saved") / "posterior.nc"

@@ -7,7 +7,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.modes import loading_mode
-from tissuq.prediction.joint_moments import joint_stresses, states_of
+from tissuq.next_test.expected_variance import joint_stresses, states_of
 from tissuq.prediction.moments import stress_moments
 
 STRETCH = np.linspace(0.75, 1.5, 14)

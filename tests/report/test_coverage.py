@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tissuq.report.campaigns import readable_coverage, write_campaign
 from tissuq.report.run_folder import RECIPE
+from tissuq.report.validation import readable_coverage, write_campaign
 from tissuq.validation.coverage import CoverageSettings
 from tissuq.validation.coverage.campaign import tasks_of
 

@@ -11,12 +11,12 @@ import pytest
 import tissuq as tq
 from tissuq.report.prediction import (
     band_headers,
+    prediction_figure,
     readable_bands,
     readable_scores,
     score_headers,
     write_prediction_run,
 )
-from tissuq.report.prediction_figures import prediction_figure
 from tissuq.studies.prediction import predicted
 from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
 

@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tissuq.report.paper import write_paper_run
 from tissuq.report.run_folder import LIBRARIES
 from tissuq.report.specimen import write_specimen_run
+from tissuq.report.validation import write_paper_run
 from tissuq.validation.paper.claims import CLAIMS
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}

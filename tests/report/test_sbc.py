@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tissuq.report.campaigns import readable_ranks, write_sbc
 from tissuq.report.run_folder import RECIPE
+from tissuq.report.validation import readable_ranks, write_sbc
 from tissuq.validation.sbc import SbcSettings
 
 

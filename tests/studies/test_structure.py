@@ -57,6 +57,7 @@ def test_processes_give_the_same_forces_as_one_and_as_the_function(settings, tmp
         np.testing.assert_array_equal(forces[0][family], plain[family])
 
 
+@pytest.mark.finite_elements
 def test_what_is_done_is_not_done_again(settings, tmp_path):
     posteriors, told = load_posteriors(settings), []
 

@@ -199,14 +199,16 @@ def test_the_right_model_covers_as_often_as_it_says(tmp_path):
     assert 0.95 - chance < row["coverage"]
 
 
-def test_auto_holds_where_the_paper_s_forms_do_not(tmp_path):
-    # 120 materials; a share below 0.90 has a chance of 1 % when the true one is 0.95.
+@pytest.mark.parametrize(("replicates", "least"), [(2, 0.75), pytest.param(10, 0.90, marks=pytest.mark.statistical)])
+def test_auto_holds_where_the_paper_s_forms_do_not(tmp_path, replicates, least):
+    # 120 materials; a share below 0.90 has a chance of 1 % when the true one is 0.95. In the short version 24, of which
+    # a share of 0.75 or less has a chance of 0.2 % then, and of 96 % when the true one is 0.6.
     settings = small(
-        families=list(FAMILIES), formulations=["none", "gp", "auto"], replicates=10,
+        families=list(FAMILIES), formulations=["none", "gp", "auto"], replicates=replicates,
         designs=[{"low": 0.6, "high": 2.0, "points": 40, "noise_sd": 0.2}],
     )  # fmt: skip
     coverage = summarise(settings, run_campaign(settings, tmp_path)).set_index("formulation")["coverage"]
-    assert coverage["auto"] > 0.90
+    assert coverage["auto"] > least
     assert coverage["none"] < 0.6
     assert coverage["gp"] < 0.8
 

@@ -13,13 +13,9 @@ import typer
 from tissuq.cli import (
     calibrate,
     catalogue,
-    compare,
-    design,
-    export,
     fit,
-    population,
-    predict,
     reading,
+    runs,
     structure,
     study,
 )
@@ -60,15 +56,15 @@ def _tissuq(
 app.command("paper")(study.paper)
 app.command("inspect")(reading.inspect)
 app.command("fit")(fit.fit)
-app.command("predict")(predict.predict)
-app.command("population")(population.population)
+app.command("predict")(runs.predict)
+app.command("population")(fit.population)
 app.command("calibrate")(calibrate.calibrate)
-app.command("compare")(compare.compare)
-app.command("design")(design.design)
-app.command("export")(export.export)
+app.command("compare")(runs.compare)
+app.command("design")(runs.design)
+app.command("export")(runs.export)
 app.command("structure")(structure.structure)
 app.command("simulate", hidden=True, deprecated=True)(structure.structure)
-app.command("show")(compare.show)
+app.command("show")(runs.show)
 app.command("materials")(catalogue.materials)
 app.command("modes")(catalogue.modes)
 app.command("check")(catalogue.check)

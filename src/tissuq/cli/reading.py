@@ -248,7 +248,7 @@ def inspect(
     inspection = inspect_file(source, **settings.reading_options)
     print(inspection)
     if out is not None:
-        from tissuq.report.inspection import write_inspection
+        from tissuq.report.specimen import write_inspection
 
         with run_folder(out, force=force) as folder:
             write_inspection(inspection, folder)

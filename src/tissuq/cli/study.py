@@ -47,8 +47,8 @@ def paper(
 ) -> None:
     """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
     from tissuq.cli.tables import print_summary, print_warnings
-    from tissuq.report.paper import write_paper_run
     from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.validation import write_paper_run
     from tissuq.validation.paper import PaperSettings, run_paper
     from tissuq.validation.paper.study import steps_of
 
@@ -115,7 +115,7 @@ def coverage(
 ) -> None:
     """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
     from tissuq.cli.tables import print_rows
-    from tissuq.report.campaigns import readable_coverage, write_campaign
+    from tissuq.report.validation import readable_coverage, write_campaign
     from tissuq.validation.coverage import PRESETS, CoverageSettings, run_campaign
     from tissuq.validation.coverage.campaign import tasks_of
 
@@ -149,7 +149,7 @@ def sbc(
 ) -> None:
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
     from tissuq.cli.tables import print_rows
-    from tissuq.report.campaigns import readable_ranks, write_sbc
+    from tissuq.report.validation import readable_ranks, write_sbc
     from tissuq.validation.sbc import SbcSettings, run_sbc, tasks_of
 
     options = {"replicates": replicates, "noise": noise, "seed": seed, "material": material}

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.emulation.basis import OutputBasis, basis_of, has_signs, output_moments
 from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, leave_one_out, moments, trend_basis
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError
@@ -20,9 +19,98 @@ from tissuq.parameters.priors import Prior
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
+__all__ = ["Coordinates", "Emulator", "OutputBasis", "basis_of", "emulate", "has_signs", "runs_needed"]
 
 FloatArray = NDArray[np.float64]
+
+MAX_TRUNCATED_SHARE = 1e-10
+"""Largest share of the outputs' variance in the directions that are truncated."""
+MAX_LOG_VARIANCE = 10.0
+"""Largest variance of a logarithm, beyond which its moments would overflow."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutputBasis:
+    """Outputs, or the logarithms of their sizes, = mean + directions @ scores + truncated remainder.
+
+    Parameters
+    ----------
+    mean : (n,) array
+    directions : (n, q) array
+        Scaled, so that the scores of the runs have unit variance.
+    truncated : (n, n) array
+        Covariance of the truncated remainder over the runs.
+    signs : (n,) array, optional
+        Signs of the outputs, where their logarithms are taken; zero where an output is always zero.
+    """
+
+    mean: FloatArray
+    directions: FloatArray
+    truncated: FloatArray
+    signs: FloatArray | None = None
+
+    @property
+    def is_log(self) -> bool:
+        """Whether it is one of logarithms."""
+        return self.signs is not None
+
+    def scores(self, outputs: FloatArray) -> FloatArray:
+        """Return the scores (N, q) of outputs (N, n)."""
+        size = (self.directions**2).sum(axis=0)
+        return np.asarray((self._working_scale(outputs) - self.mean) @ (self.directions / size))
+
+    def residuals(self, outputs: FloatArray) -> FloatArray:
+        """Return the remainder of outputs (N, n), or of their logarithms, that the directions do not reach."""
+        return np.asarray(self._working_scale(outputs) - self.mean - self.scores(outputs) @ self.directions.T)
+
+    def _working_scale(self, outputs: FloatArray) -> FloatArray:
+        return outputs if self.signs is None else _logs(outputs, self.signs)
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The arrays of which `output_moments` is computed."""
+        arrays = {name: getattr(self, name) for name in ("mean", "directions", "truncated")}
+        return arrays if self.signs is None else arrays | {"signs": self.signs}
+
+
+def basis_of(outputs: FloatArray, *, is_log: bool = False) -> OutputBasis:
+    """Return the directions in which outputs (m, n) of runs vary, up to a negligible share of their variance."""
+    signs = np.sign(outputs[0]) if is_log else None
+    working = outputs if signs is None else _logs(outputs, signs)
+    mean = working.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(working - mean, full_matrices=False)
+    remaining_share = 1 - np.cumsum(sizes**2) / max((sizes**2).sum(), np.finfo(float).tiny)
+    count = int(np.argmax(remaining_share <= MAX_TRUNCATED_SHARE)) + 1
+    dropped = sizes[count:, None] * directions[count:]
+    scale = max(len(outputs) - 1, 1)
+    scaled = (sizes[:count, None] * directions[:count]).T / np.sqrt(scale)
+    return OutputBasis(mean, scaled, dropped.T @ dropped / scale, signs)
+
+
+def has_signs(outputs: FloatArray) -> bool:
+    """Return whether every output has the same sign in all runs, so that logarithms can be taken."""
+    return bool((np.sign(outputs) == np.sign(outputs[0])).all() and outputs.any())
+
+
+def output_moments(arrays: dict[str, Any], mean: Any, variance: Any, error: Any = 0.0) -> tuple[Any, Any]:
+    """Return mean (n,) and covariance (n, n) of the outputs from those of the scores (q,), NumPy or JAX.
+
+    ``error`` (n,) is added to the mean before logarithms are undone. The moments of a log-normal are exact.
+    """
+    directions = arrays["directions"]
+    centre = arrays["mean"] + directions @ mean + error
+    cov = (directions * variance) @ directions.T + arrays["truncated"]
+    if "signs" not in arrays:
+        return centre, cov
+    library = centre.__array_namespace__()
+    bounded = library.minimum(cov, MAX_LOG_VARIANCE)
+    sizes = arrays["signs"] * library.exp(centre + 0.5 * library.diagonal(bounded))
+    return sizes, sizes[:, None] * sizes[None, :] * library.expm1(bounded)
+
+
+def _logs(outputs: FloatArray, signs: FloatArray) -> FloatArray:
+    return np.log(np.where(signs == 0, 1.0, np.abs(outputs)))
+
 
 MAX_PARAMETERS_COMBINED = 3
 """Largest number of positive parameters for which all combinations of logarithms are tried; with more, all or none."""

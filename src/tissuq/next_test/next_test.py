@@ -18,8 +18,7 @@ from tissuq.inference.solution import Solution
 from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.candidates import Candidate, Target, farthest_range, reach_of
-from tissuq.next_test.expected_variance import expected_variances
-from tissuq.prediction.joint_moments import joint_stresses, states_of
+from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
 
 __all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]
 

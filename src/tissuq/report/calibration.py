@@ -11,8 +11,8 @@ import numpy as np
 
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
-from tissuq.report.figures import BAND, BASE, INK, STYLE
-from tissuq.report.run_folder import INPUT, RECIPE, embedded_figure, render, write_figures, write_recipe
+from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
+from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, interval, significant, write_csv, write_json
 from tissuq.studies.calibration import CalibrationStudy, Measured
 
@@ -63,8 +63,7 @@ def write_calibration_run(
             "marginals": marginals_figure(calibration),
         }
         write_figures(folder, drawn)
-    page = render("calibration.html", **_context(study, folder), command=command)
-    (folder / "report.html").write_text(page, encoding="utf-8")
+    write_page(folder, "calibration.html", **_context(study), command=command)
 
 
 def _copied(study: CalibrationStudy, folder: Path, beside: Path) -> dict[str, Any]:
@@ -123,7 +122,7 @@ def readable_calibration(calibration: Calibration) -> list[list[str]]:
     return rows
 
 
-def _context(study: CalibrationStudy, folder: Path) -> dict[str, Any]:
+def _context(study: CalibrationStudy) -> dict[str, Any]:
     calibration = study.calibration
     runs, emulator = calibration.runs, calibration.emulator
     failures = [
@@ -158,8 +157,6 @@ def _context(study: CalibrationStudy, folder: Path) -> dict[str, Any]:
         "verdict": calibration.posterior.verdict,
         "method": calibration.posterior.method,
         "evidence": "" if calibration.log_evidence is None else f"{calibration.log_evidence:.2f}",
-        "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
-        "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
 
 
@@ -186,14 +183,10 @@ MAX_COLUMNS = 3
 
 def band_figure(calibration: Calibration, data: Measured) -> Figure:
     """Return the 95 % predictive band over the measurements: with the discrepancy, and of the forward model alone."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     titles = {True: "with the discrepancy", False: "forward model alone"}
     if not calibration.problem.discrepancy.is_correlated:
         titles = {True: "forward model"}
-    with rc_context(STYLE):
-        figure = Figure(figsize=(4.6 * len(titles) + 0.8, 3.9))
+    with new_figure(4.6 * len(titles) + 0.8, 3.9) as figure:
         panels = figure.subplots(1, len(titles), squeeze=False, sharey=True)[0]
         order = np.argsort(data.control, kind="stable")
         for axis, (with_discrepancy, title) in zip(panels, titles.items(), strict=True):
@@ -211,14 +204,10 @@ def band_figure(calibration: Calibration, data: Measured) -> Figure:
 
 def check_figure(calibration: Calibration) -> Figure:
     """Return the validation of the emulator: every run predicted from the others, and new runs."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     trials = [(calibration.check, BAND, "o", "left out")]
     trials += [(trial, EXACT, "s", "" if index else "in the posterior, before refinement")
                for index, trial in enumerate(calibration.held_out)]  # fmt: skip
-    with rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 3.9))
+    with new_figure(10.0, 3.9) as figure:
         error_axis, standardised_axis = figure.subplots(1, 2)
         for check, color, mark, label in trials:
             computed, error = check.computed.ravel(), (check.predicted - check.computed).ravel()
@@ -239,21 +228,16 @@ def check_figure(calibration: Calibration) -> Figure:
 
 def marginals_figure(calibration: Calibration) -> Figure:
     """Return the marginal posterior of every parameter with its prior, and as if the emulator were exact."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     symbols = calibration.problem.symbols
     columns = min(MAX_COLUMNS, len(symbols))
     rows = ceil(len(symbols) / columns)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(3.6 * columns + 0.6, 2.7 * rows + 0.7))
+    with new_figure(3.6 * columns + 0.6, 2.7 * rows + 0.7) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, symbol in zip(panels, symbols, strict=False):
             _draw_marginal(axis, calibration, symbol)
         for spare in panels[len(symbols) :]:
             spare.set_visible(False)
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9)
+        legend_above(figure, panels[:1])
     return figure
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.experiments.reading.units import StressUnit
-from tissuq.report.figures import BAND, BASE, INK, STYLE, save_figure
-from tissuq.report.run_folder import embedded_figure, render
+from tissuq.report.figures import BAND, BASE, INK, new_figure
+from tissuq.report.run_folder import write_figures, write_page
 from tissuq.report.tables import interval
 
 if TYPE_CHECKING:
@@ -88,11 +88,7 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
     unit : StressUnit
         Of the parameter's axis.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context(STYLE):
-        figure = Figure(figsize=(11.5, 1.9 + 0.42 * len(table)))
+    with new_figure(11.5, 1.9 + 0.42 * len(table)) as figure:
         evidence, prediction, parameter = figure.subplots(1, 3, sharey=True, width_ratios=(1, 1.15, 1))
         levels = np.arange(len(table))[::-1]
         low, high = (table[f"log_bayes_factor_{end}"] for end in ("low", "high"))
@@ -136,18 +132,16 @@ def write_comparison(table: pd.DataFrame, runs: list[str], unit: StressUnit, fol
         Exists and is empty.
     """
     table.rename_axis("fit").to_csv(folder / "comparison.csv")
-    (folder / "figures").mkdir()
-    save_figure(comparison_figure(table, unit), folder / "figures", "comparison")
-    page = render(
+    write_figures(folder, {"comparison": comparison_figure(table, unit)})
+    write_page(
+        folder,
         "comparison.html",
         headers=[*HEADERS, parameter_header(table, unit)],
         rows=readable_comparison(table, unit),
         explanations=EXPLANATIONS,
         warnings=comparison_warnings(table),
         command=" ".join(["tissuq compare", *runs]),
-        figure=embedded_figure(folder / "figures" / "comparison.svg"),
     )
-    (folder / "report.html").write_text(page, encoding="utf-8")
 
 
 def parameter_header(table: pd.DataFrame, unit: StressUnit) -> str:

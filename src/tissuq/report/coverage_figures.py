@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.report.figures import BAND, BASE, STYLE, TRUTH
+from tissuq.report.figures import BAND, BASE, STYLE, TRUTH, legend_above
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -151,8 +151,7 @@ def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
         row[0].set_title(str(design) if summary["noise"].nunique() == 1 else f"{design}, {noise} noise")
     for axis in axes[-1]:
         axis.set_xlabel("strength of the error of the model")
-    handles, names = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=min(5, len(names)))
+    legend_above(figure, axes[0][:1], 5, font_size=10)
     return figure
 
 
@@ -179,8 +178,7 @@ def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
     axes[-1][1].set_xlim(left=0)
     axes[-1][0].set_xlabel(f"true stress in the {100 * prob:g} % band [%]")
     axes[-1][1].set_xlabel("median error of the predicted mean [%]")
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    legend_above(figure, axes[0][:1], font_size=10)
     return figure
 
 

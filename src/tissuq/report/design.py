@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.next_test.candidates import Target
-from tissuq.report.figures import BAND, BASE, INK, STYLE
-from tissuq.report.run_folder import RECIPE, embedded_figure, render, write_figures, write_recipe
+from tissuq.report.figures import BAND, BASE, INK, new_figure
+from tissuq.report.run_folder import write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, significant, write_csv, write_json
 from tissuq.studies.design import DesignSettings, DesignStudy
 
@@ -54,13 +54,9 @@ def heading(study: DesignStudy, target: Target) -> str:
 
 def design_figure(study: DesignStudy) -> Figure:
     """Return the expected standard deviation after every test, a panel for each target, the best on top."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context(STYLE):
-        shown = [_shown(_rows_of(study, target)) for target in study.targets]
-        height = 1.5 + 0.3 * max(map(len, shown))
-        figure = Figure(figsize=(9.5, 0.4 + height * len(shown)))
+    shown = [_shown(_rows_of(study, target)) for target in study.targets]
+    height = 1.5 + 0.3 * max(map(len, shown))
+    with new_figure(9.5, 0.4 + height * len(shown)) as figure:
         axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
         for axis, target, table in zip(axes, study.targets, shown, strict=True):
             _panel(axis, study, target, table)
@@ -90,7 +86,8 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
     if figures:
         write_figures(folder, {"design": design_figure(study)})
     model = study.posterior.model
-    page = render(
+    write_page(
+        folder,
         "design.html",
         data=model.experiment.name,
         material=model.material.name,
@@ -104,10 +101,7 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
         explanations=study.explanations,
         warnings=study.warnings,
         command="design",
-        recipe=(folder / RECIPE).read_text(encoding="utf-8"),
-        figure=embedded_figure(folder / "figures" / "design.svg") if figures else "",
     )  # fmt: skip
-    (folder / "report.html").write_text(page, encoding="utf-8")
 
 
 def _rows_of(study: DesignStudy, target: Target) -> pd.DataFrame:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["BAND", "BASE", "INK", "STYLE", "marginal_figure", "predictive_figure", "save_figure"]
+__all__ = [
+    "BAND",
+    "BASE",
+    "INK",
+    "STYLE",
+    "legend_above",
+    "marginal_figure",
+    "new_figure",
+    "predictive_figure",
+    "save_figure",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -135,11 +146,7 @@ def marginal_figure(
     posteriors: Mapping[str, Posterior], symbol: str, unit: StressUnit, truth: float | None = None
 ) -> Figure:
     """Return the marginal posteriors of one stress parameter, a row a formulation, with 95 % HPD and true value."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context(STYLE):
-        figure = Figure(figsize=(8.2, 0.62 * len(posteriors) + 1.1))
+    with new_figure(8.2, 0.62 * len(posteriors) + 1.1) as figure:
         axis = figure.subplots()
         for row, posterior in enumerate(reversed(list(posteriors.values()))):
             _draw_marginal(axis, row, posterior, symbol, unit, truth)
@@ -155,6 +162,26 @@ def marginal_figure(
         axis.set_xlabel(f"{symbol} [{unit.name}]")
         axis.set_ylim(-0.35, len(posteriors) + 0.1)
     return figure
+
+
+@contextmanager
+def new_figure(width: float, height: float) -> Iterator[Figure]:
+    """Give an empty figure, its sizes in inches, to draw on in the style of all reports."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(STYLE):
+        yield Figure(figsize=(width, height))
+
+
+def legend_above(figure: Figure, axes: Iterable[Axes], columns: int | None = None, *, font_size: float = 9) -> None:
+    """Explain above a figure what its panels show, every label once, in at most so many columns."""
+    handles: dict[str, Any] = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    count = min(columns or len(handles), len(handles))
+    figure.legend(list(handles.values()), list(handles), loc="outside upper center", ncols=count, fontsize=font_size)
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> None:
@@ -230,9 +257,4 @@ def _label(figure: Figure, axes: list[Axes], count: int, modes: Sequence[Loading
         figure.supxlabel(modes[0].controls[0].name, fontsize=10.5)
     measured = {stress for mode in modes for stress in mode.stresses}
     figure.supylabel(f"{measured.pop() if len(measured) == 1 else 'engineering stress'} [{unit.name}]", fontsize=10.5)
-    handles: dict[str, Any] = {}
-    for axis in axes[:count]:
-        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    shown = 2 if count == 1 else len(handles)
-    figure.legend(list(handles.values()), list(handles), loc="outside upper center", ncols=shown, fontsize=9.5)
+    legend_above(figure, axes[:count], 2 if count == 1 else None, font_size=9.5)

@@ -35,12 +35,11 @@ __all__ = [
     "check_apart",
     "check_target",
     "copied_laws",
-    "embedded_figure",
-    "render",
     "run_folder",
     "versions",
     "write_data",
     "write_figures",
+    "write_page",
     "write_posteriors",
     "write_recipe",
     "write_tables",
@@ -188,20 +187,24 @@ def _not_written(target: Path, error: OSError) -> InputError:
 LIBRARIES = ("tissuq", "numpy", "scipy", "jax", "blackjax", "arviz-stats", "xarray", "matplotlib")
 
 
-def render(template: str, **context: Any) -> str:
-    """Return a page from a template of this package; every value is escaped."""
+def write_page(folder: Path, template: str, **context: Any) -> None:
+    """Write report.html from a template of this package, with the folder's recipe and figures; values are escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    return environment.get_template(template).render(versions=versions(), **context)
+    recipe = folder / RECIPE
+    context["recipe"] = recipe.read_text(encoding="utf-8") if recipe.exists() else ""
+    context["figures"] = {path.stem: _as_address(path) for path in sorted((folder / "figures").glob("*.svg"))}
+    page = environment.get_template(template).render(versions=versions(), **context)
+    (folder / "report.html").write_text(page, encoding="utf-8")
 
 
-def embedded_figure(path: Path) -> str:
+def _as_address(figure: Path) -> str:
     """Return an SVG file as a data address for an image in a page."""
-    return "data:image/svg+xml;base64," + b64encode(path.read_bytes()).decode("ascii")
+    return "data:image/svg+xml;base64," + b64encode(figure.read_bytes()).decode("ascii")
 
 
 def versions() -> dict[str, str]:
@@ -241,7 +244,7 @@ def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:
     """Write every figure as SVG and PNG."""
     from tissuq.report.figures import save_figure
 
-    (folder / "figures").mkdir()
+    (folder / "figures").mkdir(exist_ok=True)
     for name, figure in figures.items():
         save_figure(figure, folder / "figures", name)
 

@@ -14,7 +14,7 @@ from tissuq.errors import InputError
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.run_folder import INPUT, RECIPE, embedded_figure, render, write_figures
+from tissuq.report.run_folder import INPUT, RECIPE, write_figures, write_page
 from tissuq.report.simulation_figures import force_unit, simulation_figures, write_collection, write_vtu
 from tissuq.report.tables import significant, write_csv
 from tissuq.studies.earlier_run import POSTERIORS
@@ -94,8 +94,7 @@ def write_simulation(study: SimulationStudy, folder: Path, *, figures: bool = Tr
     shutil.rmtree(folder / "figures", ignore_errors=True)
     if figures:
         write_figures(folder, simulation_figures(simulation, table))
-    page = render("simulation.html", **_context(study, table, folder))
-    (folder / "report.html").write_text(page, encoding="utf-8")
+    write_page(folder, "simulation.html", **_context(study, table))
 
 
 def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]:
@@ -204,13 +203,12 @@ def _write_fields(study: SimulationStudy, folder: Path) -> None:
     write_collection(folder / "middle_draw.pvd", files)
 
 
-def _context(study: SimulationStudy, table: pd.DataFrame, folder: Path) -> dict[str, Any]:
+def _context(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
     simulation, model, failed = study.simulation, study.posteriors.fitted.model, study.simulation.failures
     unit, factor = force_unit(table)
     headers, rows = readable_forces(study)
     count = int(table["draws"].max())
     return {
-        "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
         "command": "structure",
         "case": simulation.case,
         "sizes": [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items()],
@@ -236,7 +234,6 @@ def _context(study: SimulationStudy, table: pd.DataFrame, folder: Path) -> dict[
         "cells": len(simulation.case.mesh().cells),
         "seconds": f"{simulation.seconds:.0f}",
         "mesh": simulation.mesh_change,
-        "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
 
 

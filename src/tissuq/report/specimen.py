@@ -1,4 +1,4 @@
-"""The run folder of a fit: the converted data, tables, posteriors, figures and the report."""
+"""The folders of measured files: of a fit and of an inspection, with the converted data, tables and figures."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment import Assessment
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.reading.experiment_file import Reading
+from tissuq.experiments.reading.inspection import Inspection
+from tissuq.experiments.reading.units import stress_unit
+from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import (
     ASSESSMENT,
     HELD_OUT_TESTS,
     INPUT,
-    RECIPE,
     copied_laws,
-    embedded_figure,
-    render,
     write_data,
     write_figures,
+    write_page,
     write_posteriors,
     write_recipe,
     write_tables,
@@ -43,9 +45,10 @@ from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenStudy
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["specimen_summary", "write_specimen_run"]
+__all__ = ["curve_figure", "specimen_summary", "write_inspection", "write_specimen_run"]
 
 
 def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
@@ -80,8 +83,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
     if figures:
         write_figures(folder, _figures(study))
-    page = render("specimen.html", **_context(study, summary, folder), command=command)
-    (folder / "report.html").write_text(page, encoding="utf-8")
+    write_page(folder, "specimen.html", **_context(study, summary), command=command)
 
 
 def _with_files(study: SpecimenStudy, sources: Sequence[Path], folder: Path) -> dict[str, Any]:
@@ -125,7 +127,7 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
     }
 
 
-def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str, Any]:
+def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
     noise = next(iter(study.posteriors.values())).model.noise
     known_noise = "" if noise.parameters else f"sd {_known_noise(study)} {study.unit.name}"
     return {
@@ -135,7 +137,6 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         "tests": [_test_line(test) for test in study.experiment.tests],
         "tolerances": tolerances_in_words(next(iter(study.posteriors.values())).model.tolerances, study.unit),
         "unit": study.unit.name,
-        "recipe": (folder / RECIPE).read_text(encoding="utf-8"),
         "lead": _lead(summary, study),
         "summary": readable_summary(summary, study.unit),
         "is_sampled": any(row["rhat"] is not None for row in summary),
@@ -152,7 +153,6 @@ def _context(study: SpecimenStudy, summary: list[Row], folder: Path) -> dict[str
         "methods": readable_methods(study.posteriors),
         "noise": known_noise or noise.description,
         "skipped": study.skipped,
-        "figures": {path.stem: embedded_figure(path) for path in sorted((folder / "figures").glob("*.svg"))},
     }
 
 
@@ -200,3 +200,42 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
             else ""
         )
     )
+
+
+def write_inspection(inspection: Inspection, folder: Path) -> None:
+    """Write figure, converted data and text into an empty folder."""
+    write_data(folder, inspection.reading.experiment)
+    write_figures(folder, {"curve": curve_figure(inspection)})
+    (folder / "inspection.txt").write_text(f"{inspection}\n", encoding="utf-8")
+
+
+def curve_figure(inspection: Inspection) -> Figure:
+    """Return two panels: every row of the file with those that are used, and these as they would be fitted.
+
+    Of a loading mode with two stresses, two for each.
+    """
+    reading = inspection.reading
+    count = len(reading.used.labels)
+    with new_figure(9.2, 3.9 * count) as figure:
+        for number, (recorded_axis, fitted_axis) in enumerate(figure.subplots(count, 2, squeeze=False)):
+            _draw_stress(recorded_axis, fitted_axis, reading, number)
+    return figure
+
+
+def _draw_stress(recorded_axis: Axes, fitted_axis: Axes, reading: Reading, number: int) -> None:
+    used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
+    stretch, stress = reading.recorded.stretch[number], reading.recorded.stress[number] / unit.to_mpa
+    prefix = f"{used.labels[number]}, " if used.labels[number] else ""
+    controls = reading.experiment.mode.controls
+    name = controls[0].name if len(controls) == 1 else "stretch"
+    recorded_axis.plot(stretch, stress, "-", color=BASE, lw=0.8, label="all rows")
+    recorded_axis.plot(stretch[used.rows], stress[used.rows], ".", color=BAND, ms=3, label="rows used")
+    recorded_axis.set_title(f"{prefix}as recorded")
+    recorded_axis.legend(fontsize=9)
+    fitted_axis.axhline(0, color=BASE, lw=0.6)
+    fitted_axis.axvline(controls[0].reference, color=BASE, lw=0.6)
+    fitted_axis.plot(used.stretch[number], used.stress[number] / unit.to_mpa, ".", color=INK, ms=3)
+    fitted_axis.set_title(f"{prefix}to be fitted: {len(used)} rows")
+    for axis in (recorded_axis, fitted_axis):
+        axis.set_xlabel(name)
+        axis.set_ylabel(f"engineering stress [{unit.name}]")
