@@ -45,7 +45,7 @@ class Table:
         The rows of data as text.
     lines : sequence of int
         The line in the file of every row, counted from 1.
-    above : sequence of (int, str)
+    head : sequence of (int, str)
         The lines above the rows, with their numbers.
     block : (rows, columns) array, optional
         All cells, where they have been read as numbers already.
@@ -57,7 +57,7 @@ class Table:
     separator: str
     rows: list[str]
     lines: Sequence[int]
-    above: Sequence[tuple[int, str]] = ()
+    head: Sequence[tuple[int, str]] = ()
     block: NDArray[np.float64] | None = None
 
     def label(self, column: int) -> str:
@@ -221,7 +221,7 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
         separator=layout.separator,
         rows=texts[layout.first_row :],
         lines=[line for line, _ in content[layout.first_row :]],
-        above=[(line, text) for line, text in filled if line < first_line],
+        head=[(line, text) for line, text in filled if line < first_line],
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     return table
