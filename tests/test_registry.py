@@ -12,6 +12,7 @@ import tissuq as tq
 from tissuq import registry
 from tissuq.experiments.modes import loading_mode
 from tissuq.experiments.modes.one_stretch import Uniaxial
+from tissuq.experiments.reading import FileFormat
 from tissuq.export.cards import CardFormat, card_format
 from tissuq.finite_elements import Case, ClampedBar
 from tissuq.model.discrepancy import Constant, discrepancy_named
@@ -19,7 +20,17 @@ from tissuq.model.measurement_errors import ZeroError
 from tissuq.model.noise import noise_named
 from tissuq.parameters.priors import prior_from
 
-BASES = [tq.Material, tq.LoadingMode, tq.Discrepancy, tq.Noise, tq.MeasurementError, tq.Prior, CardFormat, Case]
+BASES = [
+    tq.Material,
+    tq.LoadingMode,
+    tq.Discrepancy,
+    tq.Noise,
+    tq.MeasurementError,
+    tq.Prior,
+    FileFormat,
+    CardFormat,
+    Case,
+]
 
 
 @pytest.fixture

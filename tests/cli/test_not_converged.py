@@ -7,7 +7,7 @@ from math import nan
 import pytest
 
 from tissuq.inference.enumerators import sampled
-from tissuq.inference.enumerators.adaptive_cells import solve_exactly
+from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.solution import Diagnostics
 
 VERDICT = "4 chains of 1000 draws have NOT converged: R-hat of C10 is 1.73."
@@ -19,7 +19,7 @@ def stuck(monkeypatch):
 
     def install(rhat=1.73):
         def sample(model, seed):
-            (solution,) = solve_exactly([model], seed)
+            (solution,) = AdaptiveCells().solve([model], seed)
             rhats, sizes = dict.fromkeys(model.symbols, rhat), dict.fromkeys(model.symbols, 12.0)
             found = Diagnostics(False, VERDICT, rhats, sizes, sizes, divergences=3)
             return replace(solution, route="joint", log_evidence=None, log_evidence_error=None, diagnostics=found)

@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal, norm, truncnorm
 
 import tissuq as tq
 from oracle import FORMULATIONS, brute_force
-from tissuq.inference.enumerators.adaptive_cells import solve_exactly
+from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.mechanics import NeoHookean, Yeoh, stress_basis
 from tissuq.model.discrepancy import discrepancy_named
@@ -260,5 +260,5 @@ def test_solving_twice_from_one_model_is_stateless(paper):
     model = StatisticalModel(
         paper.experiment(), NeoHookean(), discrepancy_named("constant"), 0.5, paper.priors_of("constant")
     )
-    (first,), (second,) = solve_exactly([model], 1), solve_exactly([model], 1)
+    (first,), (second,) = AdaptiveCells().solve([model], 1), AdaptiveCells().solve([model], 1)
     assert first.log_evidence == second.log_evidence

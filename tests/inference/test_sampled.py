@@ -8,9 +8,9 @@ from scipy.stats import multivariate_normal
 
 import gallery
 import tissuq as tq
-from tissuq.inference.densities import given_density, joint_density
-from tissuq.inference.enumerators.adaptive_cells import solve_exactly
-from tissuq.inference.enumerators.sampled import sample_joint, sample_nuts_given
+from tissuq.inference.densities import conditional_density, joint_density
+from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
+from tissuq.inference.enumerators.sampled import sample_by_nuts, sample_joint
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.mechanics import NeoHookean, Ogden1, Ogden2, Ogden3
 from tissuq.model.discrepancy import discrepancy_named
@@ -33,7 +33,7 @@ def model_of(settings, formulation):
 )
 def test_nuts_converges_and_agrees_with_the_exact_route(paper, formulation):
     model = model_of(paper, formulation)
-    sampled, (exact,) = sample_joint(model, seed=1, draws=4000), solve_exactly([model])
+    sampled, (exact,) = sample_joint(model, seed=1, draws=4000), AdaptiveCells().solve([model])
     found = sampled.diagnostics
     assert found.converged
     assert max(found.rhat.values()) < 1.01
@@ -77,7 +77,7 @@ def test_the_density_with_linear_parameters_integrated_is_that_of_the_exact_rout
     model = model_of(paper, formulation)
     h = np.array([{"S": 0.6, "c": 0.8, "psi": 0.9}[symbol] for symbol in model.nonlinear])
     expected = ConditionalGaussian([model])(h[None, None])
-    density, data = given_density(model)
+    density, data = conditional_density(model)
     log_likelihood, log_prior, mean, root = map(np.asarray, density(h, data))
     assert log_likelihood == pytest.approx(expected.log_likelihood[0, 0], rel=1e-10)
     assert log_prior == pytest.approx(-sum(np.log(np.ptp(model.priors[s].support)) for s in model.nonlinear))
@@ -98,7 +98,7 @@ def test_the_integrated_density_keeps_its_digits_for_every_exponent(material):
     uniforms = np.random.default_rng(0).random((100, len(model.nonlinear)))
     h = np.column_stack([model.priors[s].quantile(u) for s, u in zip(model.nonlinear, uniforms.T, strict=True)])
     expected = ConditionalGaussian([model])(h[None]).log_likelihood[0]
-    density, given = given_density(model)
+    density, given = conditional_density(model)
     found = np.array([density(each, given)[0] for each in h])
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
@@ -107,7 +107,7 @@ def test_the_integrated_density_keeps_its_digits_for_every_exponent(material):
 @pytest.mark.parametrize("formulation", ["constant", "yeoh", "gp"])
 def test_nuts_on_the_nonlinear_parameters_alone_agrees_with_the_exact_route(paper, formulation):
     model = model_of(paper, formulation)
-    sampled, (exact,) = sample_nuts_given(model, seed=3), solve_exactly([model])
+    sampled, (exact,) = sample_by_nuts(model, seed=3), AdaptiveCells().solve([model])
     found = sampled.diagnostics
     assert sampled.route == "nuts"
     assert found.converged
@@ -135,7 +135,7 @@ def test_four_nonlinear_parameters_go_to_nuts_on_auto(paper, monkeypatch):
     def asked(model, seed, refusal):
         raise Asked(refusal)
 
-    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_nuts_given", asked)
+    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_by_nuts", asked)
     with pytest.raises(Asked, match="at most 3 nonlinear parameters"):
         tq.fit(paper.experiment(), discrepancy="gp", priors={"C10": tq.LogNormal(1.0, 1.0)})
 

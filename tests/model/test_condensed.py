@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.model.condensed import NODES_PER_PIECE
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.statistics import NODES_PER_PIECE
 from tissuq.prediction.bands import predict_band, share_inside
 from tissuq.prediction.densities import left_out_log_density
 

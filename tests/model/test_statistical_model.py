@@ -164,25 +164,25 @@ def test_auto_asks_nuts_with_the_reason_where_quadrature_does_not_reach_its_tole
     class Asked(Exception):
         pass
 
-    def fails(models, seed):
+    def fails(enumerator, models, seed):
         raise tq.ConvergenceError("quadrature did not reach its tolerance")
 
     def asked(model, seed, refusal):
         raise Asked(refusal)
 
-    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.solve_exactly", fails)
-    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_nuts_given", asked)
+    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
+    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_by_nuts", asked)
     with pytest.raises(Asked, match="quadrature did not reach its tolerance"):
         tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
 
 
 @pytest.mark.slow
 def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch):
-    def fails(models, seed):
+    def fails(enumerator, models, seed):
         raise tq.ConvergenceError("quadrature did not reach its tolerance")
 
     exact = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
-    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.solve_exactly", fails)
+    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
     sampled = tq.fit(DATA, discrepancy="constant", noise_sd=0.1)
     assert sampled.solution.route == "nuts"
     assert "quadrature did not reach its tolerance" in sampled.solution.reason
@@ -193,10 +193,10 @@ def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch)
 
 
 def test_auto_samples_all_parameters_where_none_is_left_to_sample_alone(monkeypatch):
-    def fails(models, seed):
+    def fails(enumerator, models, seed):
         raise tq.ConvergenceError("this fails")
 
-    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.solve_exactly", fails)
+    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
     solution = tq.fit(DATA, discrepancy="none", noise_sd=0.1).solution
     assert solution.route == "joint"
     assert "this fails" in solution.reason

@@ -1,11 +1,8 @@
-"""Material cards: draws of a posterior as complete materials for finite-element codes, a format a file."""
+"""Material cards: draws of a posterior as complete materials for finite-element codes."""
 
-from tissuq.export.abaqus import Abaqus, CalculiX
-from tissuq.export.ansys import Ansys
 from tissuq.export.cards import CardFormat, Cards, CardSettings, card_format, card_formats
 from tissuq.export.code import Card, FECode
-from tissuq.export.febio import FEBio
-from tissuq.export.ls_dyna import LSDyna
+from tissuq.export.formats import Abaqus, Ansys, CalculiX, FEBio, LSDyna
 from tissuq.export.table import Table
 
 __all__ = [

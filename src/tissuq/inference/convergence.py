@@ -10,11 +10,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MAX_RHAT", "Draws", "diagnostic"]
+from tissuq.errors import InputError
+
+__all__ = ["MAX_RHAT", "Draws", "check_minima", "diagnostic"]
 
 Floats = NDArray[np.float64]
 
 MAX_RHAT = 1.01
+"""Of any parameter, for draws that count as converged."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,13 @@ class Draws(ABC):
                 fault = f"the {region} effective sample size is {sizes[worst]:.0f} for {self.names[worst]}"
                 failures.append((f"{fault} and must exceed {minimum}", remedy))
         return failures
+
+
+def check_minima(sampler: str, settings: object, **minima: int) -> None:
+    """Refuse settings of a sampler that are below their least values."""
+    for name, minimum in minima.items():
+        if getattr(settings, name) < minimum:
+            raise InputError(f"{sampler} {name}: {getattr(settings, name)} is too few; use at least {minimum}.")
 
 
 def diagnostic(statistic: str, draws: Floats, **options: Any) -> Floats:

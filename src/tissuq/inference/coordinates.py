@@ -7,7 +7,7 @@ whitens.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -116,6 +116,19 @@ class Box:
     def width(self) -> Floats:
         """The distance between the bounds, or one."""
         return np.where(self.is_bounded, self.upper - self.lower, 1.0)
+
+    def labels(self, names: Sequence[str] | None) -> tuple[str, ...]:
+        """Return what to call the coordinates: their names, or where there are none, their numbers.
+
+        Raises
+        ------
+        InputError
+            When there are more or fewer names than coordinates.
+        """
+        labels = tuple(f"x[{index}]" for index in range(self.lower.size)) if names is None else tuple(names)
+        if len(labels) != self.lower.size:
+            raise InputError(f"the box has {self.lower.size} coordinates; {len(labels)} names were given.")
+        return labels
 
     def to_line(self, point: ArrayLike) -> Floats:
         """Return the (d,) real-line coordinates of a (d,) point inside the box.

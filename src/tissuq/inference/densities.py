@@ -19,7 +19,7 @@ from tissuq.inference.reduction import Reducer, divided_columns
 from tissuq.mechanics import traced_stress_basis
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["Density", "given_density", "joint_density"]
+__all__ = ["Density", "conditional_density", "joint_density"]
 
 Density = Callable[[Any, Any], Any]
 """Maps a parameter vector and data to what is known there; one function for all models with the same parts."""
@@ -37,7 +37,7 @@ def joint_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
     return _remembered(_joint, model), data
 
 
-def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
+def conditional_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
     """Return what is known given the nonlinear parameters h, as a JAX function of h, and its data.
 
     It returns log p(y | h), linear parameters integrated over their priors as if these had no bounds; the log prior
@@ -54,7 +54,7 @@ def given_density(model: StatisticalModel) -> tuple[Density, dict[str, Any]]:
         data |= _measurements(model)
         if not model.bent_symbols:
             data["columns"] = jax.tree.map(np.asarray, _orthogonal(model, model.design, data["stress"]))
-    return _remembered(_given, model), data
+    return _remembered(_conditional, model), data
 
 
 def _measurements(model: StatisticalModel) -> dict[str, Any]:
@@ -143,7 +143,7 @@ def _orthogonal(model: StatisticalModel, design: Any, stress: Any) -> tuple[Any,
     return columns, Fit(inverse, jnp.log(jnp.abs(jnp.diag(triangle))).sum(), centre)
 
 
-def _given(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
+def _conditional(model: StatisticalModel, h: Any, data: Mapping[str, Any]) -> tuple[Any, Any, Any, Any]:
     values = dict(zip(model.nonlinear, h, strict=True))
     moments, log_determinant, fit = _moments(model, values, data)
     fixed = [values[symbol] for symbol in model.column_symbols if symbol not in model.linear]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
 from tissuq.inference.box import Boxes
-from tissuq.inference.reduction import Reducer, Reductions, Spectrum
+from tissuq.inference.reduction import Reducer, Reduction, Spectrum
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
@@ -238,7 +238,7 @@ class ConditionalGaussian:
                 "discrepancy. Give the noise, or narrower priors, or use the method 'nuts'."
             ) from error
 
-    def _moments(self, reduced: Reductions, group: NDArray[np.intp], h: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _moments(self, reduced: Reduction, group: NDArray[np.intp], h: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return D' V^-1 D for the data matrix D, and log |V|, for every setting; some settings at a time."""
         q, directions = len(self.model.column_symbols) + 1, reduced.counts.shape[1]
         moments, log_determinant = np.empty((*h.shape[:2], q * q)), np.empty(h.shape[:2])

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from tissuq.model.statistics import CHUNK, upper_triangle
 __all__ = [
     "FEW_POINTS",
     "Reducer",
-    "Reductions",
+    "Reduction",
     "Spectrum",
     "correlation_spectrum",
     "divided_columns",
@@ -138,7 +139,7 @@ class Reduction:
     ----------
     inverse : (p, p) array
         Inverse of the triangle that turns Q into the linear columns.
-    log_size : float
+    log_size : float, or (K,) array of several
         Log of the absolute determinant of that triangle.
     centre : (B, p) array
         The least-squares solutions.
@@ -153,20 +154,7 @@ class Reduction:
     """
 
     inverse: FloatArray
-    log_size: float
-    centre: FloatArray
-    squares: FloatArray
-    counts: FloatArray
-    values: FloatArray
-    levels: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Reductions:
-    """K reductions: all arrays begin with that dimension, and those along directions are padded with zeros."""
-
-    inverse: FloatArray
-    log_size: FloatArray
+    log_size: Any
     centre: FloatArray
     squares: FloatArray
     counts: FloatArray
@@ -174,8 +162,8 @@ class Reductions:
     levels: FloatArray
 
     @classmethod
-    def of(cls, reductions: Sequence[Reduction]) -> Reductions:
-        """Stack reductions of the same data."""
+    def stacked(cls, reductions: Sequence[Reduction]) -> Reduction:
+        """Return K reductions of the same data as one: all arrays begin with K, directions are padded with zeros."""
         rank = max(len(reduction.counts) for reduction in reductions)
         directions = np.zeros((3, len(reductions), rank))
         squares = np.zeros((len(reductions), len(reductions[0].squares), rank, reductions[0].squares.shape[2]))
@@ -197,18 +185,18 @@ class Reducer:
         self._models = models
         self._known: dict[tuple[float, ...], Reduction] = {}
 
-    def __call__(self, settings: FloatArray) -> Reductions:
+    def __call__(self, settings: FloatArray) -> Reduction:
         """Return the reductions at K settings (K, s) of the structure."""
         if not settings.shape[1]:
             return self._only
         keys = [tuple(map(float, setting)) for setting in settings]
         new = [key for key in dict.fromkeys(keys) if key not in self._known]
         self._known |= zip(new, self._at(new), strict=True)
-        return Reductions.of([self._known[key] for key in keys])
+        return Reduction.stacked([self._known[key] for key in keys])
 
     @cached_property
-    def _only(self) -> Reductions:
-        return Reductions.of(self._at([()]))
+    def _only(self) -> Reduction:
+        return Reduction.stacked(self._at([()]))
 
     @cached_property
     def _fit(self) -> _Fit:

@@ -1,11 +1,11 @@
-"""What every route of inference returns: a posterior as a mixture of Gaussians, with draws and marginals."""
+"""A posterior by any route of inference, a mixture of Gaussians with draws and marginals; and what finds it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from tissuq.inference.marginal import Marginal, widened
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["Diagnostics", "Marginals", "Solution", "shares_of_members"]
+__all__ = ["Diagnostics", "Enumerator", "Marginals", "Solution", "shares_of_members"]
 
 FloatArray = NDArray[np.float64]
 
@@ -191,6 +191,26 @@ class Solution:
         """The number of chains, and of draws in each."""
         chains, draws = self.component_of_draw.shape
         return chains, draws
+
+
+class Enumerator(Protocol):
+    """Finds weighted settings of nonlinear parameters; given each, the linear ones are Gaussian (or points).
+
+    A solution holds the settings and their weights in its `mixture`, the error of its evidence, and diagnostics where
+    they are draws.
+    """
+
+    def why_not(self, model: StatisticalModel) -> str:
+        """Return why it does not serve a model, in words that follow "does not apply: "; nothing where it does."""
+
+    def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
+        """Return the posteriors of models with the same parts on the same stretches.
+
+        Raises
+        ------
+        ConvergenceError
+            When they are not found to the enumerator's tolerance.
+        """
 
 
 def _same(mixture: GaussianMixture) -> GaussianMixture:

@@ -69,12 +69,12 @@ def pieces(knots: FloatArray, slopes: FloatArray) -> list[Pieces]:
 class PiecewiseEnergy(NamedTuple):
     """W = A(I1 - 3) + B(I2 - 3) + w(ln l1) + w(ln l2) + w(ln l3)."""
 
-    first: Pieces
-    second: Pieces
+    of_i1: Pieces
+    of_i2: Pieces
     logarithm: Pieces
 
     def __call__(self, stretches: tuple[Any, Any, Any]) -> Any:
         """Return the energy (MPa) of principal stretches whose product is one."""
         x, y, z = (stretch * stretch for stretch in stretches)
-        of_invariants = self.first(x + y + z - 3) + self.second(x * y + y * z + z * x - 3)
+        of_invariants = self.of_i1(x + y + z - 3) + self.of_i2(x * y + y * z + z * x - 3)
         return of_invariants + sum(self.logarithm(log(stretch)) for stretch in stretches)

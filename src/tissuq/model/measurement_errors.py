@@ -18,7 +18,15 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.smoothing import smoothed
 from tissuq.registry import find, plugins, variants
 
-__all__ = ["BETWEEN_SPECIMENS", "ErrorPoints", "MeasurementError", "Tolerances", "measurement_errors", "specimens_of"]
+__all__ = [
+    "BETWEEN_SPECIMENS",
+    "ErrorPoints",
+    "FittedErrors",
+    "MeasurementError",
+    "Tolerances",
+    "measurement_errors",
+    "specimens_of",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -267,3 +275,39 @@ def specimens_of(experiment: Experiment) -> NDArray[np.bool_]:
     """Return which tests (tests, specimens) are of which specimen; a test without a name is of one of its own."""
     labels = [test.specimen or number for number, test in enumerate(experiment.tests)]
     return np.array([[label == specimen for specimen in dict.fromkeys(labels)] for label in labels])
+
+
+@dataclass(frozen=True, eq=False)
+class FittedErrors:
+    """Estimates of the errors of the tests that are plugged in, not integrated; `tissuq.fit` makes them.
+
+    Attributes
+    ----------
+    curve : (n,) array, MPa, optional
+        About what stress the measurements have without errors: errors of whole tests act along it.
+    level : float, MPa, optional
+        The standard deviation of all independent errors (noise and S), to which errors of whole tests are relative.
+    lag : float, optional
+        Correlation of the noise of consecutive measurements.
+    spread : float, optional
+        Relative standard deviation of the stress between specimens, where these are enough to estimate it.
+    fits : int
+        How many fits of the same data the estimates took.
+    """
+
+    curve: FloatArray | None = None
+    level: float | None = None
+    lag: float | None = None
+    spread: float | None = None
+    fits: int = 0
+
+    @property
+    def account(self) -> str:
+        """What was estimated and what it cost, in words; empty where nothing was."""
+        estimates = [
+            "the mean curve along which whole tests err" * (self.curve is not None),
+            f"the spread of {self.spread:.3g} between specimens" if self.spread is not None else "",
+            f"the lag-1 correlation of {self.lag:.3g}" if self.lag is not None else "",
+        ]
+        named = " and ".join(filter(None, estimates))
+        return f"{named} estimated by {self.fits} further fits and then taken as known" if named else ""

@@ -15,14 +15,12 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.model.compatibility import check_linearity, check_parts, check_separable
-from tissuq.model.condensed import Condensed, condensed, is_condensed
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
-from tissuq.model.fitted_errors import FittedErrors
-from tissuq.model.measurement_errors import Tolerances
-from tissuq.model.noise import Noise, noise_named, stress_level
+from tissuq.model.error_model import ErrorModel
+from tissuq.model.measurement_errors import FittedErrors, Tolerances
+from tissuq.model.noise import Noise, noise_named
 from tissuq.model.scales import default_boxes, default_prior, off_zero, support
-from tissuq.model.statistics import CHUNK, Statistics, upper_triangle
-from tissuq.model.whitening import Whitening, whitening
+from tissuq.model.statistics import CHUNK, Condensed, Statistics, condensed, is_condensed, upper_triangle
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, Prior
 
@@ -37,7 +35,7 @@ POINTS_OF_RANGE = 2001
 
 
 @dataclass(frozen=True, eq=False)
-class StatisticalModel:
+class StatisticalModel(ErrorModel):
     """measured stress = material(l) + discrepancy(l) + noise, with a prior on every parameter (eq. 15).
 
     The stress is linear in most parameters. Those of them with a flat, uniform or Gaussian prior are `linear`: given
@@ -181,36 +179,6 @@ class StatisticalModel:
         return self.material.parameters[0].symbol
 
     @cached_property
-    def whitening(self) -> Whitening | None:
-        """What makes the errors of several tests independent and equal; None where they are so already."""
-        if len(self.experiment.tests) == 1 and not self.tolerances and not self.fitted_errors.lag:
-            return None
-        noise_sd, mean_sd = self._noise_of_tests
-        return whitening(self.experiment, noise_sd, mean_sd, self.tolerances, self.fitted_errors)
-
-    @cached_property
-    def _noise_of_tests(self) -> tuple[FloatArray, float]:
-        """The noise (tests,) of every test as known or about, MPa, and its geometric mean."""
-        noise_sd = self.noise.of_tests(self.experiment)
-        mean_sd = float(np.exp(np.log(noise_sd).mean()))
-        return np.full(len(noise_sd), mean_sd) if self.noise.depends_on_level else noise_sd, mean_sd
-
-    @property
-    def common_error(self) -> float:
-        """The relative standard deviation of the error of stress that all measurements have in common.
-
-        It is not in the data: everything that is inferred is the tissue's stress times it, and so are `column_symbols`.
-        """
-        return self.tolerances.in_common(self.experiment)
-
-    def white(self, columns: Any) -> Any:
-        """Return columns (n,) or (n, k) of the measurements in units in which their errors are independent and equal.
-
-        Everything that inference sees of the data is whitened.
-        """
-        return columns if self.whitening is None else self.whitening(columns)
-
-    @cached_property
     def condensed(self) -> Condensed | None:
         """Very many measurements of one curve as few rows; None where each is a row of its own.
 
@@ -245,19 +213,6 @@ class StatisticalModel:
     def rows(self, columns: Any) -> Any:
         """Return columns (m,) or (m, k) at `states` as inference sees them: whitened, or condensed."""
         return self.white(columns) if self.condensed is None else self.condensed(columns)
-
-    def relative_noise(self, states: States) -> Any:
-        """Return the noise over noise_sd at states (g,): that of the test; one where there is none."""
-        if self.whitening is None or len(self.experiment.tests) == 1:
-            return 1.0
-        noise_sd, mean_sd = self._noise_of_tests
-        of_curves = np.repeat(noise_sd / mean_sd, [len(test.curves) for test in self.experiment.tests])
-        return np.append(of_curves, 1.0)[states.curve]  # the last one is of what no test has measured
-
-    @property
-    def log_whitening(self) -> float:
-        """What whitening adds to the log density of the data."""
-        return 0.0 if self.whitening is None else self.whitening.log_determinant
 
     @cached_property
     def stress(self) -> FloatArray:
@@ -308,55 +263,6 @@ class StatisticalModel:
     def with_errors(self, **estimates: Any) -> StatisticalModel:
         """Return the same model with other estimates of its errors, as the attributes of `FittedErrors`."""
         return replace(self, fitted_errors=replace(self.fitted_errors, **estimates))
-
-    def noise_variance(self, values: Mapping[str, Any], level: Any) -> Any:
-        """Return the variance (MPa^2) of the measurement noise where the absolute stress has a level (MPa)."""
-        return self.noise.sd(values, level) ** 2
-
-    def white_variance(self, values: Mapping[str, Any], level: Any = 0.0) -> Any:
-        """Return the variance (MPa^2) of all that is independent from measurement to measurement."""
-        return self.noise_variance(values, level) + self.independent_variance(values)
-
-    def independent_variance(self, values: Mapping[str, Any]) -> Any:
-        """Return the variance (MPa^2) of what the discrepancy adds to every measurement by itself."""
-        return 0.0 if self.is_repeated else self.discrepancy.independent_variance(values)
-
-    @cached_property
-    def levels(self) -> FloatArray:
-        """The level of the stress (n,) at every measurement, MPa, for noise that depends on it."""
-        return stress_level(self.experiment)
-
-    @property
-    def is_correlated(self) -> bool:
-        """Whether the discrepancy at one measurement tells something about another."""
-        return self.discrepancy.is_correlated or self.is_repeated
-
-    @property
-    def has_directions(self) -> bool:
-        """Whether errors are independent along directions that the size of noise and discrepancy leave alone."""
-        return not (self.is_correlated and self.noise.depends_on_level)
-
-    @cached_property
-    def is_repeated(self) -> bool:
-        """Whether measurements at one stretch share an otherwise independent discrepancy."""
-        is_only_scattered = self.discrepancy.is_scattered and not self.discrepancy.is_correlated
-        return self.noise.shares_discrepancy and is_only_scattered
-
-    def correlated_variance(self, values: Mapping[str, Any]) -> Any:
-        """Return the variance (MPa^2) of the correlated part of the discrepancy."""
-        if self.is_repeated:
-            return self.discrepancy.independent_variance(values)
-        return self.discrepancy.correlated_variance(values)
-
-    def correlation(self, rows: States, columns: States, values: Mapping[str, Any]) -> Any:
-        """Return the (n, m) covariance of the correlated part between two sets of states, over its variance."""
-        if self.is_repeated:
-            return 1.0 * (rows.abscissa[:, None] == columns.abscissa[None, :])
-        return self.discrepancy.correlation(rows, columns, values)
-
-    def relative_variance(self, states: States, values: Mapping[str, Any]) -> Any:
-        """Return the (n,) diagonal of `correlation`."""
-        return self.discrepancy.relative_variance(states, values)
 
     def _rows(self) -> Iterator[FloatArray]:
         """Yield the rows [X y], block by block; every block has one length, so that JAX compiles once."""
@@ -432,14 +338,10 @@ class StatisticalModel:
         check_separable(self.statistics.triangle[:, :-1], name, self.column_symbols)
 
 
-@lru_cache(maxsize=64)
-def _remembered_basis(
-    material: Material, discrepancy: Discrepancy, states: States, bent: tuple[float, ...]
-) -> FloatArray:
-    return _basis(material, discrepancy, states, bent)
-
-
 def _basis(material: Material, discrepancy: Discrepancy, states: States, bent: ArrayLike) -> FloatArray:
     of_material, of_discrepancy = stress_basis(material, states, bent), discrepancy.mean_basis(states)
     shape = (*of_material.shape[:-1], of_discrepancy.shape[-1])
     return np.concatenate([of_material, np.broadcast_to(of_discrepancy, shape)], axis=-1)
+
+
+_remembered_basis = lru_cache(maxsize=64)(_basis)

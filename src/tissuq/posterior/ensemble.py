@@ -200,7 +200,7 @@ def _stress(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
     I1, I2 = invariants(states)
     for row, energy in zip(stresses, (draw.discrepancy for draw in draws), strict=True):
         if energy is not None:
-            row += energy.first.slope(I1) * rates[0] + energy.second.slope(I2) * rates[1]
+            row += energy.of_i1.slope(I1) * rates[0] + energy.of_i2.slope(I2) * rates[1]
             row += (energy.logarithm.slope(logs) * log_rates).sum(axis=1)
     return stresses
 

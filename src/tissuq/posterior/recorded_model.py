@@ -11,8 +11,7 @@ from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
-from tissuq.model.fitted_errors import FittedErrors
-from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.measurement_errors import FittedErrors, Tolerances
 from tissuq.model.noise import KnownNoise, KnownNoises, Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import Statistics

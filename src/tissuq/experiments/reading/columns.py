@@ -38,11 +38,6 @@ class ColumnChoice:
     measure: str = "stretch"
     load: str = "stress"
 
-    @property
-    def is_strain(self) -> bool:
-        """Whether the deformation is a strain."""
-        return self.measure == "strain"
-
 
 def choose_columns(
     table: Table, mode: LoadingMode, mapping: Mapping[str, str | int] | None, stress_type: str, axis: str | None
@@ -160,8 +155,7 @@ def _choice(
         stress = find_column(table, load, mapping[load])
     else:
         load = "stress" if _fitting(quantities, ["stress"], stress_type) else "force"
-        hint = _stress_hint(table, stress_type)
-        stress = _recognise(table, quantities, "stress", [load], stress_type, "stress or force", hint)
+        stress = _recognise(table, quantities, "stress", [load], stress_type, "stress or force")
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
@@ -230,13 +224,13 @@ def _recognise(
     candidates: Sequence[str],
     stress_type: str,
     what: str,
-    hint: str = "",
 ) -> int:
     """Return the one column whose name says that it has one of the candidate roles."""
     columns = _fitting(quantities, candidates, stress_type)
     if len(columns) > 1:
         raise _ambiguous(table, candidates[0], columns)
     if not columns:
+        hint = _stress_hint(table, stress_type) if role == "stress" else ""
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
             f"{_columns_there_are(table)} {_how_to_say(table, role)}"
@@ -290,7 +284,7 @@ def _check_measures(table: Table, choice: ColumnChoice, stress_type: str) -> Non
             'Leave out stress_type="cauchy" (--stress-type cauchy), or rename the column.'
         )
     strain_words = set(heading(table.names[choice.deformation]).quantity.split())
-    if choice.is_strain and strain_words & {"stretch", "lambda", "λ"}:
+    if choice.measure == "strain" and strain_words & {"stretch", "lambda", "λ"}:
         raise InputError(
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."

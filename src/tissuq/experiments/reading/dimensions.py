@@ -237,7 +237,7 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
 
 def _stated(table: Table, name: str) -> Iterator[Dimension]:
     """Yield what lines above the table like ``Width : 5 mm`` or ``"Probendicke";1,55;"mm"`` state of one dimension."""
-    for line, text in table.above:
+    for line, text in table.head:
         text = text.lstrip("# ")
         cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
         words = [word.strip(' "') for cell in cells for word in re.split(r"[:=\t]|\s{2,}", cell)]

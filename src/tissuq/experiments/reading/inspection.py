@@ -1,22 +1,26 @@
-"""What was understood of a file before anything is fitted: columns, rows, cycles, ranges, noise, warnings."""
+"""What was understood of a file before anything is fitted, and what is strange about its measurements."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from textwrap import fill
 from typing import Unpack
 
 import numpy as np
 
-from tissuq.experiments.reading.data_warnings import data_warnings
+from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.modes.mode import STRETCH
+from tissuq.experiments.reading.cycles import find_cycles
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
+from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.units import stress_unit
 
-__all__ = ["Inspection", "inspect", "noise_between_neighbours"]
+__all__ = ["Inspection", "data_warnings", "inspect", "noise_between_neighbours"]
 
 MIN_TRIPLES = 30
 """Number of triples of neighbouring measurements from which their scatter shows the noise."""
@@ -24,6 +28,19 @@ MAX_CYCLES_SHOWN = 12
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 LABEL_WIDTH, TEXT_WIDTH = 10, 110
 """Characters of the column of labels, and of a line."""
+
+MANY_ROWS = 10_000
+"""Rows from which thinning is worth a word."""
+MIN_ROWS_PER_CYCLE = 10
+"""Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
+NOTABLE_SHARE = 0.05
+"""Share of the largest stress, or of the range of stretches, that is worth a word."""
+PLAUSIBLE_STRESS = (1e-6, 1e3)
+"""Largest stresses, MPa, between which units are hardly mistaken."""
+LARGE_STRETCH = 10.0
+"""Stretch beyond which lengths are likely mistaken."""
+SLACK_STRESS, SLACK_STRETCH = 0.01, 0.2
+"""Share of the largest stress that a slack specimen stays below, over what share of the range of stretches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +84,7 @@ class Inspection:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used, unit = self.reading.table, self.reading.used, stress_unit(self.reading.experiment.stress_unit)
-        head = f"{len(table.above)} lines above them" if len(table.above) != 1 else "1 line above them"
+        head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
         cells = SEPARATORS[table.separator]
         yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {head}"
         yield "columns", ", ".join(self._columns())
@@ -163,3 +180,134 @@ def _span(lines: Sequence[int]) -> str:
 
 def _wrapped(label: str, text: str) -> str:
     return fill(f"{label:<{LABEL_WIDTH}}{text}", TEXT_WIDTH, subsequent_indent=" " * LABEL_WIDTH)
+
+
+def data_warnings(reading: Reading) -> tuple[str, ...]:
+    """Return what a person should look at before a fit, of each stress."""
+    labels = reading.used.labels
+    texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
+    return (*reading.warnings, *filter(None, chain.from_iterable(texts)))
+
+
+def _unit_assumed(reading: Reading, number: int) -> str:
+    if "the file states no unit" not in reading.experiment.source:
+        return ""
+    return "the file states no unit of stress, so MPa was assumed; if it is another, give --stress-unit."
+
+
+def _size(reading: Reading, number: int) -> str:
+    largest, low, high = float(np.abs(reading.used.stress[number]).max()), *PLAUSIBLE_STRESS
+    if low <= largest <= high:
+        return ""
+    return f"the largest stress is {largest:.3g} MPa: check the units of force and area, or of stress."
+
+
+def _stretch_size(reading: Reading, number: int) -> str:
+    largest = float(reading.used.stretch[number].max())
+    if largest <= LARGE_STRETCH:
+        return ""
+    return f"the largest stretch is {largest:.4g}: check the length of the specimen and the unit of the displacement."
+
+
+def _cycles(reading: Reading, number: int) -> str:
+    count = len(find_cycles(reading.used.table, reading.used.course))
+    if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count:
+        return ""
+    return f"all {count} cycles are used; to fit one, give --cycle last, first or a number."
+
+
+def _hysteresis(reading: Reading, number: int) -> str:
+    used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
+    cycle = find_cycles(used.table, course)[-1]
+    branches = [cycle.rows("loading"), cycle.rows("unloading")]
+    if min(map(len, branches)) < MIN_ROWS_PER_CYCLE / 2:
+        return ""
+    ordered = [rows[np.argsort(course[rows])] for rows in branches]
+    low = max(course[rows[0]] for rows in ordered)
+    high = min(course[rows[-1]] for rows in ordered)
+    grid = np.linspace(low, high, 50)
+    loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
+    share = float(np.abs(loading - unloading).max() / np.abs(stress).max())
+    if share < NOTABLE_SHARE:
+        return ""
+    return (
+        f"loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one "
+        "curve; to fit one of them, give --branch loading or unloading."
+    )
+
+
+def _reference(reading: Reading, number: int) -> str:
+    stretch, stress = reading.used.stretch[number], reading.used.stress[number]
+    unit = stress_unit(reading.experiment.stress_unit)
+    mode, points = reading.experiment.mode, reading.experiment.stretch
+    control = mode.controls[0] if len(mode.controls) == 1 else STRETCH
+    change = np.abs((points - mode.reference).reshape(len(stress), -1)).max(axis=1)
+    nearest = int(np.argmin(change))
+    gap, furthest = float(change[nearest]), float(change.max())
+    if gap > NOTABLE_SHARE * furthest:
+        position = " If the file gives positions, not displacements, --preload sets their zero."
+        begin = f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
+        return begin + position * (reading.choices[number].measure == "displacement")
+    at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
+    if abs(at_reference) <= NOTABLE_SHARE * largest:
+        return ""
+    return (
+        f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
+        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell. "
+        f"A hyperelastic material has no stress at {control.name} {control.reference:g}."
+    )
+
+
+def _slack(reading: Reading, number: int) -> str:
+    course, size = reading.used.course, np.abs(reading.used.stress[number])
+    if any("the preload" in step for step in reading.used.steps):
+        return ""
+    row = int(np.argmax(size > SLACK_STRESS * size.max()))
+    share = abs(float(course[row] - course[0])) / max(float(np.ptp(course)), 1e-12)
+    if share < SLACK_STRETCH:
+        return ""
+    return (
+        f"over the first {share:.0%} of the stretches there is less than {SLACK_STRESS:.0%} of the largest stress: a "
+        "soft toe, or slack; if the specimen hung slack, give --preload."
+    )
+
+
+def _many(reading: Reading, number: int) -> str:
+    count = len(reading.used)
+    if count < MANY_ROWS:
+        return ""
+    return f"all {count} rows would be fitted; --every {count // 1000} would leave about a thousand."
+
+
+def _other_axis(reading: Reading, number: int) -> str:
+    """Return a sentence about a biaxial test that is read as uniaxial."""
+    table = reading.table
+    choice = reading.choices[number]
+    axis, _ = on_axis(heading(table.names[choice.deformation]).quantity)
+    if not axis or not isinstance(reading.experiment.mode, Uniaxial):
+        return ""
+    names = [on_axis(heading(name).quantity) for name in table.names]
+    is_across = [name_axis not in ("", axis) and name in ROLES["force"] for name_axis, name in names]
+    if not any(is_across):
+        return ""
+    column = is_across.index(True)
+    along, across = (float(np.abs(numbers).max()) for numbers in table.numbers([choice.stress, column]))
+    if across < NOTABLE_SHARE * along:
+        return ""
+    return (
+        f"column {table.label(column)} carries force, too, so the test is not uniaxial: give --mode biaxial to read "
+        "both axes, or equibiaxial with one of them if both were stretched alike."
+    )
+
+
+CHECKS: tuple[Callable[[Reading, int], str], ...] = (
+    _unit_assumed,
+    _size,
+    _stretch_size,
+    _cycles,
+    _hysteresis,
+    _reference,
+    _slack,
+    _many,
+    _other_axis,
+)

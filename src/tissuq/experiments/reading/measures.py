@@ -58,15 +58,16 @@ def stretch_of(
             f"{table.place(choice.deformation)} is read as {choice.measure}, which needs no length. Leave --length "
             "out, or name the column of displacements: --column displacement=NAME."
         )
-    if not choice.is_strain:
+    is_strain = choice.measure == "strain"
+    if not is_strain:
         _refuse(table, choice, "strain_unit", strain_unit)
     declared = _declared_unit(table, choice.deformation)
-    if not choice.is_strain and not units.looks_like_unit(declared):
+    if not is_strain and not units.looks_like_unit(declared):
         declared = ""
     factor = _strain_factor(table, choice, declared, strain_unit)
     label = table.label(choice.deformation)
     scaled = "" if factor == 1 else f" x {factor:g}"
-    if choice.is_strain:
+    if is_strain:
         check_strain(table, choice, values * factor, load, has_unit=bool(declared or strain_unit))
         return 1 + values * factor, f"stretch = 1 + column {label}{scaled}"
     what = "amount of shear" if choice.measure == "shear" else "stretch"
@@ -177,7 +178,7 @@ def _strain_factor(table: Table, choice: ColumnChoice, declared: str, strain_uni
         in_file = units.strain_factor(declared)
     except InputError as error:
         if strain_unit is None:
-            hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.is_strain else ""
+            hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.measure == "strain" else ""
             raise InputError(f"{column}: {error}{hint}") from error
         declared, in_file = "", 1.0
     if strain_unit is None:

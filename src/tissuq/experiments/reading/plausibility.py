@@ -111,23 +111,24 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
 
 
 def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
+    is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
+    if is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT):
+        return
     name = table.names[choice.deformation] or str(choice.deformation + 1)
-    if choice.is_strain:
+    if is_strain:
         advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
     else:
         advice = (
             "A stretch is deformed over undeformed length. If the column holds strain (stretch - 1), say so: "
             f'columns={{"strain": "{name}"}} or --column strain={_quoted(name)}.'
         )
-    row = int(np.argmin(stretch))
-    if stretch[row] <= 0:
-        row = int(np.flatnonzero(stretch <= 0)[0])
-        raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
-    if stretch.max() < COMPRESSED_LIMIT and not choice.is_strain:
+    if is_positive:
         raise InputError(
             f"{table.place(choice.deformation)}: its values ({stretch.min():g} to "
             f"{stretch.max():g}) look like strain, not stretch. {advice}"
         )
+    row = int(np.flatnonzero(stretch <= 0)[0])
+    raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
 
 
 def _check_signs(

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.file_lines import is_workbook, read_lines, sheet_lines
+from tissuq.experiments.reading.file_format import file_format, sheet_lines
 from tissuq.experiments.reading.layout import WHITESPACE, column_names, find_layout, is_comment, split
+from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.units import NUMBER
 
 __all__ = ["Column", "Table", "read_table"]
@@ -44,7 +45,7 @@ class Table:
         The rows of data as text.
     lines : sequence of int
         The line in the file of every row, counted from 1.
-    above : sequence of (int, str)
+    head : sequence of (int, str)
         The lines above the rows, with their numbers.
     block : (rows, columns) array, optional
         All cells, where they have been read as numbers already.
@@ -56,7 +57,7 @@ class Table:
     separator: str
     rows: list[str]
     lines: Sequence[int]
-    above: Sequence[tuple[int, str]] = ()
+    head: Sequence[tuple[int, str]] = ()
     block: NDArray[np.float64] | None = None
 
     def label(self, column: int) -> str:
@@ -154,8 +155,8 @@ def read_table(path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | in
     """
     if not isinstance(skip_rows, int) or skip_rows < 0:
         raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
-    if is_workbook(path):
-        name, lines = sheet_lines(path, sheet)
+    if (workbook := file_format(path)) is not None:
+        name, lines = sheet_lines(path, workbook.sheets(path), sheet)
         return _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, "	")
     if sheet is not None:
         raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
@@ -220,7 +221,7 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
         separator=layout.separator,
         rows=texts[layout.first_row :],
         lines=[line for line, _ in content[layout.first_row :]],
-        above=[(line, text) for line, text in filled if line < first_line],
+        head=[(line, text) for line, text in filled if line < first_line],
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     return table

@@ -17,7 +17,14 @@ from tissuq.inference.enumerators.quadrature import (
     has_missed,
     integrate,
 )
-from tissuq.inference.enumerators.survey import Warp, log_prior_density, survey, warp_along
+from tissuq.inference.enumerators.survey import (
+    Warp,
+    coordinates_of,
+    log_prior_density,
+    parameters_of,
+    survey,
+    warp_along,
+)
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
@@ -27,7 +34,7 @@ from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["AdaptiveCells", "solve_exactly"]
+__all__ = ["AdaptiveCells"]
 
 FloatArray = NDArray[np.float64]
 
@@ -60,48 +67,43 @@ class AdaptiveCells:
             )
         return ""
 
-    def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
-        """Return the posteriors of models on the same stretches, all integrated together."""
-        return solve_exactly(models, seed)
+    def solve(self, models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+        """Return posterior and evidence of models with at most three nonlinear parameters each.
 
+        Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
+        linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
+        off more, they are integrated numerically. The error given with the evidence is that of the
+        quadrature and of the mass within the bounds.
 
-def solve_exactly(models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
-    """Return posterior and evidence of models with at most three nonlinear parameters each.
+        Parameters
+        ----------
+        models : sequence of StatisticalModel
+            With the same material, discrepancy and noise on the same stretches: they share every factorisation.
+        seed : int
+            Of the draws; nothing else is random.
 
-    Likelihood times normalised prior is integrated, so the evidence includes uniform densities. Bounds of the
-    linear parameters that cut off less than 1e-8 of the posterior leave it a mixture of Gaussians; where they cut
-    off more, they are integrated numerically. The error given with the evidence is that of the
-    quadrature and of the mass within the bounds.
+        Raises
+        ------
+        ModelError
+            When a model has more than three nonlinear parameters, or noise and discrepancy without closed form.
+        ConvergenceError
+            When the quadrature does not reach its tolerance.
 
-    Parameters
-    ----------
-    models : sequence of StatisticalModel
-        With the same material, discrepancy and noise on the same stretches: they share every factorisation.
-    seed : int
-        Of the draws; nothing else is random.
-
-    Raises
-    ------
-    ModelError
-        When a model has more than three nonlinear parameters, or noise and discrepancy without closed form.
-    ConvergenceError
-        When the quadrature does not reach its tolerance.
-
-    References
-    ----------
-    Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
-    """
-    reason = AdaptiveCells().why_not(models[0])
-    if reason:
-        raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
-    together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
-    blocks = [models[start : start + together] for start in range(0, len(models), together)]
-    with one_thread():
-        return [
-            _solution(integration, index, seed)
-            for integration in map(_Integration, blocks)
-            for index in range(len(integration.models))
-        ]
+        References
+        ----------
+        Zeraatpisheh, Bordas & Beex (2021), eq. 15 and 28, integrated instead of sampled.
+        """
+        reason = self.why_not(models[0])
+        if reason:
+            raise ModelError(f"the method 'exact' does not apply: {reason}. Use the method 'nuts' or 'smc'.")
+        together = DATA_SETS_AT_ONCE[len(models[0].nonlinear)]
+        blocks = [models[start : start + together] for start in range(0, len(models), together)]
+        with one_thread():
+            return [
+                _solution(integration, index, seed)
+                for integration in map(_Integration, blocks)
+                for index in range(len(integration.models))
+            ]
 
 
 class _Integration:
@@ -121,7 +123,7 @@ class _Integration:
             self.settings = self.warp.parameters(self.rule.points)[0]
         else:
             self.settings = np.zeros((len(models), 1, 0))
-        self.given = self.conditional(self.settings)
+        self.gaussians = self.conditional(self.settings)
         if self.rule and len(models[0].structure) > 1:
             for index in range(len(models)):
                 self._check_found(index, self.rule.weights[index])
@@ -132,11 +134,8 @@ class _Integration:
         is_log, priors = self.warp.is_log, self._priors[index : index + 1]
         conditional, structure = ConditionalGaussian(self.models[index : index + 1]), self.models[0].structure
 
-        def coordinates(h: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
-            return np.where(is_log, np.log(np.where(is_log, h, 1.0)), h)
-
         def log_density(g: FloatArray) -> FloatArray:
-            h = np.where(is_log, np.exp(np.where(is_log, g, 0.0)), g)[None]
+            h = parameters_of(g, is_log)[None]
             try:
                 gaussians = conditional(h)
             except (ConvergenceError, np.linalg.LinAlgError):  # where columns depend on each other, far away
@@ -150,9 +149,9 @@ class _Integration:
             return np.asarray(np.where(np.isnan(value), -np.inf, value)[0])
 
         tried = np.array([prior.quantile(START_PROBABILITIES) for prior in priors[0][: len(structure)]])
-        starts = coordinates(tried.T, is_log[: len(structure)]).T
+        starts = coordinates_of(tried.T, is_log[: len(structure)]).T
         bounds = np.column_stack([self.warp.lower[index], self.warp.upper[index]])
-        if has_missed(log_density, bounds, coordinates(self.settings[index], is_log), weights, starts):
+        if has_missed(log_density, bounds, coordinates_of(self.settings[index], is_log), weights, starts):
             raise ConvergenceError(
                 f"the posterior of {', '.join(structure)} is a ridge too thin for quadrature beside this noise: use "
                 "the method 'nuts', or give a narrow prior of one of them."
@@ -193,7 +192,7 @@ def _ceiling(conditional: ConditionalGaussian, gaussians: Conditional) -> FloatA
 
 def _solution(integration: _Integration, index: int, seed: int) -> Solution:
     """Return the posterior of one of the data sets."""
-    model, rule, gaussians = integration.models[index], integration.rule, integration.given
+    model, rule, gaussians = integration.models[index], integration.rule, integration.gaussians
     box = integration.conditional.boxes[[index]]
     weights = rule.weights[index] if rule else np.ones(1)
     mixture = GaussianMixture(weights, integration.settings[index], gaussians.mean[index], gaussians.root[index])

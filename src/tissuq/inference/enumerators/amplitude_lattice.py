@@ -35,7 +35,7 @@ from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["AmplitudeLattice", "solve_energies"]
+__all__ = ["AmplitudeLattice"]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -67,9 +67,36 @@ class AmplitudeLattice:
                 )
         return "" if model.energy_symbols else f"discrepancy '{model.discrepancy.name}' is no energy"
 
-    def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
-        """Return the posteriors of models on the same stretches, which share every decomposition."""
-        return solve_energies(models, seed)
+    def solve(self, models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+        """Return posterior and evidence of models with an energy discrepancy, on the same stretches.
+
+        Parameters
+        ----------
+        models : sequence of StatisticalModel
+            With the same material, discrepancy and noise on the same stretches: they share every decomposition, unless
+            parameters are left that no lattice sums over.
+        seed : int
+            Of the draws; nothing else is random.
+
+        Raises
+        ------
+        ModelError
+            When the model has parameters that this route does not integrate.
+        ConvergenceError
+            When it is not found where the parameters lie that no lattice sums over.
+        """
+        reason = self.why_not(models[0])
+        if reason:
+            raise ModelError(
+                f"discrepancy '{models[0].discrepancy.name}' needs wide positive priors on its amplitudes. Here "
+                f"{reason}: choose otherwise, or another discrepancy."
+            )
+        with one_thread():
+            if Outer(models[0]).symbols:
+                return [_EnergySums(model, *weighted_nodes(model)).solution(seed) for model in models]
+            nodes = single_nodes(models)
+            sums = (_EnergySums(model, [node], np.zeros(1), 0.0) for model, node in zip(models, nodes, strict=True))
+            return [energy_sums.solution(seed) for energy_sums in sums]
 
 
 def _lattice_error(prior: Prior) -> float:
@@ -81,37 +108,6 @@ def _lattice_error(prior: Prior) -> float:
     amplitudes = np.exp(starts + 2 * LOG_RATIO_STEP * np.arange(-60, 61))
     masses = (2 * LOG_RATIO_STEP * amplitudes * np.exp(prior.log_density(amplitudes))).sum(axis=1)
     return float(np.abs(masses - 1).max())
-
-
-def solve_energies(models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
-    """Return posterior and evidence of models with an energy discrepancy, on the same stretches.
-
-    Parameters
-    ----------
-    models : sequence of StatisticalModel
-        With the same material, discrepancy and noise on the same stretches: they share every decomposition, unless
-        parameters are left that no lattice sums over.
-    seed : int
-        Of the draws; nothing else is random.
-
-    Raises
-    ------
-    ModelError
-        When the model has parameters that this route does not integrate.
-    ConvergenceError
-        When it is not found where the parameters lie that no lattice sums over.
-    """
-    reason = AmplitudeLattice().why_not(models[0])
-    if reason:
-        raise ModelError(
-            f"discrepancy '{models[0].discrepancy.name}' needs wide positive priors on its amplitudes. Here {reason}: "
-            "choose otherwise, or another discrepancy."
-        )
-    with one_thread():
-        if Outer(models[0]).symbols:
-            return [_EnergySums(model, *weighted_nodes(model)).solution(seed) for model in models]
-        nodes = single_nodes(models)
-        return [_EnergySums(m, [node], np.zeros(1), 0.0).solution(seed) for m, node in zip(models, nodes, strict=True)]
 
 
 class _EnergySums:
@@ -208,7 +204,7 @@ class _EnergySums:
                 of_member = np.flatnonzero((node == number) & (points.lattice == member))
                 amplitudes = points.amplitudes[of_member][:, list(self.model.energy_members[member].amplitude_indices)]
                 reduced = Reduced(rows, features[member])
-                linear_mean, linear_root = reduced.everything(0, amplitudes, points.noise_sd[of_member])
+                linear_mean, linear_root = reduced.linear_and_weights(0, amplitudes, points.noise_sd[of_member])
                 linear_mean, linear_root, _ = self._priors.times(linear_mean, linear_root)
                 q = linear_mean.shape[1]
                 mean[of_member, :q], root[of_member, :q, :q] = linear_mean, linear_root

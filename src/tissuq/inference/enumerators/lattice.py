@@ -47,11 +47,6 @@ class Rows:
     scale: FloatArray
     count: int
 
-    @property
-    def log_scale(self) -> float:
-        """Log of what division by the relative noise makes of a density."""
-        return float(np.log(self.scale).sum())
-
 
 class Reduced:
     """The rows of B data sets and the features of one member, as a QR triangle.
@@ -70,7 +65,9 @@ class Reduced:
         basis, self._triangle = np.linalg.qr(columns)
         self._data = basis.T @ rows.stresses
 
-    def everything(self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def linear_and_weights(
+        self, data_set: int, amplitudes: FloatArray, noise_sd: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return means (M, q) and roots (M, q, q) of the material's parameters and the discrepancy's weights.
 
         For any amplitudes (M, blocks) and noise (M,).
@@ -187,7 +184,7 @@ class Lattice:
         self._root, self._scores = gaussian.root, gaussian.scores
         self.misfit = np.maximum(gaussian.misfit, 0.0)
         self.log_size = directions.log_size - gaussian.log_volume
-        self.log_size += np.log(np.abs(np.diag(triangle))).sum() + rows.log_scale
+        self.log_size += np.log(np.abs(np.diag(triangle))).sum() + np.log(rows.scale).sum()
 
     def log_likelihood(
         self, data_set: int, second_index: Places, first_index: Places, noise_sd: FloatArray

@@ -16,7 +16,7 @@ from blackjax.adaptation.window_adaptation import build_schedule
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.inference.convergence import MAX_RHAT, Draws, diagnostic
+from tissuq.inference.convergence import MAX_RHAT, Draws, check_minima, diagnostic
 from tissuq.inference.coordinates import (
     Box,
     Derivatives,
@@ -69,9 +69,7 @@ class NutsSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, minimum in (("chains", 2), ("warmup", 20), ("draws", 4), ("thinning", 1), ("seed", 0)):
-            if getattr(self, name) < minimum:
-                raise InputError(f"NUTS {name}: {getattr(self, name)} is too few; use at least {minimum}.")
+        check_minima("NUTS", self, chains=2, warmup=20, draws=4, thinning=1, seed=0)
         if not 0 < self.target_acceptance < 1:
             raise InputError(f"NUTS target_acceptance: {self.target_acceptance} is not between 0 and 1.")
 
@@ -182,10 +180,7 @@ def sample_nuts(
     """
     settings = settings or NutsSettings()
     box = Box(lower, upper)
-    dimension = box.is_bounded.size
-    labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
-    if len(labels) != dimension:
-        raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
+    labels = box.labels(names)
     generator = np.random.default_rng(settings.seed)
     arguments = () if data is None else (data,)
     derivatives = derivatives_on_line(log_density, box, *arguments)

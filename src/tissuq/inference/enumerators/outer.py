@@ -15,7 +15,7 @@ from tissuq.inference.quasi_monte_carlo import adapted, effective, even_points, 
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["OUTER_STEP", "Node", "Outer", "plain_rows", "single_nodes", "weighted_nodes", "weighted_settings"]
+__all__ = ["OUTER_STEP", "Node", "Outer", "single_nodes", "weighted_nodes", "weighted_settings"]
 
 FloatArray = NDArray[np.float64]
 
@@ -39,12 +39,6 @@ SCOUT_MEMBERS = 6
 """Members, about, whose posterior guides the search for the values."""
 GOLDEN_RATIO = 0.6180339887
 """Multiples of it, modulo one, are where systematic resampling starts at each node in turn."""
-
-
-def plain_rows(models: Sequence[StatisticalModel]) -> Rows:
-    """Return the rows of models on the same stretches in which everything is linear or on a lattice."""
-    stresses = np.array([model.stress for model in models]).T
-    return Rows(models[0].design, stresses, np.ones(len(stresses)), models[0].experiment.size)
 
 
 class Outer:
@@ -175,7 +169,8 @@ class Node:
 
 def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     """Return the posteriors of models on the same stretches that have no outer parameters."""
-    rows = plain_rows(models)
+    stresses = np.array([model.stress for model in models]).T
+    rows = Rows(models[0].design, stresses, np.ones(len(stresses)), models[0].experiment.size)
     terms = _Terms(models)
     lattices = [Lattice(terms.directions(member, rows.scale), rows) for member in range(len(models[0].energy_members))]
     nodes = []

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.inference.box import Boxes
-from tissuq.inference.densities import Density, given_density, joint_density
+from tissuq.inference.densities import Density, conditional_density, joint_density
 from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nuts
 from tissuq.inference.enumerators.smc import SmcDraws, SmcSettings, sample_smc
 from tissuq.inference.gaussian_mixture import GaussianMixture
@@ -23,7 +23,7 @@ from tissuq.inference.solution import Diagnostics, Marginals, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat
 
-__all__ = ["JointNuts", "Nuts", "TemperedSmc", "sample_joint", "sample_nuts_given"]
+__all__ = ["JointNuts", "Nuts", "TemperedSmc", "sample_by_nuts", "sample_joint"]
 
 FloatArray = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Nuts(JointNuts):
 
     def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
         """Return the posteriors of models, one after another."""
-        return [sample_nuts_given(model, seed, self.refusal) for model in models]
+        return [sample_by_nuts(model, seed, self.refusal) for model in models]
 
 
 class TemperedSmc(Nuts):
@@ -74,7 +74,7 @@ class TemperedSmc(Nuts):
 
     def solve(self, models: Sequence[StatisticalModel], seed: int) -> list[Solution]:
         """Return the posteriors of models, one after another."""
-        return [sample_smc_given(model, seed) for model in models]
+        return [sample_by_smc(model, seed) for model in models]
 
 
 def sample_joint(model: StatisticalModel, seed: int = 0, draws: int = 1000, because: str = "") -> Solution:
@@ -110,7 +110,7 @@ def sample_joint(model: StatisticalModel, seed: int = 0, draws: int = 1000, beca
     return _solution(model, "joint", reason, _points(settings_of_draws, linear), linear, sampled)
 
 
-def sample_nuts_given(model: StatisticalModel, seed: int = 0, refusal: str = "") -> Solution:
+def sample_by_nuts(model: StatisticalModel, seed: int = 0, refusal: str = "") -> Solution:
     """Return the posterior from NUTS on the nonlinear parameters, the linear ones integrated and then drawn.
 
     Where bounds of the linear parameters cut deep, all parameters are sampled together instead.
@@ -127,19 +127,19 @@ def sample_nuts_given(model: StatisticalModel, seed: int = 0, refusal: str = "")
     if not model.nonlinear:
         return sample_joint(model, seed, because=because)
     _check_size(model)
-    density, data = given_density(model)
+    density, data = conditional_density(model)
     lower, upper = np.array([model.priors[symbol].support for symbol in model.nonlinear]).T
     settings = NutsSettings(seed=seed, target_acceptance=_acceptance(model))
     start = _best_prior_point(model, density, data)
     sampled = sample_nuts(_log_posterior(density), lower, upper, start, settings, model.nonlinear, data)
-    conditional = _Given(model, density, data, sampled.values)
+    conditional = _ConditionalDraws(model, density, data, sampled.values)
     if conditional.effective < MIN_EFFECTIVE_SHARE:
         solution = sample_joint(model, seed, because=f"{because}bounds cut deep into the linear parameters; ")
     else:
-        reason = f"{because}NUTS on {', '.join(model.nonlinear)}; {conditional.rest}"
+        reason = f"{because}NUTS on {', '.join(model.nonlinear)}; {conditional.account}"
         solution = _solution(model, "nuts", reason, *conditional.mixture_and_draws(seed), sampled)
     if refusal and not _is_improper(model):
-        by_smc = sample_smc_given(model, seed)
+        by_smc = sample_by_smc(model, seed)
         solution = replace(
             solution,
             log_evidence=by_smc.log_evidence,
@@ -149,20 +149,20 @@ def sample_nuts_given(model: StatisticalModel, seed: int = 0, refusal: str = "")
     return solution
 
 
-def sample_smc_given(model: StatisticalModel, seed: int = 0) -> Solution:
+def sample_by_smc(model: StatisticalModel, seed: int = 0) -> Solution:
     """Return posterior and evidence from tempered SMC on the nonlinear parameters, the linear ones integrated.
 
     The evidence without bounds of the linear parameters times the mean mass within them is that with bounds.
     """
     _check_size(model)
-    density, data = given_density(model)
+    density, data = conditional_density(model)
     priors = [model.priors[symbol] for symbol in model.nonlinear]
     lower, upper = np.array([prior.support for prior in priors]).T
     settings = SmcSettings(seed=seed)
     points = _prior_points(model, np.random.default_rng([seed, 7]).random((settings.particles, len(priors))))
     sampled = sample_smc(*_likelihood_and_prior(density), lower, upper, points, settings, model.nonlinear, data)
-    conditional = _Given(model, density, data, sampled.values)
-    reason = f"tempered SMC on {', '.join(model.nonlinear)}; {conditional.rest}"
+    conditional = _ConditionalDraws(model, density, data, sampled.values)
+    reason = f"tempered SMC on {', '.join(model.nonlinear)}; {conditional.account}"
     solution = _solution(model, "smc", reason, *conditional.mixture_and_draws(seed), sampled)
     if _is_improper(model):
         return solution
@@ -171,7 +171,7 @@ def sample_smc_given(model: StatisticalModel, seed: int = 0) -> Solution:
     return replace(solution, log_evidence=evidence, log_evidence_error=error)
 
 
-class _Given:
+class _ConditionalDraws:
     """The linear parameters given draws (chains, draws, d) of the nonlinear ones."""
 
     def __init__(self, model: StatisticalModel, density: Density, data: Mapping[str, Any], h: FloatArray) -> None:
@@ -193,7 +193,7 @@ class _Given:
         self.is_cut = bool((self._log_inside < -1e-8).any())
 
     @property
-    def rest(self) -> str:
+    def account(self) -> str:
         """What happened to the linear parameters, in words."""
         linear = ", ".join(self.model.linear)
         return f"{linear} integrated in closed form, then drawn" if linear else "these are all parameters"
@@ -302,7 +302,7 @@ def _best_prior_point(model: StatisticalModel, density: Density, data: Mapping[s
 
 def _start(model: StatisticalModel) -> FloatArray:
     """Return a point inside the support: the best of some prior points, linear parameters at their conditional mean."""
-    density, data = given_density(model)
+    density, data = conditional_density(model)
     best = _best_prior_point(model, density, data) if model.nonlinear else np.zeros(0)
     _, _, mean, root = (np.asarray(array)[0] for array in _compiled(density)(best[None], data))
     start = dict(zip((*model.nonlinear, *model.linear), [*best, *mean], strict=True))

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp, ndtr, stdtrit
 
 from tissuq.errors import ConvergenceError, InputError
-from tissuq.inference.convergence import MAX_RHAT, Draws
+from tissuq.inference.convergence import MAX_RHAT, Draws, check_minima
 from tissuq.inference.coordinates import Box
 from tissuq.inference.enumerators.mutation import Mutation, Program, compiled_program
 from tissuq.inference.quasi_monte_carlo import resampled_at_random
@@ -56,9 +56,7 @@ class SmcSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, minimum in (("runs", 4), ("particles", 50 * self.runs), ("max_sweeps", 1), ("seed", 0)):
-            if getattr(self, name) < minimum:
-                raise InputError(f"SMC {name}: {getattr(self, name)} is too few; use at least {minimum}.")
+        check_minima("SMC", self, runs=4, particles=50 * self.runs, max_sweeps=1, seed=0)
         if self.particles % self.runs:
             raise InputError(f"SMC particles: {self.particles} is not a multiple of the {self.runs} runs.")
         if not 0.5 <= self.ess_fraction <= 0.9:
@@ -240,10 +238,7 @@ def sample_smc(
     """
     settings = settings or SmcSettings()
     box = Box(lower, upper)
-    dimension = box.is_bounded.size
-    labels = tuple(names) if names is not None else tuple(f"x[{index}]" for index in range(dimension))
-    if len(labels) != dimension:
-        raise InputError(f"the box has {dimension} coordinates; {len(labels)} names were given.")
+    labels = box.labels(names)
     arguments = () if data is None else (data,)
     program = compiled_program(log_likelihood, log_prior, tuple(box.lower.tolist()), tuple(box.upper.tolist()))
     lines = _starting_lines(box, prior_draws, settings)

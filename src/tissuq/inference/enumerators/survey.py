@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.parameters.priors import Prior
 
-__all__ = ["REACH_E_FOLDS", "Survey", "Warp", "log_prior_density", "survey", "warp_along"]
+__all__ = ["Survey", "Warp", "coordinates_of", "log_prior_density", "parameters_of", "survey", "warp_along"]
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
@@ -48,6 +48,16 @@ class Survey:
     covariance: FloatArray
 
 
+def parameters_of(coordinates: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
+    """Return the parameters (..., d) of coordinates (..., d), some of which are logarithms."""
+    return np.where(is_log, np.exp(np.where(is_log, coordinates, 0.0)), coordinates)
+
+
+def coordinates_of(parameters: FloatArray, is_log: NDArray[np.bool_]) -> FloatArray:
+    """Return the coordinates (..., d) of parameters (..., d): of some their logarithms."""
+    return np.where(is_log, np.log(np.where(is_log, parameters, 1.0)), parameters)
+
+
 def log_prior_density(priors: Sequence[Sequence[Prior]], h: FloatArray) -> FloatArray:
     """Return the log prior density (B, N) of parameters (B, N, d) under the d priors of each data set."""
     if all(priors_of_one == priors[0] for priors_of_one in priors):
@@ -80,7 +90,7 @@ def survey(priors: Sequence[Sequence[Prior]], structure: int, log_likelihood: Lo
         bounds = np.where(is_log[:, None], np.log(np.maximum(supports, 0.0)), supports)
 
     def log_posterior(g: FloatArray) -> FloatArray:
-        h = np.where(is_log, np.exp(np.where(is_log, g, 0.0)), g)
+        h = parameters_of(g, is_log)
         value = log_likelihood(h) + log_prior_density(priors, h) + (g * is_log).sum(axis=2)
         return np.where(np.isnan(value), -np.inf, value)
 
@@ -249,7 +259,7 @@ class Warp:
             tangent = np.tan(np.pi * (start + mass * u[:, j] - 0.5))
             g[:, :, j] = np.clip(centre + scale * tangent, self.lower[:, j, None], self.upper[:, j, None])
             log_density -= np.log(np.pi * scale * (1 + tangent**2) * mass)
-        h = np.where(self.is_log, np.exp(np.where(self.is_log, g, 0.0)), g)
+        h = parameters_of(g, self.is_log)
         return h, log_density - (g * self.is_log).sum(axis=2)
 
     def bounds(self, j: int) -> tuple[float, float]:
@@ -267,7 +277,7 @@ class Warp:
         if j:
             padded = np.hstack([preceding, np.full((len(preceding), len(self.is_log) - j), 0.5)])
             h = self[0].parameters(padded)[0]
-            g[:, :, :j] = np.where(self.is_log, np.log(np.where(self.is_log, h, 1.0)), h)[:, :, :j]
+            g[:, :, :j] = coordinates_of(h, self.is_log)[:, :, :j]
         centre = self[0]._centre(j, g)
         start, mass = (value.T for value in self[0]._cut(j, centre))
         scale = self.scale[0, j]

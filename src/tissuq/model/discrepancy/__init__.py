@@ -1,11 +1,23 @@
 """The discrepancies, one family a file; importing this package registers them all."""
 
-from tissuq.model.discrepancy.best_fit import OrthogonalProcess, ScaledProcess
 from tissuq.model.discrepancy.discrepancy import Discrepancy, NoDiscrepancy
-from tissuq.model.discrepancy.energy import Auto, EnergyDiscrepancy, EnergySum, Member, side_by_side
+from tissuq.model.discrepancy.energy import (
+    Auto,
+    EnergyDiscrepancy,
+    EnergySum,
+    Member,
+    discrepancies,
+    discrepancy_named,
+    side_by_side,
+)
 from tissuq.model.discrepancy.means import Constant, Linear, MooneyRivlinTerm, Quadratic, YeohTerms
-from tissuq.model.discrepancy.named import discrepancies, discrepancy_named
-from tissuq.model.discrepancy.processes import ConditionedProcess, GaussianProcess, PinnedProcess
+from tissuq.model.discrepancy.processes import (
+    ConditionedProcess,
+    GaussianProcess,
+    OrthogonalProcess,
+    PinnedProcess,
+    ScaledProcess,
+)
 
 __all__ = [
     "Auto",

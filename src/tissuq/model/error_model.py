@@ -1,19 +1,22 @@
-"""What makes measurements whose errors differ and hang together into ones of independent and equal errors."""
+"""The errors of all measurements: their variances, and the whitening that makes them independent and equal."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.experiment import Experiment
-from tissuq.model.fitted_errors import FittedErrors
-from tissuq.model.measurement_errors import Tolerances, specimens_of
+from tissuq.experiments.modes import States
+from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.measurement_errors import FittedErrors, Tolerances, specimens_of
+from tissuq.model.noise import Noise, stress_level
 
-__all__ = ["Whitening", "whitening"]
+__all__ = ["ErrorModel", "Whitening", "whitening"]
 
 FloatArray = NDArray[np.float64]
 
@@ -146,3 +149,108 @@ def _errors_of_tests(
         of_specimen, of_test = (tolerances.columns(test, curve, of_specimen=flag) for flag in (True, False))
         rows.append(np.hstack([np.kron(of_specimen, deviation[None]), np.kron(of_test, specimen[None])]))
     return np.concatenate(rows)
+
+
+class ErrorModel:
+    """The errors of the measurements: what is independent of them, what is correlated, and the whitening of tests.
+
+    Everything that inference sees of the data is whitened.
+    """
+
+    experiment: Experiment
+    discrepancy: Discrepancy
+    noise: Noise
+    tolerances: Tolerances
+    fitted_errors: FittedErrors
+
+    @cached_property
+    def whitening(self) -> Whitening | None:
+        """What makes the errors of several tests independent and equal; None where they are so already."""
+        if len(self.experiment.tests) == 1 and not self.tolerances and not self.fitted_errors.lag:
+            return None
+        noise_sd, mean_sd = self._noise_of_tests
+        return whitening(self.experiment, noise_sd, mean_sd, self.tolerances, self.fitted_errors)
+
+    @cached_property
+    def _noise_of_tests(self) -> tuple[FloatArray, float]:
+        """The noise (tests,) of every test as known or about, MPa, and its geometric mean."""
+        noise_sd = self.noise.of_tests(self.experiment)
+        mean_sd = float(np.exp(np.log(noise_sd).mean()))
+        return np.full(len(noise_sd), mean_sd) if self.noise.depends_on_level else noise_sd, mean_sd
+
+    def white(self, columns: Any) -> Any:
+        """Return columns (n,) or (n, k) of the measurements in units in which their errors are independent and equal.
+
+        Everything that inference sees of the data is whitened.
+        """
+        return columns if self.whitening is None else self.whitening(columns)
+
+    @property
+    def log_whitening(self) -> float:
+        """What whitening adds to the log density of the data."""
+        return 0.0 if self.whitening is None else self.whitening.log_determinant
+
+    def relative_noise(self, states: States) -> Any:
+        """Return the noise over noise_sd at states (g,): that of the test; one where there is none."""
+        if self.whitening is None or len(self.experiment.tests) == 1:
+            return 1.0
+        noise_sd, mean_sd = self._noise_of_tests
+        of_curves = np.repeat(noise_sd / mean_sd, [len(test.curves) for test in self.experiment.tests])
+        return np.append(of_curves, 1.0)[states.curve]  # the last one is of what no test has measured
+
+    @property
+    def common_error(self) -> float:
+        """The relative standard deviation of the error of stress that all measurements have in common.
+
+        It is not in the data: everything that is inferred is the tissue's stress times it, and so are `column_symbols`.
+        """
+        return self.tolerances.in_common(self.experiment)
+
+    def noise_variance(self, values: Mapping[str, Any], level: Any) -> Any:
+        """Return the variance (MPa^2) of the measurement noise where the absolute stress has a level (MPa)."""
+        return self.noise.sd(values, level) ** 2
+
+    def independent_variance(self, values: Mapping[str, Any]) -> Any:
+        """Return the variance (MPa^2) of what the discrepancy adds to every measurement by itself."""
+        return 0.0 if self.is_repeated else self.discrepancy.independent_variance(values)
+
+    def white_variance(self, values: Mapping[str, Any], level: Any = 0.0) -> Any:
+        """Return the variance (MPa^2) of all that is independent from measurement to measurement."""
+        return self.noise_variance(values, level) + self.independent_variance(values)
+
+    @cached_property
+    def levels(self) -> FloatArray:
+        """The level of the stress (n,) at every measurement, MPa, for noise that depends on it."""
+        return stress_level(self.experiment)
+
+    @property
+    def is_correlated(self) -> bool:
+        """Whether the discrepancy at one measurement tells something about another."""
+        return self.discrepancy.is_correlated or self.is_repeated
+
+    @cached_property
+    def is_repeated(self) -> bool:
+        """Whether measurements at one stretch share an otherwise independent discrepancy."""
+        is_only_scattered = self.discrepancy.is_scattered and not self.discrepancy.is_correlated
+        return self.noise.shares_discrepancy and is_only_scattered
+
+    @property
+    def has_directions(self) -> bool:
+        """Whether errors are independent along directions that the size of noise and discrepancy leave alone."""
+        return not (self.is_correlated and self.noise.depends_on_level)
+
+    def correlated_variance(self, values: Mapping[str, Any]) -> Any:
+        """Return the variance (MPa^2) of the correlated part of the discrepancy."""
+        if self.is_repeated:
+            return self.discrepancy.independent_variance(values)
+        return self.discrepancy.correlated_variance(values)
+
+    def correlation(self, rows: States, columns: States, values: Mapping[str, Any]) -> Any:
+        """Return the (n, m) covariance of the correlated part between two sets of states, over its variance."""
+        if self.is_repeated:
+            return 1.0 * (rows.abscissa[:, None] == columns.abscissa[None, :])
+        return self.discrepancy.correlation(rows, columns, values)
+
+    def relative_variance(self, states: States, values: Mapping[str, Any]) -> Any:
+        """Return the (n,) diagonal of `correlation`."""
+        return self.discrepancy.relative_variance(states, values)

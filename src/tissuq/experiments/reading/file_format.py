@@ -1,0 +1,87 @@
+"""Files with sheets of cells: a class for each format, known by the first bytes of its files."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.layout import find_layout
+from tissuq.registry import plugins, variants
+
+__all__ = ["FileFormat", "file_format", "sheet_lines"]
+
+LONGEST_SIGNATURE = 64
+"""First bytes of a file that are looked at."""
+
+
+class FileFormat(ABC):
+    """A format whose files hold sheets of cells; a new one is one subclass in one file.
+
+    Files of no such format are read as text.
+    """
+
+    entry_point_group: ClassVar[str] = "tissuq.file_formats"
+    name: ClassVar[str]
+    signature: ClassVar[bytes]
+    """First bytes of every file of this format."""
+
+    @abstractmethod
+    def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
+        """Return the lines of every sheet by the sheet's name, with tabs between cells and decimal points.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be opened, or a library that reads it is not installed.
+        """
+
+
+def file_format(path: str | os.PathLike[str]) -> FileFormat | None:
+    """Return the format whose files begin like this one; None for a text, and for a file that cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            start = file.read(LONGEST_SIGNATURE)
+    except (OSError, ValueError):
+        return None
+    kinds = dict.fromkeys([*variants(FileFormat).values(), *plugins(FileFormat)])
+    return next((kind() for kind in kinds if start.startswith(kind.signature)), None)
+
+
+def sheet_lines(
+    path: str | os.PathLike[str], sheets: dict[str, list[str]], sheet: str | int | None
+) -> tuple[str, list[str]]:
+    """Return the name and the lines of a sheet; without a choice, of the only one that holds a table.
+
+    Raises
+    ------
+    InputError
+        When there is no such sheet, or none or several hold tables.
+    """
+    name = _sheet_named(path, list(sheets), sheet) if sheet is not None else _only_sheet_with_table(path, sheets)
+    return name, sheets[name]
+
+
+def _sheet_named(path: str | os.PathLike[str], names: list[str], sheet: str | int) -> str:
+    text = str(sheet)
+    if text in names:
+        return text
+    if text.isdecimal() and 1 <= int(text) <= len(names):
+        return names[int(text) - 1]
+    raise InputError(f"{path} has no sheet '{sheet}'. The sheets are: {', '.join(map(repr, names))}.")
+
+
+def _only_sheet_with_table(path: str | os.PathLike[str], sheets: dict[str, list[str]]) -> str:
+    tables = [name for name, lines in sheets.items() if find_layout([line for line in lines if line.strip()], "\t")]
+    if not tables:
+        raise InputError(
+            f"{path} holds no sheet with a table of numbers (cells shown as percentages are not read as numbers). The "
+            f"sheets are: {', '.join(map(repr, sheets))}."
+        )
+    if len(tables) > 1:
+        raise InputError(
+            f"{path}: several sheets hold tables: {', '.join(map(repr, tables))}. Say which: sheet='{tables[0]}' "
+            f"(--sheet '{tables[0]}')."
+        )
+    return tables[0]
