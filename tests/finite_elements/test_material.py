@@ -225,6 +225,7 @@ def test_a_cube_under_tension_has_the_engineering_stress_of_its_draw(draws):
         assert force == pytest.approx(expected, rel=1e-4)  # the volume gives way by about 1e-5
 
 
+@pytest.mark.finite_elements
 def test_newtons_method_converges_quadratically(draws):
     felupe = pytest.importorskip("felupe", reason="FElupe is not installed")
     modulus = distortional_energy(draws[1]).initial_shear_modulus
