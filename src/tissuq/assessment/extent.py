@@ -309,10 +309,10 @@ def _even(states: States) -> States:
         unique = np.unique(points, axis=0)
         different.append(unique[np.argsort(path.abscissa(unique), kind="stable")])
     ends = np.cumsum([len(points) for points in different])
-    chosen = np.linspace(0, ends[-1] - 1, min(int(ends[-1]), MAX_SHARE_POINTS)).astype(int)
+    indices = np.linspace(0, ends[-1] - 1, min(int(ends[-1]), MAX_SHARE_POINTS)).astype(int)
     starts = ends - [len(points) for points in different]
     points = [
-        unique[chosen[(start <= chosen) & (chosen < end)] - start]
+        unique[indices[(start <= indices) & (indices < end)] - start]
         for unique, start, end in zip(different, starts, ends, strict=True)
     ]
     return States(states.paths, tuple(points), states.curves)

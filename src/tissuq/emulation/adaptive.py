@@ -69,7 +69,7 @@ def calibrated(
     problem : Problem
     run : callable
         Function that runs the forward model.
-    settings : Choices
+    settings : EmulationSettings
     emulator : Emulator, optional
         An earlier emulator of the same model at the same controls, in place of the run plan.
     """

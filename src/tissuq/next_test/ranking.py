@@ -48,7 +48,7 @@ def rank_tests(
     ----------
     solution : Solution
     candidates : sequence of str or Candidate
-        The usual ones (`usual_candidates`) where there are none; the tests of the data again are always among them.
+        The default ones (`default_candidates`) where there are none; the tests of the data again are always among them.
     targets : sequence of str or Target
         The initial shear modulus where there are none.
     points : sequence of int

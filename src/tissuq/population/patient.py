@@ -73,8 +73,8 @@ def patient_posterior(
     """
     full = complete.model
     used = {p.symbol for p in (*full.material.parameters, *full.noise.parameters)}
-    chosen = {symbol: prior for symbol, prior in full.chosen_priors.items() if symbol in used}
-    model = StatisticalModel(full.experiment, full.material, NoDiscrepancy(), full.noise, chosen)
+    chosen_priors = {symbol: prior for symbol, prior in full.chosen_priors.items() if symbol in used}
+    model = StatisticalModel(full.experiment, full.material, NoDiscrepancy(), full.noise, chosen_priors)
     chains, draws, count, size = hierarchy.specimens.shape
     on_line, values = hierarchy.specimens.reshape(-1, count, size), np.empty((chains * draws, len(model.symbols)))
     for i, posterior in enumerate(posteriors):

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.population.labelled import labelled
 from tissuq.population.likelihoods import Coordinates
 from tissuq.population.patient import matching_draws, patient_curves, patient_posterior
 from tissuq.posterior.posterior import Posterior
@@ -272,7 +271,7 @@ class Population:
         unseen = np.isnan(stresses).all(axis=0)
         if unseen.any():
             raise InputError(
-                f"no specimen was measured at {loading.controls[0].name} {points[unseen][0]:g},so that the model "
+                f"no specimen was measured at {loading.controls[0].name} {points[unseen][0]:g}, so that the model "
                 "error there is unknown: predict nearer to the data, or with discrepancy=False."
             )
         low, median, high = np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
@@ -285,6 +284,8 @@ class Population:
         Groups posterior (of the population and the specimens), new_patient, no_pooling, complete_pooling,
         observed_data and constant_data.
         """
+        from tissuq.population.hierarchy import labelled
+
         labels: dict[str, str | float] = {
             "spread_prior": f"half-normal({self.spread_prior:g})",
             "seed": self.seed,

@@ -187,7 +187,7 @@ def write_prediction_run(
 
     Parameters
     ----------
-    found : Prediction
+    prediction : Prediction
     settings : PredictionSettings
         From which it came.
     folder : Path

@@ -48,9 +48,9 @@ def load(path: str | Path, discrepancy: str | Discrepancy | None = None, materia
     >>> import tissuq as tq
     >>> posterior = tq.load("runs/brain", discrepancy="auto")  # doctest: +SKIP
     """
-    place = Path(path)
-    own = discrepancy if isinstance(discrepancy, Discrepancy) else None
-    return Posterior.load(place if place.is_file() else _file_in(place, discrepancy), material, own)
+    file = Path(path)
+    user_discrepancy = discrepancy if isinstance(discrepancy, Discrepancy) else None
+    return Posterior.load(file if file.is_file() else _file_in(file, discrepancy), material, user_discrepancy)
 
 
 def load_run(
@@ -133,7 +133,7 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None) -> Path:
     name = discrepancy.name if isinstance(discrepancy, Discrepancy) else discrepancy
     name = name or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in files:
-        known = ", ".join(names)
+        available = ", ".join(names)
         what = f"has no discrepancy '{name}'" if name else "has several discrepancies"
-        raise InputError(f"run '{run}' {what}: choose one of {known}.")
+        raise InputError(f"run '{run}' {what}: choose one of {available}.")
     return files[name]

@@ -78,15 +78,15 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"configuration file '{path}' is not TOML: {error}.") from error
 
 
-def _check_inside(recipe: Path, given: Any) -> None:
+def _check_inside(recipe: Path, settings: Any) -> None:
     """Refuse the recipe of a run that names files outside of the run's folder: a run holds copies of them."""
     folder = recipe.parent.resolve()
-    for name, value in given.items() if isinstance(given, dict) else ():
-        for each in value if isinstance(value, list) else [value]:
-            _check_inside(recipe, each)
-            if name in ("file", "files") and isinstance(each, str) and not _is_inside(folder / each, folder):
+    for name, value in settings.items() if isinstance(settings, dict) else ():
+        for entry in value if isinstance(value, list) else [value]:
+            _check_inside(recipe, entry)
+            if name in ("file", "files") and isinstance(entry, str) and not _is_inside(folder / entry, folder):
                 raise InputError(
-                    f"{recipe} names the file '{each}', which does not lie in the folder of that run. Give the file "
+                    f"{recipe} names the file '{entry}', which does not lie in the folder of that run. Give the file "
                     f"itself, or call the configuration another name than {RECIPE} if it is your own."
                 )
 

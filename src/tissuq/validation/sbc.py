@@ -101,11 +101,11 @@ class SbcSettings(BaseModel):
                     raise ValueError(f"'{formulation}' needs proper priors of {', '.join(missing)} to be drawn from")
                 for noise in self.noise:
                     self.model(formulation, noise)
-            known = parameters_of(self.formulations, material_named(self.material))
-            for symbol in self.priors.keys() - known - PRIORS.keys():
+            symbols = parameters_of(self.formulations, material_named(self.material))
+            for symbol in self.priors.keys() - symbols - PRIORS.keys():
                 raise ValueError(
                     f"priors: there is no parameter '{symbol}'; those of the material, the formulations and the noise "
-                    f"are {', '.join(sorted(known))}"
+                    f"are {', '.join(sorted(symbols))}"
                 )
         except TissuqError as error:
             raise ValueError(str(error)) from error

@@ -82,7 +82,7 @@ def parameters_of(formulations: Sequence[str], material: Material = PLAIN) -> se
     """Return the symbols of all parameters that the fits of a campaign may have."""
     parameters = [*material.parameters, *noise_named("unknown").parameters]
     for formulation in formulations:
-        parameters += [each for part in parts_of(formulation) for each in discrepancy_named(part).parameters]
+        parameters += [p for name in parts_of(formulation) for p in discrepancy_named(name).parameters]
     return {parameter.symbol for parameter in parameters}
 
 

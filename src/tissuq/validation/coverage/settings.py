@@ -172,11 +172,11 @@ class CoverageSettings(BaseModel):
                     except TissuqError as error:
                         combination = f"design {design.label} with '{formulation}' and {noise} noise"
                         raise ValueError(f"{combination}: {error}") from error
-        known = parameters_of(self.formulations)
-        for symbol in self.priors.keys() - known:
+        symbols = parameters_of(self.formulations)
+        for symbol in self.priors.keys() - symbols:
             raise ValueError(
                 f"priors: there is no parameter '{symbol}'; those of the formulations and the noise are "
-                f"{', '.join(sorted(known))}"
+                f"{', '.join(sorted(symbols))}"
             )
         return self
 
