@@ -232,9 +232,9 @@ def export(
     source = f"run {run.resolve().name} of tissuq fit, {sampling} draws from seed {seed}"
     cards = write_cards(ensemble, target, format, force=force, source=source, **settings)
     print_explanations(cards.warnings)
-    files, typical = list(cards.files), min(cards.index, key=lambda row: row["from_median"])
+    files, distances = list(cards.files), [row["from_median"] for row in cards.index]
     print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
-    print(f"The most typical draw, nearest to the median stresses: {typical['file']}")
+    print(f"The most typical draw, nearest to the median stresses: {files[distances.index(min(distances))]}")
 
 
 def compare(

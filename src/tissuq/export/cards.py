@@ -135,7 +135,7 @@ class Cards:
     files : mapping of str to str
         Texts by the names of the files, one for each draw.
     index : tuple of mappings
-        A row for each draw: its file, parameters, constants, and how far its card is from the draw.
+        A row for each draw, in the order of the files: parameters, constants, and how far its card is from the draw.
     warnings : tuple of str
         Sentences that the user must read: the law of the cards, its errors, and cards that are not stable.
     """

@@ -16,7 +16,6 @@ from tissuq.export.cards import (
     CardFormat,
     Cards,
     CardSettings,
-    distances_from_median,
     draw_row,
     ensemble_lines,
     file_name,
@@ -121,7 +120,7 @@ class FECode(CardFormat):
         values = judged.law.scaled(settings.factor).values
         common = [*ensemble_lines(ensemble, settings), *self._law_lines(judged, settings)]
         files, index = {}, []
-        for draw_index, (modulus, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
+        for draw_index, modulus in enumerate(shear):
             constants = judged.form.constants(judged.law.material, values[draw_index])
             bulk = settings.bulk(float(modulus), float(shear.mean()))
             card = Card(judged.form, constants, float(modulus), bulk, settings.name, settings.system.water_density)
@@ -130,7 +129,7 @@ class FECode(CardFormat):
             draw = ensemble[draw_index]
             row = {"file": file_name(ensemble, draw_index, self.suffix), **draw_row(draw, settings, card.shear)}
             row |= {"bulk_modulus": bulk, "form": judged.form.keyword, **_prefixed(constants)}
-            row |= _errors(errors) | {"card_is_stable": bool(judged.stable[draw_index]), "from_median": float(distance)}
+            row |= _errors(errors) | {"card_is_stable": bool(judged.stable[draw_index])}
             lines = [f"draw {draw_index + 1} of {len(ensemble)}: {words_of(draw, settings)}", *common]
             lines += self._error_lines(errors, judged.is_exact, bool(judged.stable[draw_index]))
             files[str(row["file"])] = self.wrapped(self._commented(lines), self.text(card))

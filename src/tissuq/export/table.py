@@ -11,7 +11,6 @@ from tissuq.export.cards import (
     CardFormat,
     Cards,
     CardSettings,
-    distances_from_median,
     draw_row,
     ensemble_lines,
     file_name,
@@ -47,12 +46,12 @@ class Table(CardFormat):
             f"stresses, W1 and W2 in {settings.unit}; W1 = dW/dI1, W2 = dW/dI2; incompressible; no projection",
         ]
         files, index = {}, []
-        for draw_index, (modulus, distance) in enumerate(zip(shear, distances_from_median(ensemble), strict=True)):
+        for draw_index, modulus in enumerate(shear):
             name = file_name(ensemble, draw_index, ".csv")
             heading = [f"draw {draw_index + 1} of {len(ensemble)}: {words_of(ensemble[draw_index], settings)}", *common]
             files[name] = _table(heading, _rows(states, stress[draw_index]))
             row = draw_row(ensemble[draw_index], settings, float(modulus))
-            index.append({"file": name, **row, "from_median": float(distance)})
+            index.append({"file": name, **row})
         note = "The tables are exact: W1 and W2 of material and discrepancy at states whose invariants were measured."
         return Cards(files, tuple(index), (note,))
 

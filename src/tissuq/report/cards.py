@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tissuq.export import Cards, CardSettings, card_format
+from tissuq.export.cards import distances_from_median
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.report.run_folder import run_folder
 
@@ -40,7 +42,7 @@ def write_cards(
     Returns
     -------
     Cards
-        Texts, rows of the index, and warnings.
+        Texts, rows of the index with the distance of every draw from the median stresses, and warnings.
 
     Raises
     ------
@@ -63,6 +65,8 @@ def write_cards(
     """
     with run_folder(Path(folder), force=force) as scratch:
         cards = card_format(format).cards(ensemble, CardSettings(**settings))
+        pairs = zip(cards.index, distances_from_median(ensemble).tolist(), strict=True)
+        cards = replace(cards, index=tuple({**row, "from_median": distance} for row, distance in pairs))
         for name, text in cards.files.items():
             (scratch / name).write_text(text, encoding="utf-8")
         with (scratch / INDEX).open("w", encoding="utf-8", newline="") as file:
