@@ -8,7 +8,7 @@ import tissuq as tq
 from against import neo_hookean, uniform_priors
 from dense import Axis, Linear, integrate, problem_of
 from tissuq.inference.densities import conditional_density
-from tissuq.inference.enumerators.sampled import _Given
+from tissuq.inference.enumerators.sampled import _ConditionalDraws
 from tissuq.model.statistical_model import StatisticalModel
 
 
@@ -20,7 +20,9 @@ def test_samplers_draw_the_linear_parameters_within_several_bounds():
     kinds = tq.materials()["neo-hookean"](), tq.discrepancies()["yeoh"]()
     priors = uniform_priors(linear, {"S": Axis(0, 3, 0.01)})
     model = StatisticalModel(tq.Experiment("uniaxial", stretch, stress), *kinds, 0.02, priors)
-    _, drawn = _Given(model, *conditional_density(model), np.full((4, 125, 1), 0.06)).mixture_and_draws(seed=1)
+    _, drawn = _ConditionalDraws(model, *conditional_density(model), np.full((4, 125, 1), 0.06)).mixture_and_draws(
+        seed=1
+    )
     # S = 0.06 beside a noise of 0.02 is a noise of their root sum of squares without S.
     problem = problem_of("yeoh", stretch, stress, linear, {}, float(np.hypot(0.02, 0.06)))
     for index, symbol in enumerate(model.linear):
