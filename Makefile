@@ -1,4 +1,4 @@
-# tissuq: `make demo` shows what it does, `make test` tests it in five minutes, `make test-all` runs every test. All make their own environment in .venv.
+# tissuq: `make demo` shows what it does, `make test` runs the quick tests, `make test-all` runs every test. All make their own environment in .venv.
 
 PYTHON ?= python3
 VENV := .venv
@@ -24,7 +24,7 @@ demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain 
 	@echo "  the paper's study:  $(abspath $(RUNS))/paper/report.html"
 	@echo "  human brain cortex: $(abspath $(RUNS))/brain/report.html"
 
-test: $(VENV)/.installed-dev  ## Run the quick tests (five minutes on two cores)
+test: $(VENV)/.installed-dev  ## Run the quick tests (ten minutes on two cores, less when compiled functions are kept)
 	$(PYTEST) -m 'not ($(LONG))'
 
 test-rest: $(VENV)/.installed-dev  ## Run the tests that `make test` leaves out
