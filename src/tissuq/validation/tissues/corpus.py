@@ -125,7 +125,7 @@ def _read_set(file: Path, tissue_class: str) -> TissueSet:
         names = dict(zip(labels, (str(value) for value in values), strict=True))
         try:
             tests += _sides(_test(loading_mode(names["mode"]), names, rows))
-        except TissuqError as error:
+        except (TissuqError, ValueError) as error:  # a cell that is no number
             raise InputError(f"{file}, test {' '.join(names.values())}: {error}") from error
     return TissueSet(file.stem, tissue_class, tuple(test for test in tests if len(test) >= MIN_POINTS))
 
