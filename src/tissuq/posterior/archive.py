@@ -20,13 +20,13 @@ from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.mechanics import Material
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.posterior.netcdf import Group, LabelledGroup, read_groups
+from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
 from tissuq.posterior.recorded_model import TESTS, model_groups, recorded_model
 from tissuq.posterior.solver import Solver
 
 __all__ = ["read_modes", "read_solution", "solution_groups"]
 
-FORMAT = 1
+FORMAT = 2
 """Version of the groups; of another one nothing is known."""
 FIT, SOLUTION, MIXTURE, WIDE_MIXTURE, MARGINALS = "fit", "solution", "mixture", "wide_mixture", "marginals"
 STABILITY = ("stable_in", "stable_share", "stable_prior_share")
@@ -102,11 +102,9 @@ def read_modes(path: Path) -> list[str]:
     InputError
         When there is no such file, or it holds no posterior.
     """
-    import h5netcdf
-
     try:
-        with h5netcdf.File(path, "r") as file:
-            return sorted({str(test.attrs["mode"]) for test in file.groups[FIT].groups[TESTS].groups.values()})
+        with opened(path) as file:
+            return sorted({str(test.attrs["mode"]) for test in file[FIT][TESTS].values()})
     except Exception as error:  # as in `read_solution`
         raise InputError(
             f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again."
