@@ -25,7 +25,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
-from tissuq.posterior.labelled import labelled_arrays, labels_of, summary_table
+from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
@@ -261,7 +261,10 @@ class Posterior:
             Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
             when the posterior was sampled.
         """
-        return summary_table(self.solution, prob, parameters)
+        import pandas as pd
+
+        rows = summaries(self.solution, prob, parameters)
+        return pd.DataFrame(list(rows.values()), pd.Index(list(rows), name="parameter"))
 
     def predict(
         self,
@@ -407,7 +410,7 @@ class Posterior:
 
     @cached_property
     def _groups(self) -> dict[str, LabelledGroup]:
-        headline = self.summary(parameters=[self.model.headline]).to_dict("records")[0]
+        headline = summaries(self.solution, parameters=[self.model.headline])[self.model.headline]
         labels = labels_of(self.solution, self.seed, headline)
         return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed)
 

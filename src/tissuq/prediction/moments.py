@@ -32,6 +32,7 @@ __all__ = [
     "mean_stress",
     "stress_moments",
     "values_of",
+    "variance_of_noise",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -171,12 +172,19 @@ def stress_moments(
             mean[rows] += shift
             root[rows] += spread
             extra[rows] += variance
-    level = np.abs(mean)
     if discrepancy:
         extra += model.independent_variance(values)
     if noise:
-        extra += model.noise_variance(values, level) * model.relative_noise(states) ** 2
+        extra += variance_of_noise(model, components, states, mean)
     return mean, extra + np.einsum("mgp,mgp->mg", root, root)
+
+
+def variance_of_noise(
+    model: StatisticalModel, components: GaussianMixture, states: States, mean: FloatArray
+) -> FloatArray:
+    """Return the variance of the noise at states (g,) where the mean stress is known (M, g), for every component."""
+    values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
+    return np.asarray(model.noise_variance(values, np.abs(mean)) * model.relative_noise(states) ** 2)
 
 
 def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
