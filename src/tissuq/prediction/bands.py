@@ -30,7 +30,6 @@ __all__ = [
     "predict_band",
     "predict_bands",
     "predictive_mixtures",
-    "share_inside",
     "speaks_of",
     "stress_ratio",
 ]
@@ -294,13 +293,6 @@ def stress_ratio(stress_type: str, mode: str | LoadingMode, channel: int) -> Cal
     if stress_type == "engineering":
         return lambda points: np.ones(len(points))
     return loading_mode(mode).paths[channel].cauchy_ratio
-
-
-def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
-    """Return the share of the measurements inside the predictive band at their own stretches."""
-    options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob}
-    inside = [inside_band(solution, curve, **options) for curve in solution.model.experiment.curves]
-    return float(np.mean(np.concatenate(inside)))
 
 
 def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: float = 0.95) -> NDArray[np.bool_]:

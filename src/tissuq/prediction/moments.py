@@ -170,7 +170,7 @@ def stress_moments(
     if discrepancy and components.member is not None:
         for shift, spread, variance, rows in _energies(model, components, states):
             mean[rows] += shift
-            root[rows] += spread
+            root[rows, :, : spread.shape[2]] += spread
             extra[rows] += variance
     if discrepancy:
         extra += model.independent_variance(values)
@@ -251,9 +251,10 @@ def conditioned_jointly(
 def _energies(
     model: StatisticalModel, components: GaussianMixture, states: States
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
-    """Yield means (N, g), roots (N, g, p) and further variances (N, g) of energy discrepancies, and whose they are.
+    """Yield means (N, g), roots (N, g, q) and further variances (N, g) of energy discrepancies, and whose they are.
 
-    What the terms that serve the data leave of the discrepancy elsewhere is independent of the data.
+    Beyond q the roots are zero. What the terms that serve the data leave of the discrepancy elsewhere is independent of
+    the data.
     """
     for member, rows, features, weights in _energy_terms(model, components, states):
         unexplained = [
@@ -263,7 +264,9 @@ def _energies(
         symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.amplitude_indices]
         all_terms = side_by_side(features, len(states))
         variance = components.settings[rows][:, symbols] ** 2 @ np.reshape(unexplained, (-1, len(states)))
-        yield components.mean[rows, weights] @ all_terms.T, all_terms @ components.root[rows, weights], variance, rows
+        root = components.root[rows, weights]
+        width = int(np.flatnonzero(root.any(axis=(0, 1))).max(initial=-1)) + 1
+        yield components.mean[rows, weights] @ all_terms.T, all_terms @ root[:, :, :width], variance, rows
 
 
 def _drawn_energies(
