@@ -11,7 +11,7 @@ import pytest
 import tissuq as tq
 from tissuq import registry
 from tissuq.experiments.modes import loading_mode
-from tissuq.experiments.modes.one_stretch import Uniaxial
+from tissuq.experiments.modes.one_control import Uniaxial
 from tissuq.experiments.reading import FileFormat
 from tissuq.export.cards import CardFormat, card_format
 from tissuq.finite_elements import Case, ClampedBar

@@ -70,3 +70,20 @@ def test_a_campaign_shows_progress_and_time_left_on_a_terminal(here):
     shown = os.read(reader, 100_000).decode("utf-8", "replace")
     assert "2/2" in shown
     assert "left, none" in shown
+
+
+def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, here):
+    arguments = ("study", "tissues", "--dataset", "brain-cortex", "--formulation", "none", "--protocol", "tests")
+    said = cli(*arguments, "--out", "out")
+    assert said.status == 0
+    assert "Predictions of real tests" in said.out
+    page = (here / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Each test from the others of its set" in page
+    assert {"summary.csv", "predictions.csv", "run.toml"} <= {file.name for file in (here / "out").iterdir()}
+    assert cli("study", "tissues", "--config", here / "out" / "run.toml", "--out", "out").status == 0
+    refused = cli(*arguments, "--protocol", "test", "--out", "other")
+    assert refused.status == 2
+    assert "there is no protocol 'test'; choose from tests, modes, specimens, ends, halves" in " ".join(
+        refused.err.split()
+    )
+    assert not (here / "other").exists()

@@ -160,7 +160,7 @@ def test_a_law_in_a_file_can_be_part_of_a_sum(laws):
 def test_another_package_adds_a_material_through_an_entry_point(monkeypatch):
     points = EntryPoints(
         [
-            EntryPoint("from-elsewhere", "tissuq.mechanics.laws.gent:Gent", tq.Material.entry_point_group),
+            EntryPoint("from-elsewhere", "tissuq.mechanics.laws.limiting_chains:Gent", tq.Material.entry_point_group),
             EntryPoint("lost", "no_such_module:Law", tq.Material.entry_point_group),
         ]
     )

@@ -161,6 +161,44 @@ def sbc(
     print(f"Report: {folder / 'report.html'}")
 
 
+@study.command("tissues")
+def tissues(
+    folder: Annotated[
+        Path | None, typer.Argument(help="Folder with a CSV file for each set of tests [the sets of tissuq].")
+    ] = None,
+    config: CampaignConfig = None,
+    out: Out = None,
+    dataset: Annotated[list[str] | None, typer.Option(help="A set to take; repeat for more [all of them].")] = None,
+    protocol: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What is predicted: tests, modes, specimens, ends, halves; repeat for more [tests, specimens, ends]."
+        ),
+    ] = None,
+    formulation: Annotated[list[str] | None, typer.Option(help="A discrepancy; repeat for more [auto, none].")] = None,
+    material: Annotated[str | None, typer.Option(help="The material that is fitted [neo-hookean].")] = None,
+    predictions: Annotated[int | None, typer.Option(help="Predictions at most of a set and protocol [12].")] = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+) -> None:
+    """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
+    from tissuq.cli.tables import print_rows
+    from tissuq.report.tissues import readable_tissues, write_tissues
+    from tissuq.validation.tissues import TissueSettings, run_benchmark
+    from tissuq.validation.tissues.benchmark import tasks_of
+
+    options: dict[str, Any] = {
+        "folder": None if folder is None else str(folder.resolve()), "sets": dataset or None,
+        "protocols": protocol or None, "formulations": formulation or None, "material": material,
+        "predictions": predictions,
+    }  # fmt: skip
+    settings = load_settings(TissueSettings, config, options)
+    target = out or Path("runs") / (config.stem if config else "tissues")
+    results = _carry_out(settings, target, workers, scheduler, len(tasks_of(settings)), run_benchmark)
+    print_rows("Predictions of real tests", *readable_tissues(write_tissues(settings, results, target)))
+    print(f"Report: {target / 'report.html'}")
+
+
 def _with_preset(name: str | None, options: dict[str, Any]) -> dict[str, Any]:
     from tissuq.validation.coverage import preset
 

@@ -266,6 +266,13 @@ class Experiment:
         """Return the same measurements with another name, source, stress_unit or specimen."""
         return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
 
+    def where(self, selected: NDArray[Any]) -> Experiment:
+        """Return only some measurements of a test: a mask (n,), or numbers of its rows."""
+        curves = (
+            replace(curve, points=curve.points[selected], stress=curve.stress[selected]) for curve in self._only_test
+        )
+        return self._of_curves(curves)
+
     def has_measurements_of(self, experiment: Experiment) -> bool:
         """Return whether another experiment has the same curves."""
         return len(self.curves) == len(experiment.curves) and all(

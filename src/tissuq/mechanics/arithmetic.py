@@ -7,15 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tissuq.parameters.parameter import Parameter
-from tissuq.parameters.priors import LogUniform
-
-__all__ = ["LIMIT", "cos", "exp", "expm1", "library", "log", "log_left", "positive_part", "sin", "sqrt"]
-
-LIMIT = Parameter(
-    "Jm", "value of I1 - 3 at which the material locks", "limit", (0.0, float("inf")), False, LogUniform(1.001, 100.0)
-)
-"""A specimen that was stretched so far has its limit beyond: the data set where its support begins."""
+__all__ = ["cos", "exp", "expm1", "library", "log", "log_left", "positive_part", "sin", "sqrt"]
 
 
 def library(value: Any) -> Any:

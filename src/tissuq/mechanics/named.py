@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tissuq.errors import ModelError
 from tissuq.mechanics.laws.fibres import FibreMaterial
-from tissuq.mechanics.laws.ogden import Ogden
 from tissuq.mechanics.laws.polynomial import Rivlin
+from tissuq.mechanics.laws.separable import Ogden
 from tissuq.mechanics.material import Material, MaterialSum
 from tissuq.mechanics.user_law import LAW, as_material, load_material
 from tissuq.registry import find, load_plugins, variants

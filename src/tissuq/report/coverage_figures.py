@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["campaign_figures"]
+__all__ = ["COLORS", "MARKERS", "campaign_figures", "panel_grid"]
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "osD^vP*"
@@ -54,7 +54,7 @@ def _overview(summary: pd.DataFrame, prob: float) -> Figure:
     else:
         panels = [(_labels(rows)[0], list(rows["formulation"]), rows) for _, rows in summary.groupby(CELL, sort=False)]
     tall = max(len(labels) for _, labels, _ in panels)
-    figure, axes = _grid(len(panels), len(measures), 0.75 + 0.24 * tall)
+    figure, axes = panel_grid(len(panels), len(measures), 0.75 + 0.24 * tall)
     for row, (title, labels, table) in zip(axes, panels, strict=True):
         heights = list(range(len(labels)))[::-1]
         for axis, measure in zip(row, measures, strict=True):
@@ -134,7 +134,7 @@ def _shade(values: Any, prob: float) -> Any:
 def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
     """Draw coverage and price over the strength of the model's error, a line a formulation."""
     panels = list(summary.groupby(["design", "noise"], sort=False))
-    figure, axes = _grid(len(panels), 2, 2.6)
+    figure, axes = panel_grid(len(panels), 2, 2.6)
     for row, ((design, noise), table) in zip(axes, panels, strict=True):
         for index, (name, line) in enumerate(table.groupby("formulation", sort=False)):
             style: dict[str, Any] = {"color": COLORS[index % len(COLORS)], "marker": MARKERS[index % len(MARKERS)]}
@@ -159,7 +159,7 @@ def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
     """Draw coverage and error of the true stress in other loading modes, a row of panels a design and noise."""
     panels = list(unseen.groupby(CELL, sort=False))
     names, modes = list(dict.fromkeys(unseen["formulation"])), list(dict.fromkeys(unseen["mode"]))
-    figure, axes = _grid(len(panels), 2, 0.75 + 0.3 * len(names))
+    figure, axes = panel_grid(len(panels), 2, 0.75 + 0.3 * len(names))
     for row, (_, table) in zip(axes, panels, strict=True):
         for index, mode in enumerate(modes):
             rows = table[table["mode"] == mode]
@@ -182,7 +182,7 @@ def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
     return figure
 
 
-def _grid(down: int, across: int, height: float) -> tuple[Figure, list[list[Axes]]]:
+def panel_grid(down: int, across: int, height: float) -> tuple[Figure, list[list[Axes]]]:
     """Return a figure with rows of panels that share their horizontal axes."""
     from matplotlib.figure import Figure
 

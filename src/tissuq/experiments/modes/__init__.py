@@ -2,9 +2,8 @@
 
 from tissuq.experiments.modes.biaxial import Biaxial, ConstrainedUniaxial, ThinTube
 from tissuq.experiments.modes.mode import Control, LoadingMode, loading_mode, loading_modes
-from tissuq.experiments.modes.one_stretch import Equibiaxial, Planar, Uniaxial
+from tissuq.experiments.modes.one_control import Equibiaxial, Planar, SimpleShear, SimpleShearNormal, Uniaxial
 from tissuq.experiments.modes.path import Deformation, Path, States
-from tissuq.experiments.modes.shear import SimpleShear, SimpleShearNormal
 
 __all__ = [
     "Biaxial",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.experiments.modes.mode import Control, LoadingMode
-from tissuq.experiments.modes.one_stretch import Planar
+from tissuq.experiments.modes.one_control import Planar
 from tissuq.experiments.modes.path import Deformation, Path
 
 __all__ = ["Biaxial", "ConstrainedUniaxial", "ThinTube"]

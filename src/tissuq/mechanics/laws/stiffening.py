@@ -1,4 +1,4 @@
-"""Exponential laws of soft tissue: Demiray, Fung, Veronda and Westmann."""
+"""Laws that stiffen by an exponential or a power: Demiray, Fung, Veronda and Westmann, Knowles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tissuq.mechanics.material import Material
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import LogUniform
 
-__all__ = ["Demiray", "Fung", "VerondaWestmann"]
+__all__ = ["Demiray", "Fung", "Knowles", "VerondaWestmann"]
 
 
 def _modulus(law: str) -> Parameter:
@@ -71,3 +71,24 @@ class VerondaWestmann(Material):
     def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
         mu, rate = values
         return mu * (expm1(rate * (I1 - 3)) / rate - 0.5 * (I2 - 3))
+
+
+class Knowles(Material):
+    """W = mu/(2 b) ((1 + b (I1 - 3)/n)^n - 1); initial shear modulus mu.
+
+    n = 1 is neo-Hookean; larger n hardens, smaller n softens, and below 1/2 it loses ellipticity in shear. As n grows
+    it becomes Demiray's exponential with the same b.
+    """
+
+    name = "knowles"
+    formula = "mu/(2 b) ((1 + b (I1 - 3)/n)^n - 1)"
+    source = "Knowles 1977"
+    parameters = (
+        Parameter("mu", "initial shear modulus of Knowles' law", support=(0.0, inf)),
+        Parameter("b", "how fast Knowles' law changes", "rate", (0.0, inf), False, LogUniform(0.01, 20.0)),
+        Parameter("n", "exponent: above one it hardens", "number", (0.0, inf), False, LogUniform(0.5, 10.0)),
+    )
+
+    def strain_energy(self, I1: Any, I2: Any, values: Any) -> Any:
+        mu, rate, exponent = values
+        return 0.5 * mu / rate * ((1 + rate * (I1 - 3) / exponent) ** exponent - 1)

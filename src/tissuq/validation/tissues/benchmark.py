@@ -1,0 +1,226 @@
+"""The benchmark as many small tasks, what each of them gives, and the summary of all by class of tissue."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError, TissuqError
+from tissuq.experiments.experiment import Experiment
+from tissuq.posterior.fitting import fit
+from tissuq.posterior.posterior import Posterior
+from tissuq.prediction.bands import predictive_mixtures, speaks_of
+from tissuq.prediction.scores import interval_score
+from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.validation.tissues.corpus import TissueSet, read_corpus
+from tissuq.validation.tissues.protocols import PROTOCOLS, Split
+from tissuq.validation.tissues.settings import TissueSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["ALL", "PROBABILITIES", "PredictionTask", "predicted", "run_benchmark", "summarise_tissues", "tasks_of"]
+
+FloatArray = NDArray[np.float64]
+
+PROBABILITIES = (0.5, 0.8, 0.95)
+"""Of the intervals whose coverage is counted; the last is that of half widths and scores."""
+TARGET_INSIDE, TARGET_HALF_WIDTH = 0.9, 0.5
+"""Share of the measurements in the band, and half width relative to the stress, that make a prediction useful."""
+MODULUS = ("modulus_low", "modulus_of_predicted", "modulus_high")
+"""Initial shear moduli, MPa: the interval of the fitted tests, and the median of the predicted one between its ends."""
+MODULI = "modes"
+"""The protocol that compares initial shear moduli, too: that of the fitted tests with that of the predicted one."""
+ALL = "all"
+"""The class of all tissues together."""
+
+
+@dataclass(frozen=True)
+class PredictionTask:
+    """A prediction of one test by one formulation, all by their indices but the set, which has a name."""
+
+    tissue: str
+    protocol: str
+    number: int
+    formulation: str
+
+    @property
+    def key(self) -> str:
+        """What tells it from every other task of the benchmark."""
+        return f"{self.tissue}/{self.protocol}/{self.number}/{self.formulation}"
+
+    @property
+    def label(self) -> str:
+        """What is shown while it is carried out."""
+        return f"{self.tissue}, {self.protocol}, {self.formulation}"
+
+
+def tasks_of(settings: TissueSettings) -> list[PredictionTask]:
+    """Return all tasks of a benchmark, in their order.
+
+    Raises
+    ------
+    InputError
+        When data cannot be read, there is no set of a name, or there is nothing to predict.
+    """
+    corpus = _corpus(settings.folder)
+    unknown = [name for name in settings.sets if name not in corpus]
+    if unknown:
+        raise InputError(f"there is no set {', '.join(map(repr, unknown))}. The sets are: {', '.join(corpus)}.")
+    tasks = [
+        PredictionTask(name, protocol, number, formulation)
+        for name in settings.sets or corpus
+        for protocol in settings.protocols
+        for number in _taken(len(_splits(settings.folder, name, protocol)), settings.predictions)
+        for formulation in settings.formulations
+    ]
+    if not tasks:
+        raise InputError(f"the sets hold nothing to predict by the protocols {', '.join(settings.protocols)}.")
+    return tasks
+
+
+def run_benchmark(
+    settings: TissueSettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
+) -> list[dict[str, Any]]:
+    """Carry out what is not done yet of a benchmark, and return the results of all tasks, in their order.
+
+    Parameters
+    ----------
+    settings : TissueSettings
+    folder : Path
+        Exists; holds the results so far, if any.
+    pool : Executor, optional
+        Workers from `tissuq.studies.stream.open_pool`.
+    step : callable
+        Told of every task that is done: its label, and whether it was done now or before.
+    """
+    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
+
+
+def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
+    """Return how one test was predicted; ``failure`` says why, where it was not."""
+    split = _splits(settings.folder, task.tissue, task.protocol)[task.number]
+    fitted = [_thinned(test, settings.points) for test in split.fitted]
+    target = _thinned(split.predicted, settings.points)
+    row: dict[str, Any] = {
+        "tissue": task.tissue,
+        "class": _corpus(settings.folder)[task.tissue].tissue_class,
+        "protocol": task.protocol,
+        "formulation": task.formulation,
+        "fitted": [test.name for test in fitted],
+        "predicted": target.name,
+        "mode": target.mode.name,
+    }
+    try:
+        posterior = fit(fitted, material=settings.material, discrepancy=task.formulation)
+        row |= predicted(posterior, target)
+        if task.protocol == MODULI:
+            own = fit(target, material=settings.material, discrepancy=task.formulation).initial_shear_modulus
+            low, high = posterior.initial_shear_modulus.hdi(PROBABILITIES[-1])
+            row |= {"modulus_low": low, "modulus_high": high, "modulus_of_predicted": float(own.quantile(0.5))}
+        return row
+    except (TissuqError, np.linalg.LinAlgError) as error:
+        return row | {"failure": str(error)}
+
+
+def predicted(posterior: Posterior, test: Experiment) -> dict[str, float]:
+    """Return how a posterior predicts all stresses of a test that it has not seen.
+
+    The band is that of a new test with noise and an error of its own; a discrepancy that says nothing about the test's
+    mode is left out of it. Stresses of zero, which are so by definition, are left out.
+
+    Returns
+    -------
+    dict
+        ``inside_50``, ``inside_80`` and ``inside_95``, the shares of the measurements in central intervals; over the
+        root mean square of the stress those of the half width of the 95 % interval (``half_width``) and of the error of
+        the median (``error``), and the mean interval score (``score``).
+    """
+    model = posterior.model
+    tails = sorted({0.5, *(0.5 + 0.5 * prob for prob in PROBABILITIES), *(0.5 - 0.5 * prob for prob in PROBABILITIES)})
+    measured, quantiles = [], []
+    for curve in test.curves:
+        is_loaded = curve.stress != 0
+        mixtures = predictive_mixtures(
+            [(1.0, posterior.solution)],
+            curve.points[is_loaded],
+            curve.mode,
+            curve.channel,
+            discrepancy=speaks_of(model, curve.mode),
+            noise=True,
+        )
+        measured.append(curve.stress[is_loaded])
+        quantiles += [[mixture.quantile(tail) for tail in tails] for mixture in mixtures]
+    stress, levels = np.concatenate(measured), np.concatenate(quantiles, axis=1)
+    size = _root_mean_square(stress)
+    result = {}
+    for prob, low, high in zip(PROBABILITIES[::-1], levels, levels[::-1], strict=False):
+        result[f"inside_{100 * prob:.0f}"] = float(((low <= stress) & (stress <= high)).mean())
+    low, centre, high = levels[0], levels[len(tails) // 2], levels[-1]
+    return result | {
+        "half_width": _root_mean_square(0.5 * (high - low)) / size,
+        "error": _root_mean_square(centre - stress) / size,
+        "score": float(interval_score(low, high, stress, PROBABILITIES[-1]).mean()) / size,
+    }
+
+
+def summarise_tissues(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Return one row a protocol, class of tissue and formulation, and one of all classes together.
+
+    Columns: ``predictions`` and ``failed``; the means over predictions of ``inside_50``, ``inside_80`` and
+    ``inside_95``; the medians of ``half_width``, ``error`` and ``score``; and ``useful``, the share of predictions with
+    90 % of the measurements in a 95 % band whose half width is less than half of the stress. Where one mode is
+    predicted from another, ``modulus_inside``, the share of 95 % intervals of the fitted tests' initial shear modulus
+    that hold the median of that of the predicted test, and ``modulus_ratio``, the median ratio of their ends.
+    """
+    import pandas as pd
+
+    scores = [*(f"inside_{100 * prob:.0f}" for prob in PROBABILITIES), "half_width", "error", "score"]
+    table = pd.DataFrame(results).reindex(columns=["protocol", "class", "formulation", *scores, *MODULUS])
+    is_useful = (table["inside_95"] >= TARGET_INSIDE) & (table["half_width"] < TARGET_HALF_WIDTH)
+    table["useful"] = is_useful.where(table["inside_95"].notna()).astype(float)
+    low, modulus, high = (table[f"modulus_{name}"] for name in ("low", "of_predicted", "high"))
+    table["modulus_inside"] = ((low <= modulus) & (modulus <= high)).where(modulus.notna()).astype(float)
+    table["modulus_ratio"] = high / low.clip(lower=0)
+    classes = list(dict.fromkeys(table["class"]))
+    parts = [table, table.assign(**{"class": ALL})] if len(classes) > 1 else [table]
+    groups = pd.concat(parts).groupby(["protocol", "class", "formulation"], sort=False)
+    count = groups["inside_95"].count()
+    summary = pd.DataFrame({"predictions": count, "failed": groups.size() - count})
+    for name in (*scores, "useful", "modulus_inside", "modulus_ratio"):
+        summary[name] = groups[name].mean() if "inside" in name or name == "useful" else groups[name].median()
+    order = {name: number for number, name in enumerate([*classes, ALL])}
+    protocols = list(dict.fromkeys(table["protocol"]))
+    rows = summary.reset_index()
+    keys = rows["protocol"].map(protocols.index), rows["class"].map(order.get)
+    return rows.iloc[np.lexsort((np.arange(len(rows)), keys[1], keys[0]))].reset_index(drop=True)
+
+
+@lru_cache(maxsize=1)
+def _corpus(folder: str | None) -> dict[str, TissueSet]:
+    return {tissue.name: tissue for tissue in read_corpus(folder)}
+
+
+@lru_cache
+def _splits(folder: str | None, tissue: str, protocol: str) -> tuple[Split, ...]:
+    return tuple(PROTOCOLS[protocol](_corpus(folder)[tissue].tests))
+
+
+def _taken(count: int, most: int) -> list[int]:
+    """Return numbers below a count, evenly among all where these are too many."""
+    return sorted({int(number) for number in np.linspace(0, count - 1, min(count, most)).round()}) if count else []
+
+
+def _thinned(test: Experiment, points: int) -> Experiment:
+    return test if len(test) <= points else test.where(np.array(_taken(len(test), points)))
+
+
+def _root_mean_square(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,79 @@
+"""What a benchmark on real tissue runs over."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from tissuq.errors import TissuqError
+from tissuq.mechanics import material_named
+from tissuq.model.discrepancy import discrepancy_named
+from tissuq.validation.tissues.protocols import PROTOCOLS
+
+__all__ = ["TissueSettings"]
+
+
+class TissueSettings(BaseModel):
+    """Everything that a benchmark on real tissue depends on, but for the data themselves.
+
+    Attributes
+    ----------
+    folder : str, optional
+        Of the data sets (`tissuq.validation.tissues.read_corpus`); without it those of the package.
+    sets : tuple of str
+        Names of the sets that are taken; all, where there are none.
+    protocols : tuple of str
+        Which tests are predicted from which (`PROTOCOLS`).
+    formulations : tuple of str
+        Discrepancies of the fits.
+    material : str
+    points : int
+        Number of measurements at most that are taken from a test, evenly along it.
+    predictions : int
+        Number of predictions at most for each set and protocol, evenly among all.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    folder: str | None = None
+    sets: tuple[str, ...] = ()
+    protocols: tuple[str, ...] = ("tests", "specimens", "ends")
+    formulations: tuple[str, ...] = ("auto", "none")
+    material: str = "neo-hookean"
+    points: int = Field(30, ge=4, le=10_000)
+    predictions: int = Field(12, ge=1)
+
+    @field_validator("protocols")
+    @classmethod
+    def _known_protocols(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name not in PROTOCOLS:
+                raise ValueError(f"there is no protocol '{name}'; choose from {', '.join(PROTOCOLS)}")
+        return names
+
+    @field_validator("formulations")
+    @classmethod
+    def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(_named(discrepancy_named, name) for name in names)
+
+    @field_validator("material")
+    @classmethod
+    def _known_material(cls, name: str) -> str:
+        return _named(material_named, name)
+
+    @field_validator("protocols", "formulations")
+    @classmethod
+    def _present_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if not names or len(set(names)) < len(names):
+            raise ValueError("give one or more names, each once")
+        return names
+
+
+def _named(find: Any, name: str) -> str:
+    """Return a name that something has, or explain that nothing has."""
+    try:
+        find(name)
+    except TissuqError as error:
+        raise ValueError(str(error)) from error
+    return name
