@@ -74,7 +74,9 @@ def test_an_exponent_is_integrated():
     assert table.loc["alpha1", "sd"] == pytest.approx(sd, rel=0.05)
 
 
+@pytest.mark.slow
 def test_proportional_noise_is_integrated():
+    """The short version is that of a narrow prior of the share, below."""
     level = stress_level(DATA)
     noises, shares = np.linspace(1e-4, 0.2, 50), np.linspace(1e-4, 0.3, 50)
     values = [[conditional(UNIT, s + share * level, 2)[:2] for share in shares] for s in noises]

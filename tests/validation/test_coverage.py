@@ -256,8 +256,10 @@ def test_wrong_settings_are_refused(wrong, words):
         small(**wrong)
 
 
-def test_a_scheduler_that_does_not_answer_is_told():
-    pytest.importorskip("distributed")
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    client = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout="0.5s"))
     with pytest.raises(InputError, match="no Dask scheduler answers"), open_pool(scheduler="tcp://127.0.0.1:1"):
         pass
 
