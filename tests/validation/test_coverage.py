@@ -192,10 +192,12 @@ def test_the_error_of_a_median_is_that_of_medians_of_normal_samples():
     assert found.iloc[0]["width_error"] == pytest.approx(expected, rel=0.15)  # four standard errors
 
 
-def test_the_right_model_covers_as_often_as_it_says(tmp_path):
-    found = run_campaign(small(families=["yeoh"], formulations=["yeoh"], replicates=400), tmp_path)
-    row = summarise(small(families=["yeoh"], formulations=["yeoh"], replicates=400), found).iloc[0]
-    chance = 4.3 * np.sqrt(0.95 * 0.05 / 400)  # two-sided 2e-5; S makes intervals a little wider than they need be
+@pytest.mark.parametrize("replicates", [100, pytest.param(400, marks=pytest.mark.statistical)])
+def test_the_right_model_covers_as_often_as_it_says(tmp_path, replicates):
+    """A correct 95 % fails about once in 1e4 cases; 0.80 passes with 100 data sets in 8 %, 0.88 with 400 in 7 %."""
+    settings = small(families=["yeoh"], formulations=["yeoh"], replicates=replicates)
+    row = summarise(settings, run_campaign(settings, tmp_path)).iloc[0]
+    chance = 4.3 * np.sqrt(0.95 * 0.05 / replicates)  # S makes intervals a little wider than they need be
     assert 0.95 - chance < row["coverage"]
 
 
