@@ -26,6 +26,12 @@ def paper():
     return PaperSettings()
 
 
+@pytest.fixture
+def one_range(monkeypatch):
+    """Leave out the study's other stretch ranges, of which `paper_run` in the tests of the command line has all."""
+    monkeypatch.setattr("tissuq.validation.paper.study.RANGES", ())
+
+
 @pytest.fixture(scope="session")
 def boxes(paper):
     """The paper's uniform priors as (low, high)."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import pytest
+import typer.main
 
 from tissuq.cli import main
 
@@ -29,6 +33,14 @@ Cli = Callable[..., Outcome]
 STRETCH = [0.8, 0.9, 1.1, 1.2, 1.3, 1.4]
 STRESS_KPA = [-75.25, -33.06, 27.86, 49.31, 70.83, 88.48]
 """100 (l - l^-2) kPa, C10 = 50 kPa, with errors of +1, 0, 0.5, -1.25, 0 and -0.5 kPa rounded to 0.01."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_parser():
+    """Build the parser of the command line once, as every process of a person does."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", functools.cache(typer.main.get_command))
+        yield
 
 
 @pytest.fixture
@@ -74,6 +86,18 @@ def command(*arguments: object, folder: Path) -> Outcome:
     return Outcome(done.returncode, done.stdout, done.stderr)
 
 
+def run_in(folder: Path, *arguments: object) -> Outcome:
+    """Run ``tissuq ARGUMENTS`` in this process, in a folder: for fixtures that outlive a test."""
+    out, err = StringIO(), StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.chdir(folder)
+        patch.setenv("COLUMNS", "80")
+        patch.setattr(sys, "argv", ["tissuq", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+    return Outcome(int(end.value.code or 0), out.getvalue(), err.getvalue())
+
+
 def tree(folder: Path) -> dict[str, bytes | None]:
     """Return every file and folder in a folder, hidden ones too, with the bytes of the files."""
     return {
@@ -83,10 +107,10 @@ def tree(folder: Path) -> dict[str, bytes | None]:
 
 @pytest.fixture(scope="session")
 def paper_run(tmp_path_factory):
-    """A small run of the paper's study with figures, in a process of its own: its folder and what was said."""
+    """A small run of the paper's study with figures: its folder and what was said."""
     folder = tmp_path_factory.mktemp("paper")
     options = ["--points", 12, "--noise-sd", 0.4, "--seed", 7, "--prior", "c=uniform(0,2)"]
-    said = command("paper", *options, "--out", "run", folder=folder)
+    said = run_in(folder, "paper", *options, "--out", "run")
     assert said.status == 0, said.err
     return folder / "run", said
 

@@ -170,7 +170,11 @@ def test_a_column_called_stretch_is_not_taken_for_a_strain(cli, here):
         (["--config", "few.toml"], "3 measurements for 4 parameters"),
         (["--config", "unknown.toml"], "replicats"),
         (["--preset", "sbc", "--replicates", "5"], "greater than or equal to 20"),
-        (["--preset", "strength", "--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler answers"),
+        pytest.param(
+            ["--preset", "strength", "--scheduler", "tcp://127.0.0.1:1"],
+            "no Dask scheduler answers",
+            marks=pytest.mark.slow,  # the message itself is held in tests/validation/test_coverage.py
+        ),
     ],
 )
 def test_a_campaign_refuses_bad_options_before_anything_is_written(cli, here, arguments, words):

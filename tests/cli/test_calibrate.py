@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from .conftest import command, tree
+from .conftest import command, run_in, tree
 
 MODEL = """
 import numpy as np
@@ -41,7 +41,7 @@ def calibrate_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("calibrate")
     write_all(folder)
     options = [*USUAL, "--discrepancy", "gp-pinned", "--out", "run"]
-    said = command("calibrate", "punch.csv", "--forward", "force.py:force", *options, folder=folder)
+    said = run_in(folder, "calibrate", "punch.csv", "--forward", "force.py:force", *options)
     assert said.status == 0, said.err
     return folder, said
 

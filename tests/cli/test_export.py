@@ -10,7 +10,7 @@ import pytest
 import tissuq as tq
 from tissuq.export import card_formats
 
-from .conftest import command, tree, write_specimen
+from .conftest import run_in, tree, write_specimen
 
 FREE = "auto"
 
@@ -21,7 +21,7 @@ def earlier(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
     write_specimen(folder / "specimen.csv")
     chosen = [word for name in (FREE, "none", "gp") for word in ("--discrepancy", name)]
-    said = command("fit", "specimen.csv", *chosen, "--noise-sd", 1, "--no-figures", folder=folder)
+    said = run_in(folder, "fit", "specimen.csv", *chosen, "--noise-sd", 1, "--no-figures")
     assert said.status == 0, said.err
     return folder / "runs" / "specimen"
 

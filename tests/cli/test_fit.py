@@ -1,4 +1,5 @@
 import csv
+import shutil
 import tomllib
 
 import numpy as np
@@ -242,8 +243,8 @@ def test_show_prints_the_study_of_the_paper(cli, paper_run):
     ],
     ids=str,
 )
-def test_show_refuses_a_folder_that_is_not_a_complete_run(cli, here, specimen, damage):
-    cli("fit", specimen, "--noise-sd", 1, *ALONE)
+def test_show_refuses_a_folder_that_is_not_a_complete_run(cli, here, fit_run, damage):
+    shutil.copytree(fit_run[0], here / "runs" / "specimen")
     for name, text in damage.items():
         file = here / "runs" / "specimen" / name
         file.unlink() if text is None else file.write_text(text)

@@ -180,7 +180,7 @@ def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_p
     assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
 
 
-def test_replicates_count_how_often_each_claim_holds(cli, here):
+def test_replicates_count_how_often_each_claim_holds(cli, here, one_range):
     said = cli("paper", "--points", 6, "--replicates", 2, "--no-figures", "--out", "run")
     assert said.status == 0, said.err
     claims = rows_of(here / "run" / "claims.csv")

@@ -12,7 +12,7 @@ import tissuq as tq
 from tissuq.studies import population
 from tissuq.studies.population import PopulationSettings
 
-from .conftest import STRETCH, command
+from .conftest import STRETCH, command, run_in
 
 MODULI_KPA = [40.0, 48.0, 52.0, 60.0, 75.0, 45.0]
 OPTIONS = ["--discrepancy", "none", "--noise-sd", 1]
@@ -41,7 +41,7 @@ def write_all(folder):
 def population_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("population")
     write_all(folder)
-    said = command("population", "specimens", *OPTIONS, "--out", "run", folder=folder)
+    said = run_in(folder, "population", "specimens", *OPTIONS, "--out", "run")
     assert said.status == 0, said.err
     return folder, said
 
@@ -78,7 +78,7 @@ def test_predictions_and_cards_start_from_a_new_patient(population_run):
     patient = tq.load(folder / "run")
     assert float(patient.summary().loc["C10", "median"]) == pytest.approx(float(row["median"]), rel=0.02)
     for arguments in (["predict", "run", "--mode", "planar", "--points", 3, "--no-figures"], ["export", "run"]):
-        said = command(*arguments, folder=folder)
+        said = run_in(folder, *arguments)
         assert said.status == 0, said.err
 
 

@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-from .conftest import command, write_specimen
+from .conftest import run_in, write_specimen
 
 pytest.importorskip("felupe", reason="FElupe is not installed")
 
@@ -20,7 +20,7 @@ def fitted(tmp_path_factory):
     """The run folder of a fit."""
     folder = tmp_path_factory.mktemp("fitted")
     write_specimen(folder / "specimen.csv")
-    said = command("fit", "specimen.csv", "--noise-sd", 1, "--no-figures", "--out", "run", folder=folder)
+    said = run_in(folder, "fit", "specimen.csv", "--noise-sd", 1, "--no-figures", "--out", "run")
     assert said.status == 0, said.err
     return folder / "run"
 

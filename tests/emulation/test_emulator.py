@@ -45,7 +45,7 @@ def test_errors_are_about_as_large_as_the_emulator_says():
 
 
 def test_few_runs_are_less_sure_than_many():
-    few, many = (emulate(designed(ogden, OGDEN, count), DEPTH) for count in (8, 30))
+    few, many = (emulate(designed(ogden, OGDEN, count), DEPTH) for count in (8, 20))
     point = {"mu": 1.0, "alpha": -9.0}
     assert few.predict(point)["sd"].max() > 5 * many.predict(point)["sd"].max()
 

@@ -109,7 +109,7 @@ def test_the_discrepancy_is_conditioned_on_the_data():
     np.testing.assert_allclose(variance[17], np.diag(process - gain @ process), atol=1e-6)
 
 
-@pytest.mark.parametrize(("count", "level"), [(8, 0.05), pytest.param(20, 1e-4, marks=pytest.mark.statistical)])
+@pytest.mark.parametrize(("count", "level"), [(5, 0.05), pytest.param(20, 1e-4, marks=pytest.mark.statistical)])
 def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emulator_knows_why(count, level):
     """Truths from the prior, an emulator of seven runs each.
 
@@ -203,7 +203,7 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     poor = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.001, runs=7)
     assert any("emulator's error is large beside the noise" in text for text in poor.warnings)
     narrow = {"mu": tq.Uniform(0.2, 1.4), "alpha": tq.Uniform(-25.0, -1.0)}
-    found = tq.calibrate(DEPTH, data, ogden, narrow, noise_sd=0.02, runs=16)
+    found = tq.calibrate(DEPTH, data, ogden, narrow, noise_sd=0.02, runs=10)
     assert any("reaches the end of the simulated range of mu (upper)" in text for text in found.warnings)
 
 

@@ -92,6 +92,7 @@ class Cylinder(Case):
         return Supports(np.stack([bottom, points[:, 1] < 1e-9], axis=-1), top, 1.0)
 
 
+@pytest.mark.finite_elements
 def test_a_case_of_ones_own_has_the_engineering_stress_of_a_draw(draws):
     found = respond(Cylinder(), draws[0], steps=3, bulk_ratio=1e4)
     expected = engineering_stress(draws[0], loading_mode("uniaxial"), 1 + found.travel / 2.0, ()) * np.pi * 1.5**2

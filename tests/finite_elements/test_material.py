@@ -239,6 +239,7 @@ def test_newtons_method_converges_quadratically(draws):
     assert max(orders[(norms[:-1] < 1e-2) & (norms[1:] > 1e-14)]) > 1.7, norms
 
 
+@pytest.mark.finite_elements
 def test_it_goes_into_the_mixed_formulations_of_felupe(draws):
     felupe = pytest.importorskip("felupe", reason="FElupe is not installed")
     modulus = distortional_energy(draws[3]).initial_shear_modulus

@@ -21,9 +21,10 @@ BAR = ClampedBar(elongation=1.0, fineness=0.5)
 
 @pytest.fixture(scope="module")
 def found(posterior, without):
-    return simulate(posterior, BAR, draws=4, without=without, steps=2)
+    return simulate(posterior, BAR, draws=4, without=without, steps=2, check_mesh=False)
 
 
+@pytest.mark.finite_elements
 def test_every_family_has_the_forces_of_its_draws(found, posterior, without):
     draws = posterior.ensemble(4)
     for number, draw in enumerate(draws):
@@ -69,7 +70,9 @@ def test_the_table_has_the_moments_of_the_forces(found):
     assert row["without_mean"] == pytest.approx(found.forces["without"][:, -1].mean())
 
 
-def test_the_mesh_is_checked_against_one_of_twice_the_fineness(found):
+@pytest.mark.finite_elements
+def test_the_mesh_is_checked_against_one_of_twice_the_fineness(posterior, without):
+    found = simulate(posterior, BAR, draws=4, without=without, steps=2)
     change, travel = found.mesh_change
     draw = found.ensembles["complete"][int(np.argsort([each.values["C10"] for each in found.ensembles["complete"]])[2])]
     coarse, fine = (respond(replace(BAR, fineness=f), draw, steps=2).force[-1] for f in (0.5, 1.0))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from against import AXES, BOXES, TRUTH, assert_agrees, both, neo_hookean, parts
 from dense import Axis, integrate
+from marks import slow_but
 
 STRETCH = np.linspace(0.6, 2.5, 12)
 WITH_ERROR = ["constant", "linear", "mooney-rivlin", "yeoh", "gp"]
@@ -27,8 +30,10 @@ def test_data_with_a_discrepancy(discrepancy):
     assert_agrees(posterior, problem)
 
 
-@pytest.mark.parametrize("noise_sd", [0.1, 0.5])
-@pytest.mark.parametrize("discrepancy", WITH_ERROR)
+@pytest.mark.parametrize(
+    ("discrepancy", "noise_sd"),
+    slow_but([(name, 0.1) for name in WITH_ERROR] + [("constant", 0.5), ("gp", 0.5)], product(WITH_ERROR, (0.1, 0.5))),
+)
 def test_data_without_any_discrepancy_whose_amplitude_is_pressed_to_zero(discrepancy, noise_sd):
     stress = 1.2 * neo_hookean(STRETCH) + 0.1 * NOISE  # a noise of 0.5 is overstated: nothing is left for S or c
     posterior, problem = both(discrepancy, STRETCH, stress, noise_sd, *parts(discrepancy))
@@ -49,8 +54,9 @@ def test_noise_so_large_that_the_priors_decide(discrepancy):
     assert_agrees(posterior, problem)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e3])
-@pytest.mark.parametrize("discrepancy", ALL)
+@pytest.mark.parametrize(
+    ("discrepancy", "factor"), slow_but([*product(ALL, [1e-3]), ("none", 1e3), ("gp", 1e3)], product(ALL, (1e-3, 1e3)))
+)
 def test_stresses_of_kilopascals_and_gigapascals(discrepancy, factor):
     boxes = {symbol: (low * factor, high * factor) for symbol, (low, high) in BOXES.items()}
     axes = AXES | {symbol: Axis(0, AXES[symbol].high * factor, 0.01 * factor) for symbol in ("S", "c")}
@@ -59,7 +65,7 @@ def test_stresses_of_kilopascals_and_gigapascals(discrepancy, factor):
     assert_agrees(posterior, problem)
 
 
-@pytest.mark.parametrize("points", [4, 5, 6])
+@pytest.mark.parametrize("points", slow_but([4], [4, 5, 6]))
 @pytest.mark.parametrize("discrepancy", ["none", "constant", "mooney-rivlin", "gp"])
 def test_few_points(discrepancy, points):
     stretch = np.linspace(0.7, 2, points)

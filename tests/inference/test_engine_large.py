@@ -10,6 +10,7 @@ from scipy.stats import multivariate_normal, norm
 import tissuq as tq
 from against import TRUTH, columns_of
 from dense import columns
+from marks import slow_but
 from tissuq.inference.linear import ConditionalGaussian
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -84,7 +85,7 @@ def test_the_same_measurements_in_pieces_are_those_at_once(million):
     assert (np.abs(posterior.summary()["mean"] - whole.summary()["mean"]) < 1e-6 * sd).all()
 
 
-@pytest.mark.parametrize("noise_sd", [0.1, 0.001])
+@pytest.mark.parametrize("noise_sd", slow_but([0.1], [0.1, 0.001]))
 def test_two_thousand_points_of_a_process_are_those_of_a_dense_cholesky_factor(noise_sd):
     generator = np.random.default_rng(3)
     stretch = np.sort(generator.uniform(0.7, 2.5, 2000))

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 import tissuq as tq
 from against import AXES, TRUTH, assert_agrees, both, neo_hookean, parts
 from dense import Axis, Linear, columns, integrate, problem_of
+from marks import slow_but
 
 GENERATOR = np.random.default_rng(11)
 STRETCH = np.linspace(0.7, 2.2, 14)
@@ -84,7 +85,7 @@ def test_repeated_measurements_share_the_independent_discrepancy(discrepancy):
     assert abs(integrate(unshared).log_evidence - truth.log_evidence) > 0.1, "sharing must matter to test anything"
 
 
-@pytest.mark.parametrize("noise", ["unknown", "repeats"])
+@pytest.mark.parametrize("noise", slow_but(["repeats"], ["unknown", "repeats"]))
 def test_repeats_of_a_process_and_of_no_discrepancy_are_plain_unknown_noise(noise):
     stress = yeoh(REPEATED) + 0.05 * np.random.default_rng(1).standard_normal(len(REPEATED))
     linear, axes = parts("none")
@@ -121,7 +122,7 @@ def test_given_noise_and_share_the_posterior_is_that_of_a_dense_covariance():
     assert posterior.log_evidence == pytest.approx(dense + inside, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", slow_but([0], [0, 1, 2]))
 def test_repeats_separate_noise_from_discrepancy_where_unknown_noise_cannot(seed):
     generator = np.random.default_rng(seed)
     stretch = np.repeat(np.linspace(0.7, 2.2, 12), 4)
@@ -144,7 +145,7 @@ def test_repeats_without_a_repeated_stretch_are_refused():
         tq.fit(data, discrepancy="constant", noise="repeats")
 
 
-@pytest.mark.parametrize("points", [12, pytest.param(24, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("points", slow_but([8], [8, 12, 24]))
 def test_a_process_as_short_as_the_spacing_is_said_to_be_inseparable_from_noise(points):
     stretch = np.linspace(0.7, 2.2, points)
     spacing = stretch[1] - stretch[0]
@@ -154,7 +155,7 @@ def test_a_process_as_short_as_the_spacing_is_said_to_be_inseparable_from_noise(
     assert any("cannot separate noise from discrepancy" in text for text in posterior.warnings)
 
 
-@pytest.mark.parametrize("points", [12, 24])
+@pytest.mark.parametrize("points", slow_but([12], [12, 24]))
 def test_a_process_much_longer_than_the_spacing_is_separable_from_noise(points):
     stretch = np.linspace(0.7, 2.2, points)
     stress = yeoh(stretch) + 0.05 * np.random.default_rng(points).standard_normal(points)

@@ -86,7 +86,9 @@ def test_one_term_with_an_amplitude_or_unknown_noise(kind):
     agrees(kind, posterior, truth)
 
 
+@pytest.mark.slow
 def test_two_terms():
+    """The short version is one term with an amplitude, which has two nonlinear parameters, too."""
     linear = {"mu1": Linear(-20, 20), "mu2": Linear(-20, 20)}
     axes = {"alpha1": Axis(0.5, 10, 1.0), "alpha2": Axis(-10, -0.5, 1.0)}
     priors = {"mu1": tq.Uniform(-20, 20), "mu2": tq.Uniform(-20, 20)}

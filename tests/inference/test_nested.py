@@ -48,7 +48,7 @@ def log_mass_by_panels(covariance, low, high):
 
 
 def test_the_mass_within_two_bounds_is_that_of_dense_panels():
-    covariance, low, high = gaussians(200, 2)
+    covariance, low, high = (each[:100] for each in gaussians(200, 2))
     log_mass, error = nested_log_mass(np.linalg.cholesky(covariance), low, high)
     truth = np.array([log_mass_by_panels(*each) for each in zip(covariance, low, high, strict=True)])
     assert truth.min() < -1000
@@ -78,21 +78,25 @@ def test_independent_parameters_have_the_product_of_their_masses():
 
 
 @pytest.mark.parametrize(
-    ("k", "shift"),
-    [(2, 0.0), (2, 3.0), (2, 30.0), (3, 3.0), *(pytest.param(3, x, marks=pytest.mark.slow) for x in (0.0, 30.0))],
+    ("k", "shift", "size"),
+    [
+        *((2, shift, 40_000) for shift in (0.0, 3.0, 30.0)),
+        (3, 3.0, 10_000),
+        *(pytest.param(3, shift, 40_000, marks=pytest.mark.slow) for shift in (0.0, 3.0, 30.0)),
+    ],
 )
-def test_draws_have_the_moments_of_the_bounded_gaussian(k, shift):
+def test_draws_have_the_moments_of_the_bounded_gaussian(k, shift, size):
     covariance = (0.8 * np.ones((k, k)) + 0.2 * np.eye(k))[None]
     triangle, low, high = np.linalg.cholesky(covariance), np.full((1, k), shift), np.full((1, k), np.inf)
-    uniforms = np.random.default_rng(0).random((1, 40_000, k))
+    uniforms = np.random.default_rng(0).random((1, size, k))
     drawn = nested_draws(triangle, low, high, uniforms)[0] @ triangle[0].T
     assert (drawn >= shift - 1e-9).all()
     score, log_terms = nested_points(triangle, low, high)
     weights = np.exp(log_terms - log_terms.max())
     mean = (weights * score).sum() / weights.sum()
     sd = np.sqrt((weights * (score - mean) ** 2).sum() / weights.sum())
-    assert np.abs(drawn.mean(axis=0) - mean).max() < 5 * sd / np.sqrt(40_000)  # all parameters are alike
-    assert np.abs(drawn.std(axis=0) / sd - 1).max() < 0.03
+    assert np.abs(drawn.mean(axis=0) - mean).max() < 5 * sd / np.sqrt(size)  # all parameters are alike
+    assert np.abs(drawn.std(axis=0) / sd - 1).max() < 6 / np.sqrt(size)
 
 
 def test_draws_of_parameters_far_from_their_bounds_follow_those_that_are_cut():

@@ -95,7 +95,7 @@ def test_the_integrated_density_keeps_its_digits_for_every_exponent(material):
     data = tq.simulate("yeoh", {"C10": 1.2, "C20": -0.057, "C30": 0.004}, np.linspace(0.5, 2.5, 25), 0.05, seed=1)
     moduli = {p.symbol: tq.Uniform(-50, 50) for p in material.parameters if p.is_linear}
     model = StatisticalModel(data, material, discrepancy_named("none"), 0.05, moduli)
-    uniforms = np.random.default_rng(0).random((100, len(model.nonlinear)))
+    uniforms = np.random.default_rng(0).random((30, len(model.nonlinear)))
     h = np.column_stack([model.priors[s].quantile(u) for s, u in zip(model.nonlinear, uniforms.T, strict=True)])
     expected = ConditionalGaussian([model])(h[None]).log_likelihood[0]
     density, given = conditional_density(model)

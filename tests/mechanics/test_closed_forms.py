@@ -36,21 +36,31 @@ def test_every_material_has_a_closed_form():
 
 @in_every_mode
 def test_stress_is_that_of_the_full_tensors(material, measured):
+    assert_stress_of_tensors(material, measured, seed=0)
+
+
+@pytest.mark.slow
+@in_every_mode
+def test_stress_is_that_of_the_full_tensors_for_further_values(material, measured):
+    for seed in (1, 2):
+        assert_stress_of_tensors(material, measured, seed)
+
+
+def assert_stress_of_tensors(material, measured, seed):
     # In turned axes a component has the rounding errors of the largest one; in those of the test it has its own. A
     # stress of next to nothing has those of the moduli, which are of size one.
-    for seed in range(3):
-        values = values_of(material, seed)
-        found = engineering_stress(material, measured.path, measured.points, values)
-        for turn, rounding in ((np.eye(3), 1e-13), (TURN, RELATIVE)):
-            tensors = [tensor_stress(material.name, values, measured.gradient(each), turn) for each in measured.points]
-            for stress, tensor in zip(found, tensors, strict=True):
-                least = rounding * np.abs(tensor).max() + 1e-14
-                assert stress == pytest.approx(tensor[measured.component], RELATIVE, least)
+    values = values_of(material, seed)
+    found = engineering_stress(material, measured.path, measured.points, values)
+    for turn, rounding in ((np.eye(3), 1e-13), (TURN, RELATIVE)):
+        tensors = [tensor_stress(material.name, values, measured.gradient(each), turn) for each in measured.points]
+        for stress, tensor in zip(found, tensors, strict=True):
+            least = rounding * np.abs(tensor).max() + 1e-14
+            assert stress == pytest.approx(tensor[measured.component], RELATIVE, least)
 
 
 @pytest.mark.parametrize(
     "material",
-    [own if k % 3 == 0 else pytest.param(own, marks=pytest.mark.slow) for k, own in enumerate(EVERY)],
+    [own if k % 6 == 0 else pytest.param(own, marks=pytest.mark.slow) for k, own in enumerate(EVERY)],
     ids=lambda material: material.name,
 )
 def test_the_contract_for_materials_holds(material):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from marks import slow_but
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics import engineering_stress, material_named, stress_basis
 
@@ -74,7 +75,7 @@ def test_no_published_parameters_describe_the_stress_better_than_the_optimum(law
     assert misfit(law, mode, optimum(law, mode)) < misfit(law, mode, published)
 
 
-@pytest.mark.parametrize("mode", TRELOAR)
+@pytest.mark.parametrize("mode", slow_but(["equibiaxial"], TRELOAR))
 def test_ogdens_three_terms_describe_treloars_rubber_and_the_optimum_does_it_better(mode):
     mu, alpha = OGDEN
     law, start = material_named("ogden-3"), np.append(mu * alpha / 2, alpha)  # here: shares of the initial modulus

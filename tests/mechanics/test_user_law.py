@@ -85,7 +85,7 @@ def laws(tmp_path, monkeypatch):
     ("name", "same", "values"),
     [
         ("exponential", "demiray", [1.3, 0.7]),
-        ("logarithmic", "hencky", [1.3]),
+        pytest.param("logarithmic", "hencky", [1.3], marks=pytest.mark.slow),
         ("Simple", "neo-hookean", [1.3]),
         ("made", "neo-hookean", [1.3]),
     ],

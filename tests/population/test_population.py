@@ -39,8 +39,8 @@ def by_quadrature(specimens, noise_sd, spread):
     estimates = np.array([basis @ each.stress / (basis @ basis) for each in specimens.values()])
     sd = noise_sd / np.sqrt(basis @ basis)
     middle = np.median(np.log(truncnorm(-estimates / sd, np.inf, estimates, sd).median()))
-    m, tau = middle + np.linspace(-4, 4, 121), np.exp(np.linspace(np.log(1e-3), np.log(5), 60))
-    score = np.linspace(-7, 7, 401)
+    m, tau = middle + np.linspace(-4, 4, 81), np.exp(np.linspace(np.log(1e-3), np.log(5), 40))
+    score = np.linspace(-7, 7, 241)
     theta = m[:, None, None] + tau[:, None] * score
     log_terms = norm.logpdf(score) + norm.logpdf(estimates[:, None, None, None], np.exp(theta), sd)
     log_total = logsumexp(log_terms, axis=3)

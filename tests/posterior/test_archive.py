@@ -49,6 +49,8 @@ FITS = {
 
 SLOW = ("nuts",)
 """Of two posteriors that are sampled, the other is in the quick tests."""
+SAVED_AGAIN = ("closed form", "process", "energies", "joint")
+"""One of each representation, saved a second time in the quick tests, where all are saved once."""
 
 
 @pytest.fixture(
@@ -121,6 +123,11 @@ def test_the_model_comes_back(pair):
             assert getattr(one, name) == getattr(two, name)
 
 
+@pytest.mark.parametrize(
+    "pair",
+    [name if name in SAVED_AGAIN else pytest.param(name, marks=pytest.mark.slow) for name in FITS],
+    indirect=True,
+)
 def test_what_is_saved_again_is_the_same(pair, tmp_path):
     _, after, path = pair
     after.save(tmp_path / "again.nc")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 import tissuq as tq
 from against import BOXES, TRUTH, columns_of, parts
 from dense import TERMS
+from marks import slow_but
 
 DISCREPANCIES = list(TERMS)
 FIRST, SECOND, THIRD = np.linspace(0.7, 2.0, 10), np.linspace(0.8, 2.4, 13), np.linspace(0.7, 2.0, 10)[::-1]
@@ -40,8 +43,13 @@ def assert_same(first, second, evidence=1e-5, share=1e-3):
     assert max(abs(low - other_low), abs(high - other_high)) < 10 * share * b.sd
 
 
-@pytest.mark.parametrize("with_priors", [True, False])
-@pytest.mark.parametrize("discrepancy", DISCREPANCIES)
+@pytest.mark.parametrize(
+    ("discrepancy", "with_priors"),
+    slow_but(
+        [("none", True), ("constant", True), ("linear", False), ("yeoh", False), ("gp", False)],
+        product(DISCREPANCIES, (True, False)),
+    ),
+)
 def test_many_experiments_on_mixed_stretches_are_those_one_by_one(discrepancy, with_priors):
     priors = fixed(discrepancy, 0.1) if with_priors else None
     options = {"discrepancy": discrepancy, "noise_sd": 0.1, "priors": priors}
@@ -51,8 +59,10 @@ def test_many_experiments_on_mixed_stretches_are_those_one_by_one(discrepancy, w
         assert_same(found, tq.fit(data, **options))
 
 
-@pytest.mark.parametrize("discrepancy", ["none", "constant", "yeoh"])
-@pytest.mark.parametrize("with_priors", [True, False])
+@pytest.mark.parametrize(
+    ("discrepancy", "with_priors"),
+    slow_but([("none", True), ("constant", False)], product(["none", "constant", "yeoh"], (True, False))),
+)
 def test_many_experiments_with_unknown_noise_are_those_one_by_one(discrepancy, with_priors):
     options = {"discrepancy": discrepancy, "priors": fixed(discrepancy, None) if with_priors else None}
     for found, data in zip(tq.fit_many(MIXED, **options), MIXED, strict=True):

@@ -30,4 +30,7 @@ def specimen_study(specimen_file):
 
 @pytest.fixture(scope="session")
 def paper_study():
-    return run_paper(PaperSettings(points=10, seed=11))
+    """The study on its own stretch range and one other."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tissuq.validation.paper.study.RANGES", ((0.6, 2.0),))
+        return run_paper(PaperSettings(points=10, seed=11))

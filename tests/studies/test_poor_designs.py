@@ -40,7 +40,9 @@ def test_the_interval_is_wide_and_a_warning_says_what_to_measure(design, noise, 
         assert all("easure" in text for text in told)
 
 
+@pytest.mark.slow
 def test_two_points_say_next_to_nothing():
+    """The short version has two points with known noise, among the designs above."""
     data = tq.simulate("yeoh", TRUTH, [0.8, 1.3], noise_sd=0.02, seed=1)
     assert any("determine C10 poorly" in text for text in tq.fit(data, discrepancy="auto").warnings)
 

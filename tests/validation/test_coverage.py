@@ -192,17 +192,19 @@ def test_the_error_of_a_median_is_that_of_medians_of_normal_samples():
     assert found.iloc[0]["width_error"] == pytest.approx(expected, rel=0.15)  # four standard errors
 
 
-def test_the_right_model_covers_as_often_as_it_says(tmp_path):
-    found = run_campaign(small(families=["yeoh"], formulations=["yeoh"], replicates=400), tmp_path)
-    row = summarise(small(families=["yeoh"], formulations=["yeoh"], replicates=400), found).iloc[0]
-    chance = 4.3 * np.sqrt(0.95 * 0.05 / 400)  # two-sided 2e-5; S makes intervals a little wider than they need be
+@pytest.mark.parametrize("replicates", [100, pytest.param(400, marks=pytest.mark.statistical)])
+def test_the_right_model_covers_as_often_as_it_says(tmp_path, replicates):
+    """A correct 95 % fails about once in 1e4 cases; 0.80 passes with 100 data sets in 8 %, 0.88 with 400 in 7 %."""
+    settings = small(families=["yeoh"], formulations=["yeoh"], replicates=replicates)
+    row = summarise(settings, run_campaign(settings, tmp_path)).iloc[0]
+    chance = 4.3 * np.sqrt(0.95 * 0.05 / replicates)  # S makes intervals a little wider than they need be
     assert 0.95 - chance < row["coverage"]
 
 
-@pytest.mark.parametrize(("replicates", "least"), [(2, 0.75), pytest.param(10, 0.90, marks=pytest.mark.statistical)])
+@pytest.mark.parametrize(("replicates", "least"), [(1, 0.7), pytest.param(10, 0.90, marks=pytest.mark.statistical)])
 def test_auto_holds_where_the_paper_s_forms_do_not(tmp_path, replicates, least):
-    # 120 materials; a share below 0.90 has a chance of 1 % when the true one is 0.95. In the short version 24, of which
-    # a share of 0.75 or less has a chance of 0.2 % then, and of 96 % when the true one is 0.6.
+    # 120 materials; a share below 0.90 has a chance of 1 % when the true one is 0.95. In the short version 12, of which
+    # a share of 0.7 or less has a chance of 0.2 % then, and of 77 % when the true one is 0.6.
     settings = small(
         families=list(FAMILIES), formulations=["none", "gp", "auto"], replicates=replicates,
         designs=[{"low": 0.6, "high": 2.0, "points": 40, "noise_sd": 0.2}],
@@ -256,8 +258,10 @@ def test_wrong_settings_are_refused(wrong, words):
         small(**wrong)
 
 
-def test_a_scheduler_that_does_not_answer_is_told():
-    pytest.importorskip("distributed")
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    client = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout="0.5s"))
     with pytest.raises(InputError, match="no Dask scheduler answers"), open_pool(scheduler="tcp://127.0.0.1:1"):
         pass
 

@@ -74,9 +74,9 @@ def test_the_table_has_every_range_and_formulation(study):
     assert all(cell.data_sets == 3 for cell in study.cells)
 
 
-def test_every_announced_step_is_taken():
+def test_every_announced_step_is_taken(one_range):
     steps = []
-    settings = PaperSettings(points=10, replicates=2)
+    settings = PaperSettings(points=6, replicates=2)
     run_paper(settings, steps.append)
     assert len(steps) + 1 == steps_of(settings)  # the last one is writing
 

@@ -124,21 +124,52 @@ class GaussianMixture:
         representatives = self[systematic(self.weights[None], count)[0]]
         return representatives.weighted(np.full(count, self.weights.sum() / count))
 
+    def merged(self) -> GaussianMixture:
+        """Return the same distribution, components that equal their predecessor merged with it."""
+        first = self._first_of_equals()
+        return self[first].weighted(np.add.reduceat(self.weights, first))
+
+    def _first_of_equals(self) -> NDArray[np.intp]:
+        """Return the indices of the components that differ from their predecessor in more than the weight."""
+        is_new = np.zeros(len(self), dtype=bool)
+        is_new[0] = True
+        for array in (self.settings, self.mean, self.member, self.root):
+            if array is not None:
+                others = np.flatnonzero(~is_new)
+                is_new[others] = (array[others] != array[others - 1]).any(axis=tuple(range(1, array.ndim)))
+        return np.flatnonzero(is_new)
+
     def to_arrays(self) -> dict[str, tuple[tuple[str, ...], NDArray[Any]]]:
-        """Return its arrays by name, with their dimensions, without those that are empty."""
-        dims = {
-            "weights": ("component",),
-            "settings": ("component", "nonlinear"),
-            "mean": ("component", "linear"),
-            "root": ("component", "linear", "along"),
-            "member": ("component",),
+        """Return its arrays by name, with their dimensions, without those that are empty.
+
+        A component that equals its predecessor in all but the weight is counted, not repeated. Of the roots, which are
+        triangular and padded with zeros where members have different numbers of weights, there are the entries that
+        are not zero and a bit for every entry that tells which these are.
+        """
+        first = self._first_of_equals()
+        distinct = self[first]
+        is_nonzero = distinct.root != 0
+        arrays: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = {
+            "weights": (("component",), self.weights),
+            "copies": (("distinct",), np.diff(first, append=len(self))),
+            "settings": (("distinct", "nonlinear"), distinct.settings),
+            "mean": (("distinct", "linear"), distinct.mean),
+            "root": (("entry",), distinct.root[is_nonzero]),
+            "root_is_nonzero": (("eight_entries",), np.packbits(is_nonzero)),
+            "root_shape": (("axis",), np.array(is_nonzero.shape)),
         }
-        arrays = {name: getattr(self, name) for name in dims}
-        return {name: (dims[name], array) for name, array in arrays.items() if array is not None and array.size}
+        if distinct.member is not None:
+            arrays["member"] = (("distinct",), distinct.member)
+        return {name: (dims, array) for name, (dims, array) in arrays.items() if array.size}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> GaussianMixture:
         """Return the mixture whose arrays `to_arrays` gave."""
-        empty = np.zeros((len(arrays["weights"]), 0))
+        empty = np.zeros((len(arrays["copies"]), 0))
+        root = np.zeros(arrays["root_shape"])
+        if "root" in arrays:
+            is_nonzero = np.unpackbits(arrays["root_is_nonzero"], count=root.size).astype(bool)
+            root[is_nonzero.reshape(root.shape)] = arrays["root"]
         settings, mean = (arrays.get(name, empty) for name in ("settings", "mean"))
-        return cls(arrays["weights"], settings, mean, arrays.get("root", empty[:, :, None]), arrays.get("member"))
+        distinct = cls(np.ones(len(empty)), settings, mean, root, arrays.get("member"))
+        return distinct[np.repeat(np.arange(len(distinct)), arrays["copies"])].weighted(arrays["weights"])

@@ -22,7 +22,7 @@ from tissuq.model.noise import KnownNoise, KnownNoises, Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import Statistics
 from tissuq.parameters.priors import prior_from
-from tissuq.posterior.netcdf import Group, LabelledGroup, read_groups
+from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
 from tissuq.posterior.solver import Solver
 
 __all__ = ["read_modes", "read_solution", "solution_groups"]
@@ -151,7 +151,7 @@ def _named(kind: str, name: str, find: Callable[[str], T] | None, supplied: T | 
     return variant
 
 
-FORMAT = 1
+FORMAT = 2
 """Version of the groups; of another one nothing is known."""
 FIT, SOLUTION, MIXTURE, WIDE_MIXTURE, MARGINALS = "fit", "solution", "mixture", "wide_mixture", "marginals"
 STABILITY = ("stable_in", "stable_share", "stable_prior_share")
@@ -227,11 +227,9 @@ def read_modes(path: Path) -> list[str]:
     InputError
         When there is no such file, or it holds no posterior.
     """
-    import h5netcdf
-
     try:
-        with h5netcdf.File(path, "r") as file:
-            return sorted({str(test.attrs["mode"]) for test in file.groups[FIT].groups[TESTS].groups.values()})
+        with opened(path) as file:
+            return sorted({str(test.attrs["mode"]) for test in file[FIT][TESTS].values()})
     except Exception as error:  # as in `read_solution`
         raise InputError(
             f"'{path}' is damaged or no posterior of tissuq ({type(error).__name__}): run the fit again."

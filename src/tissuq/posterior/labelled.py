@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,7 @@ from tissuq.inference.solution import Solution
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import leave_one_out, pointwise_log_likelihood, replicate_data, stride
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-__all__ = ["labelled_arrays", "labels_of", "summary_table"]
+__all__ = ["labelled_arrays", "labels_of", "summaries"]
 
 
 def labelled_arrays(solution: Solution, seed: int) -> dict[str, LabelledGroup]:
@@ -68,7 +64,7 @@ def labelled_arrays(solution: Solution, seed: int) -> dict[str, LabelledGroup]:
     return groups
 
 
-def labels_of(solution: Solution, seed: int, headline: Mapping[Hashable, float]) -> dict[str, str | float]:
+def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> dict[str, str | float]:
     """Return what was fitted, how, and what came out, in short: the attributes of the arrays.
 
     ``headline`` is the row of the headline parameter in the summary.
@@ -100,10 +96,10 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[Hashable, float])
     return labels | {name: value for name, value in evidence.items() if value is not None}
 
 
-def summary_table(solution: Solution, prob: float, parameters: Sequence[str] | None) -> pd.DataFrame:
+def summaries(
+    solution: Solution, prob: float = 0.95, parameters: Sequence[str] | None = None
+) -> dict[str, dict[str, float]]:
     """Return mean, sd, median and interval of the parameters that are asked for; `Posterior.summary` describes it."""
-    import pandas as pd
-
     model = solution.model
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
@@ -111,21 +107,20 @@ def summary_table(solution: Solution, prob: float, parameters: Sequence[str] | N
     unknown = [symbol for symbol in wanted if symbol not in model.symbols]
     if unknown:
         raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(model.symbols)}.")
-    index, names = pd.Index(wanted, name="parameter"), ["mean", "sd", "median", "hdi_low", "hdi_high"]
-    table = pd.DataFrame([_numbers(solution, symbol, prob) for symbol in wanted], index, names)
-    diagnostics = solution.diagnostics
-    if diagnostics is not None:
-        table["ess"] = [min(diagnostics.ess_bulk[symbol], diagnostics.ess_tail[symbol]) for symbol in table.index]
-        table["rhat"] = [diagnostics.rhat[symbol] for symbol in table.index]
-    return table
+    return {symbol: _numbers(solution, symbol, prob) for symbol in wanted}
 
 
-def _numbers(solution: Solution, symbol: str, prob: float) -> tuple[float, ...]:
-    """Return mean and sd (nan where there may be none), median and the ends of the interval of a parameter."""
-    marginal, model = solution.marginals[symbol], solution.model
+def _numbers(solution: Solution, symbol: str, prob: float) -> dict[str, float]:
+    """Return mean and sd (nan where there may be none), median, ends of the interval, and how well it is sampled."""
+    marginal, model, diagnostics = solution.marginals[symbol], solution.model, solution.diagnostics
     has_moments = symbol not in model.energy_symbols or model.priors[symbol].has_moments
-    moments = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
-    return (*moments, float(marginal.quantile(0.5)), *marginal.hdi(prob))
+    mean, sd = (marginal.mean, marginal.sd) if has_moments else (np.nan, np.nan)
+    low, high = marginal.hdi(prob)
+    numbers = {"mean": mean, "sd": sd, "median": float(marginal.quantile(0.5)), "hdi_low": low, "hdi_high": high}
+    if diagnostics is None:
+        return numbers
+    ess = min(diagnostics.ess_bulk[symbol], diagnostics.ess_tail[symbol])
+    return numbers | {"ess": ess, "rhat": diagnostics.rhat[symbol]}
 
 
 def _draws(solution: Solution, seed: int) -> dict[str, NDArray[np.float64]]:

@@ -6,10 +6,12 @@ Not through xarray, whose import takes longer than a fit.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from zlib import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +19,10 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Group", "LabelledGroup", "read_groups", "save_groups"]
+__all__ = ["Group", "LabelledGroup", "opened", "read_groups", "save_groups"]
 
-COMPRESSED_SIZE = 1000
-"""Number of values in an array from which it is compressed."""
+COMPRESSED_SIZE, SAMPLE_SIZE, MAX_SHRUNK_SHARE = 1000, 4000, 0.75
+"""Number of values in an array from which it is compressed, if so many of its values then shrink to such a share."""
 COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 
@@ -65,7 +67,7 @@ class LabelledGroup:
                 if dim not in file.dimensions:
                     file.dimensions[dim] = size
             array = array.astype(h5py.string_dtype()) if array.dtype.kind == "U" else array
-            packed = COMPRESSION if array.size > COMPRESSED_SIZE else {}
+            packed = COMPRESSION if array.size > COMPRESSED_SIZE and _shrinks(array) else {}
             variable = file.create_variable(name, dims, array.dtype, array, **packed)
             _write_attributes(variable, *attributes)
             if name not in self.coordinates:
@@ -73,6 +75,14 @@ class LabelledGroup:
                 _write_attributes(variable, {"coordinates": " ".join(beside)} if beside else {})
             elif dims != (name,):
                 scattered[name] = set(dims)
+
+
+def _shrinks(array: NDArray[Any]) -> bool:
+    """Return whether compression is worth its time, which is long for random digits."""
+    if array.dtype.kind not in "fiu":
+        return True
+    sample = array.ravel()[:SAMPLE_SIZE].tobytes()
+    return len(compress(sample, 1)) < MAX_SHRUNK_SHARE * len(sample)
 
 
 def _write_attributes(file: Any, attributes: Mapping[str, str | float] | None = None) -> None:
@@ -92,16 +102,33 @@ def save_groups(groups: Mapping[str, LabelledGroup], path: Path) -> None:
 
 
 def read_groups(path: Path, root: str) -> dict[str, Group]:
-    """Read a group of a file and all within it, by name; none where there is no such group."""
-    import h5netcdf
+    """Read a group of a file and all within it, by name; none where there is no such group. Coordinates are left out.
 
-    with h5netcdf.File(path, "r") as file:
-        return dict(_nested(file.groups[root], root, root)) if root in file.groups else {}
+    The attributes of a NetCDF file's dimensions take h5netcdf longer than HDF5 itself takes for all arrays.
+    """
+    with opened(path) as file:
+        return dict(_nested(file[root], root, root)) if root in file else {}
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """Open a file of HDF5 to read; an error where its structure is damaged, on which single reads can wait for ever."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        file.visititems(lambda name, item: None)
+        yield file
 
 
 def _nested(group: Any, name: str, root: str) -> Iterator[tuple[str, Group]]:
     """Yield a group of a file and all within it, by name."""
-    arrays = {str(key): variable[...] for key, variable in group.variables.items()}
-    yield name.removeprefix(f"{root}/"), Group(arrays, dict(group.attrs))
-    for key, inner in group.groups.items():
-        yield from _nested(inner, f"{name}/{key}", root)
+    import h5py
+
+    contents = dict(group.items())
+    variables = {key: item for key, item in contents.items() if isinstance(item, h5py.Dataset)}
+    arrays = {key: variable[()] for key, variable in variables.items() if not variable.is_scale}
+    attrs = {key: value if isinstance(value, str) else np.squeeze(value)[()] for key, value in group.attrs.items()}
+    yield name.removeprefix(f"{root}/"), Group(arrays, attrs)
+    for key, item in contents.items():
+        if key not in variables:
+            yield from _nested(item, f"{name}/{key}", root)

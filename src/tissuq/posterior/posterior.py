@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment import Assessment, assess
 from tissuq.assessment.comparison import scores_of
@@ -25,11 +25,11 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
-from tissuq.posterior.labelled import labelled_arrays, labels_of, summary_table
+from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
-from tissuq.prediction.bands import predict_band, share_inside, stress_ratio
+from tissuq.prediction.bands import inside_band, predict_band, stress_ratio
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -261,7 +261,10 @@ class Posterior:
             Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
             when the posterior was sampled.
         """
-        return summary_table(self.solution, prob, parameters)
+        import pandas as pd
+
+        rows = summaries(self.solution, prob, parameters)
+        return pd.DataFrame(list(rows.values()), pd.Index(list(rows), name="parameter"))
 
     def predict(
         self,
@@ -379,13 +382,19 @@ class Posterior:
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of C10)."""
+        return float(np.mean(np.concatenate(self.inside_bands(discrepancy=discrepancy, prob=prob))))
+
+    def inside_bands(self, *, discrepancy: bool = True, prob: float = 0.95) -> tuple[NDArray[np.bool_], ...]:
+        """Return which measurements are inside their predictive band, an array for every curve of the experiment."""
         key = (discrepancy, prob)
-        if key not in self._coverage:
-            self._coverage[key] = share_inside(self.solution, discrepancy=discrepancy, prob=prob)
-        return self._coverage[key]
+        if key not in self._inside:
+            options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob}
+            curves = self.model.experiment.curves
+            self._inside[key] = tuple(inside_band(self.solution, curve, **options) for curve in curves)
+        return self._inside[key]
 
     @cached_property
-    def _coverage(self) -> dict[tuple[bool, float], float]:
+    def _inside(self) -> dict[tuple[bool, float], tuple[NDArray[np.bool_], ...]]:
         return {}
 
     @cached_property
@@ -407,7 +416,7 @@ class Posterior:
 
     @cached_property
     def _groups(self) -> dict[str, LabelledGroup]:
-        headline = self.summary(parameters=[self.model.headline]).to_dict("records")[0]
+        headline = summaries(self.solution, parameters=[self.model.headline])[self.model.headline]
         labels = labels_of(self.solution, self.seed, headline)
         return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed)
 

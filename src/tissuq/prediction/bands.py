@@ -19,7 +19,7 @@ from tissuq.inference.reduction import one_thread
 from tissuq.inference.solution import Solution
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import stress_moments
+from tissuq.prediction.moments import stress_moments, variance_of_noise
 
 __all__ = [
     "Band",
@@ -28,8 +28,8 @@ __all__ = [
     "inside_band",
     "predict_average",
     "predict_band",
+    "predict_bands",
     "predictive_mixtures",
-    "share_inside",
     "speaks_of",
     "stress_ratio",
 ]
@@ -194,15 +194,31 @@ def predict_average(
 
     All else is as for `predict_band`.
     """
+    options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": mode, "channel": channel}
+    return predict_bands(weighted_solutions, stretch, (noise,), **options)[0]
+
+
+def predict_bands(
+    weighted_solutions: Sequence[tuple[float, Solution]],
+    stretch: ArrayLike,
+    noises: Sequence[bool],
+    *,
+    discrepancy: bool = True,
+    prob: float = 0.95,
+    mode: str | LoadingMode | None = None,
+    channel: int = 0,
+) -> list[Band]:
+    """Return the bands of `predict_average` for new measurements, for the stress itself, or for both at once."""
     solutions = [solution for _, solution in weighted_solutions]
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
     tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
     with one_thread():
-        mixtures = predictive_mixtures(
-            weighted_solutions, points, loading, channel, discrepancy=discrepancy, noise=noise
+        blocks = predictive_mixtures(
+            weighted_solutions, points, loading, channel, discrepancy=discrepancy, noises=noises
         )
-        curves = [[mixture.mean, *map(mixture.quantile, tails)] for mixture in mixtures]
-    return Band(loading.paths[channel].abscissa(points), *np.concatenate(curves, axis=1))
+        curves = [[(mixture.mean, *map(mixture.quantile, tails)) for mixture in mixtures] for mixtures in blocks]
+    abscissa = loading.paths[channel].abscissa(points)
+    return [Band(abscissa, *np.concatenate(of_noise, axis=1)) for of_noise in zip(*curves, strict=True)]
 
 
 def predictive_mixtures(
@@ -212,18 +228,21 @@ def predictive_mixtures(
     channel: int,
     *,
     discrepancy: bool,
-    noise: bool,
-) -> Iterator[Mixtures]:
-    """Yield the predictive distributions of a stress at points of a mode, some points at a time."""
+    noises: Sequence[bool],
+) -> Iterator[list[Mixtures]]:
+    """Yield the predictive distributions of a stress, with noise or without, at points of a mode, some at a time."""
     count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
-    mixture = [(weight, solution.model, solution.mixture.thinned(count)) for weight, solution in weighted_solutions]
+    mixture = [
+        (weight, solution.model, solution.mixture.thinned(count).merged()) for weight, solution in weighted_solutions
+    ]
     weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
     for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
         moments = [
-            _moments(model, components, block, mode, channel, discrepancy=discrepancy, noise=noise)
+            _moments(model, components, block, mode, channel, discrepancy=discrepancy, noises=noises)
             for _, model, components in mixture
         ]
-        yield Mixtures(weights, *(np.concatenate(blocks) for blocks in zip(*moments, strict=True)))
+        mean, *variances = (np.concatenate(arrays) for arrays in zip(*moments, strict=True))
+        yield [Mixtures(weights, mean, variance) for variance in variances]
 
 
 def asked_for(
@@ -276,13 +295,6 @@ def stress_ratio(stress_type: str, mode: str | LoadingMode, channel: int) -> Cal
     return loading_mode(mode).paths[channel].cauchy_ratio
 
 
-def share_inside(solution: Solution, *, discrepancy: bool, prob: float = 0.95) -> float:
-    """Return the share of the measurements inside the predictive band at their own stretches."""
-    options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob}
-    inside = [inside_band(solution, curve, **options) for curve in solution.model.experiment.curves]
-    return float(np.mean(np.concatenate(inside)))
-
-
 def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: float = 0.95) -> NDArray[np.bool_]:
     """Return which measurements (n,) of a curve are inside the predictive band at their own stretches.
 
@@ -303,20 +315,27 @@ def _moments(
     channel: int,
     *,
     discrepancy: bool,
-    noise: bool,
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and variance (M, g) of a stress at points of a mode; those of a new test with its own errors."""
+    noises: Sequence[bool],
+) -> tuple[FloatArray, ...]:
+    """Return mean (M, g) of a stress at points of a mode and its variances (M, g), with noise or without.
 
-    def at(points: FloatArray, noise: bool) -> tuple[FloatArray, FloatArray]:
+    With noise they are those of a new test with its own errors.
+    """
+
+    def at(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         states = model.experiment.states_at(points, mode, channel)
-        return stress_moments(model, components, states, discrepancy=discrepancy, noise=noise)
+        return stress_moments(model, components, states, discrepancy=discrepancy, noise=False)
 
-    mean, variance = at(points, noise)
-    variance = variance + (model.common_error * mean) ** 2
-    if noise and model.tolerances:
-        slope = (at(points + STEP, False)[0] - mean) / STEP if model.tolerances.need_slope else 0.0
-        variance = variance + model.tolerances.variance(ErrorPoints(mode, points, mean, slope))
-    return mean, variance
+    mean, of_stress = at(points)
+    of_stress = of_stress + (model.common_error * mean) ** 2
+    if not any(noises):
+        return mean, *(of_stress for _ in noises)
+    states = model.experiment.states_at(points, mode, channel)
+    of_measurements = of_stress + variance_of_noise(model, components, states, mean)
+    if model.tolerances:
+        slope = (at(points + STEP)[0] - mean) / STEP if model.tolerances.need_slope else 0.0
+        of_measurements = of_measurements + model.tolerances.variance(ErrorPoints(mode, points, mean, slope))
+    return mean, *(of_measurements if noise else of_stress for noise in noises)
 
 
 def _only_mode(experiment: Experiment) -> LoadingMode:

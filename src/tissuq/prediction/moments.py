@@ -31,6 +31,7 @@ __all__ = [
     "mean_stress",
     "stress_moments",
     "values_of",
+    "variance_of_noise",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -168,14 +169,21 @@ def stress_moments(
     if discrepancy and components.member is not None:
         for shift, spread, variance, rows in _energies(model, components, states):
             mean[rows] += shift
-            root[rows] += spread
+            root[rows, :, : spread.shape[2]] += spread
             extra[rows] += variance
-    level = np.abs(mean)
     if discrepancy:
         extra += model.independent_variance(values)
     if noise:
-        extra += model.noise_variance(values, level) * model.relative_noise(states) ** 2
+        extra += variance_of_noise(model, components, states, mean)
     return mean, extra + np.einsum("mgp,mgp->mg", root, root)
+
+
+def variance_of_noise(
+    model: StatisticalModel, components: GaussianMixture, states: States, mean: FloatArray
+) -> FloatArray:
+    """Return the variance of the noise at states (g,) where the mean stress is known (M, g), for every component."""
+    values = {symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)}
+    return np.asarray(model.noise_variance(values, np.abs(mean)) * model.relative_noise(states) ** 2)
 
 
 def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
@@ -242,9 +250,10 @@ def conditioned_jointly(
 def _energies(
     model: StatisticalModel, components: GaussianMixture, states: States
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]]:
-    """Yield means (N, g), roots (N, g, p) and further variances (N, g) of energy discrepancies, and whose they are.
+    """Yield means (N, g), roots (N, g, q) and further variances (N, g) of energy discrepancies, and whose they are.
 
-    What the terms that serve the data leave of the discrepancy elsewhere is independent of the data.
+    Beyond q the roots are zero. What the terms that serve the data leave of the discrepancy elsewhere is independent of
+    the data.
     """
     for member, rows, features, weights in _energy_terms(model, components, states):
         unexplained = [
@@ -254,7 +263,9 @@ def _energies(
         symbols = [model.nonlinear.index(model.energy_symbols[k]) for k in member.amplitude_indices]
         all_terms = side_by_side(features, len(states))
         variance = components.settings[rows][:, symbols] ** 2 @ np.reshape(unexplained, (-1, len(states)))
-        yield components.mean[rows, weights] @ all_terms.T, all_terms @ components.root[rows, weights], variance, rows
+        root = components.root[rows, weights]
+        width = int(np.flatnonzero(root.any(axis=(0, 1))).max(initial=-1)) + 1
+        yield components.mean[rows, weights] @ all_terms.T, all_terms @ root[:, :, :width], variance, rows
 
 
 def _drawn_energies(

@@ -102,7 +102,8 @@ def judged(solution: Solution, curve: Curve, *, discrepancy: bool = True, prob: 
     options: dict[str, Any] = {"discrepancy": discrepancy}
     mode, _ = asked_for([solution], points, **options, prob=prob, mode=curve.mode, channel=curve.channel)
     rows, start = [], 0
-    for mixture in predictive_mixtures([(1.0, solution)], points, mode, curve.channel, **options, noise=True):
+    blocks = predictive_mixtures([(1.0, solution)], points, mode, curve.channel, **options, noises=(True,))
+    for (mixture,) in blocks:
         block = measured[start : start + mixture.means.shape[1]]
         start += len(block)
         ends = (mixture.quantile(0.5 * (1 - prob)), mixture.quantile(0.5 * (1 + prob)))

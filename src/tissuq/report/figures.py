@@ -17,7 +17,7 @@ from tissuq.experiments.experiment import Curve
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.units import StressUnit
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import Band, inside_band, predict_band
+from tissuq.prediction.bands import Band, predict_band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +90,7 @@ def predictive_figure(
         base = bands[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
         for index, (axis, (name, curve)) in enumerate(zip(axes, panels, strict=False)):
             posterior, band = posteriors[name], bands[index]
-            inside = inside_band(posterior.solution, curve, discrepancy=discrepancy).sum()
+            inside = posterior.inside_bands(discrepancy=discrepancy)[index % len(curves)].sum()
             labels = [name] * (len(posteriors) > 1) + [_name_of(curve)] * (len(curves) > 1) or [name]
             axis.set_title(f"{', '.join(labels)}:  {inside} of {len(curve)} inside")
             _draw_band(axis, band, unit)

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.prediction.bands import Band
 from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
 from tissuq.report.tables import interval, significant, write_csv, write_json
 from tissuq.studies.prediction import Prediction
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -67,13 +67,13 @@ def _draw(axis: Axes, prediction: Prediction, channel: int, kind: bool) -> None:
     looks = ((noisy, 0.18, f"{share} of measurements"), (stress, 0.38, f"{share} of the stress"))
     is_path = prediction.points.ndim == 1 or prediction.data is None
     for band, strength, label in looks:
-        low, high = (band[end].to_numpy()[order] for end in ("low", "high"))
+        low, high = (band.low[order], band.high[order])
         if is_path:
             axis.fill_between(abscissa[order], low, high, color=BAND, alpha=strength, lw=0, label=label)
         else:
             axis.vlines(abscissa[order], low, high, color=BAND, alpha=strength, lw=5, label=label)
     style: dict[str, Any] = {"ls": "-", "lw": 1.6} if is_path else {"ls": "", "marker": "_", "ms": 7}
-    axis.plot(abscissa[order], stress["mean"].to_numpy()[order], color=BAND, label="predicted mean", **style)
+    axis.plot(abscissa[order], stress.mean[order], color=BAND, label="predicted mean", **style)
     axis.set_xlim(*_padded(abscissa.min(), abscissa.max()))
     axis.locator_params(axis="x", nbins=6)
     _shade(axis, prediction)
@@ -88,11 +88,13 @@ def _draw(axis: Axes, prediction: Prediction, channel: int, kind: bool) -> None:
                 axis.plot(points[is_shown], values, "o", mec=INK, mfc=face, ms=3.6, mew=0.9, label=label, zorder=4)
 
 
-def _drawn(prediction: Prediction, channel: int, kind: bool, noise: bool) -> pd.DataFrame:
+def _drawn(prediction: Prediction, channel: int, kind: bool, noise: bool) -> Band:
     """Return a band in the unit of the run, cut where it has long left the panel: no renderer takes any number."""
     low, high = _limits(prediction, channel)
-    band = prediction.bands[channel, kind, noise] / prediction.unit.to_mpa
-    return band.clip(lower=low - 5 * (high - low), upper=high + 5 * (high - low))
+    band = prediction.curves[channel, kind, noise]
+    ends = low - 5 * (high - low), high + 5 * (high - low)
+    drawn = (np.clip(stress / prediction.unit.to_mpa, *ends) for stress in (band.mean, band.low, band.high))
+    return Band(band.stretch, *drawn)
 
 
 def _abscissa(prediction: Prediction) -> tuple[int, FloatArray]:
@@ -156,12 +158,12 @@ def _limits(prediction: Prediction, channel: int) -> tuple[float, float]:
     calibrated = (
         prediction.is_calibrated if prediction.is_calibrated.any() else np.ones(len(prediction.points), dtype=bool)
     )
-    bands = [prediction.bands[channel, kind, True] for kind in prediction.kinds]
-    core = [band[end].to_numpy()[calibrated] for band in bands for end in ("low", "high")]
+    bands = [prediction.curves[channel, kind, True] for kind in prediction.kinds]
+    core = [stress[calibrated] for band in bands for stress in (band.low, band.high)]
     core += [] if prediction.data is None else [prediction.measured(channel)]
     low, high = min(float(values.min()) for values in core), max(float(values.max()) for values in core)
     margin = MARGIN * (high - low)
-    all_ends = np.concatenate([band[end].to_numpy() for band in bands for end in ("low", "high")])
+    all_ends = np.concatenate([stress for band in bands for stress in (band.low, band.high)])
     ends = np.clip([all_ends.min(), all_ends.max()], low - margin, high + margin)
     low, high = _padded(min(low, float(ends[0])), max(high, float(ends[1])))
     return low / scale, high / scale
@@ -210,7 +212,7 @@ def write_prediction_run(
         copy = {"file": f"{INPUT}/{source.name}", "mode": prediction.mode.name}
         relocated["data"] = settings.data.model_copy(update=copy)
     write_recipe(folder, command, settings.model_copy(update=relocated))
-    prediction.table.to_csv(folder / "prediction.csv", index=False)
+    write_csv(folder / "prediction.csv", prediction.rows)
     prediction.save(folder / "prediction.nc")
     if prediction.scores is not None:
         rows = [{str(name): value for name, value in row.items()} for row in prediction.scores.to_dict("records")]
@@ -241,8 +243,8 @@ def readable_bands(prediction: Prediction) -> list[list[str]]:
             cells = [f"{column[index]:.4g}" for column in prediction.controls.values()]
             cells += [name] * (len(prediction.stresses) > 1)
             for kind in prediction.kinds:
-                stress, noisy = (prediction.bands[channel, kind, noise].iloc[index] / scale for noise in (False, True))
-                cells += [_mean(stress), _ends(stress), _ends(noisy)]
+                stress, noisy = (prediction.curves[channel, kind, noise] for noise in (False, True))
+                cells += [_mean(stress, index, scale), _ends(stress, index, scale), _ends(noisy, index, scale)]
             rows.append([*cells, "yes" if prediction.is_calibrated[index] else "no"])
     return rows
 
@@ -294,15 +296,15 @@ def _stress(value: float) -> str:
     return significant(value) if abs(value) < MAX_STRESS else f"{value:.0e}"
 
 
-def _mean(band: pd.Series[float]) -> str:
-    mean, width = float(band["mean"]), float(band["high"] - band["low"])
+def _mean(band: Band, index: int, scale: float) -> str:
+    mean, width = (float(stress[index]) / scale for stress in (band.mean, band.high - band.low))
     if max(abs(mean), width) < MIN_STRESS:
         return "0"
     return interval(mean, mean, width / 4)[0] if abs(mean) < MAX_STRESS else f"{mean:.0e}"
 
 
-def _ends(band: pd.Series[float]) -> str:
-    low, high = float(band["low"]), float(band["high"])
+def _ends(band: Band, index: int, scale: float) -> str:
+    low, high = (float(stress[index]) / scale for stress in (band.low, band.high))
     if max(-low, high) < MIN_STRESS:
         return "0"
     texts = interval(low, high, (high - low) / 4) if max(-low, high) < MAX_STRESS else (f"{low:.0e}", f"{high:.0e}")
@@ -371,10 +373,9 @@ def _lead_of_bands(prediction: Prediction) -> str:
     )
     texts = []
     for channel, name in enumerate(prediction.stresses):
-        band = prediction.bands[channel, prediction.kinds[0], False].iloc[index] / prediction.unit.to_mpa
-        texts.append(
-            f"the {name} is {_mean(band)} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {_ends(band)})"
-        )
+        band, scale = prediction.curves[channel, prediction.kinds[0], False], prediction.unit.to_mpa
+        mean, ends = (words(band, index, scale) for words in (_mean, _ends))
+        texts.append(f"the {name} is {mean} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
     extrapolated = "" if len(calibrated) else ", which is outside the measured range"
     kind = _kind(prediction, prediction.kinds[0])
     return f"At {point_words} in mode {prediction.mode.name}{extrapolated}, {' and '.join(texts)}: {kind}."

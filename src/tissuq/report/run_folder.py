@@ -9,6 +9,7 @@ import shutil
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import cache
 from importlib.metadata import version
 from itertools import repeat
 from pathlib import Path
@@ -20,6 +21,7 @@ from tissuq.report.tables import Row, parameter_rows, write_csv, write_json
 from tissuq.studies.settings import RECIPE
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from matplotlib.figure import Figure
     from pydantic import BaseModel
 
@@ -189,17 +191,22 @@ LIBRARIES = ("tissuq", "numpy", "scipy", "jax", "blackjax", "arviz-stats", "xarr
 
 def write_page(folder: Path, template: str, **context: Any) -> None:
     """Write report.html from a template of this package, with the folder's recipe and figures; values are escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
     recipe = folder / RECIPE
     context["recipe"] = recipe.read_text(encoding="utf-8") if recipe.exists() else ""
     context["figures"] = {path.stem: _as_address(path) for path in sorted((folder / "figures").glob("*.svg"))}
-    page = environment.get_template(template).render(versions=versions(), **context)
+    page = _templates().get_template(template).render(versions=versions(), **context)
     (folder / "report.html").write_text(page, encoding="utf-8")
+
+
+@cache
+def _templates() -> Environment:
+    """Return the templates of this package, each compiled once in a process."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
 
 
 def _as_address(figure: Path) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
+from tissuq.posterior.labelled import summaries
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.units import StressUnit
@@ -41,7 +42,7 @@ STABILITY = ("stable", "lost_at", "lost_at_low", "lost_at_high")
 def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: float | None = None) -> Row:
     """Return the row of one formulation, C10 (or the material's first parameter) in MPa; empty what it has not."""
     symbol = posterior.model.headline
-    numbers = posterior.summary().to_dict("index")[symbol]
+    numbers = summaries(posterior.solution, parameters=[symbol])[symbol]
     low, high = float(numbers["hdi_low"]), float(numbers["hdi_high"])
     return {
         "formulation": formulation,
@@ -71,7 +72,7 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
     """Return mean, sd, median and 95 % HPD of every parameter of every formulation, with its unit and prior."""
     rows = []
     for formulation, posterior in posteriors.items():
-        table = posterior.summary().to_dict("index")
+        table = summaries(posterior.solution)
         for parameter in posterior.model.parameters:
             numbers = table[parameter.symbol]
             rows.append(
@@ -236,7 +237,7 @@ def readable_parameters(posteriors: Mapping[str, Posterior], unit: StressUnit) -
     """Return rows of formulation, parameter, unit, prior, median, mean, sd and interval as text."""
     rows = []
     for formulation, posterior in posteriors.items():
-        for symbol, numbers in posterior.summary().iterrows():
+        for symbol, numbers in summaries(posterior.solution).items():
             parameter = next(p for p in posterior.model.parameters if p.symbol == symbol)
             is_stress = parameter.unit == "MPa"
             factor = unit.to_mpa if is_stress else 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -21,7 +21,7 @@ from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import speaks_of
+from tissuq.prediction.bands import Band, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Prediction:
         ``"engineering"`` or ``"cauchy"``.
     kinds : tuple of bool
         With the discrepancy and without, as far as they differ and the discrepancy says something about the mode.
-    bands : mapping of (int, bool, bool) to pandas.DataFrame
+    curves : mapping of (int, bool, bool) to Band
         Mean, low and high (MPa) by number of the stress, with the discrepancy or not, and with noise or not.
     data : Experiment, optional
         The measurements that it is compared with.
@@ -68,7 +68,7 @@ class Prediction:
     prob: float
     stress_type: str
     kinds: tuple[bool, ...]
-    bands: Mapping[tuple[int, bool, bool], pd.DataFrame]
+    curves: Mapping[tuple[int, bool, bool], Band]
     data: Experiment | None
     scores: pd.DataFrame | None
     warnings: tuple[str, ...]
@@ -77,6 +77,13 @@ class Prediction:
     def unit(self) -> StressUnit:
         """The unit in which the run's measurements give stresses."""
         return stress_unit(self.posterior.model.experiment.stress_unit)
+
+    @cached_property
+    def bands(self) -> Mapping[tuple[int, bool, bool], pd.DataFrame]:
+        """The `curves` as tables with the columns stretch, mean, low and high."""
+        import pandas as pd
+
+        return {key: pd.DataFrame(vars(band)) for key, band in self.curves.items()}
 
     @property
     def stresses(self) -> tuple[str, ...]:
@@ -122,17 +129,23 @@ class Prediction:
         """
         import pandas as pd
 
-        tables = []
+        return pd.DataFrame(self.rows)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of `table`."""
+        rows: list[dict[str, Any]] = []
         for channel, name in enumerate(self.stresses):
-            columns: dict[str, Any] = {"measured": name} if len(self.stresses) > 1 else {}
-            columns |= self.controls | {"is_calibrated": self.is_calibrated}
+            columns: dict[str, FloatArray | NDArray[np.bool_]] = self.controls | {"is_calibrated": self.is_calibrated}
             for kind in self.kinds:
                 prefix = "" if kind else "alone_"
-                stress, noisy = (self.bands[channel, kind, noise] for noise in (False, True))
-                columns |= {f"{prefix}{end}": stress[end].to_numpy() for end in ("mean", "low", "high")}
-                columns |= {f"{prefix}predictive_{end}": noisy[end].to_numpy() for end in ("low", "high")}
-            tables.append(pd.DataFrame(columns))
-        return pd.concat(tables, ignore_index=True)
+                stress, noisy = (self.curves[channel, kind, noise] for noise in (False, True))
+                columns |= {f"{prefix}{end}": getattr(stress, end) for end in ("mean", "low", "high")}
+                columns |= {f"{prefix}predictive_{end}": getattr(noisy, end) for end in ("low", "high")}
+            label = {"measured": name} if len(self.stresses) > 1 else {}
+            values = (column.tolist() for column in columns.values())
+            rows += [label | dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
+        return rows
 
     @property
     def data_set(self) -> xr.Dataset:
@@ -150,7 +163,7 @@ class Prediction:
         order = [*product(self.kinds, (True, False), range(len(self.stresses)))]
         shape = len(self.kinds), 2, len(self.stresses), len(self.points)
         arrays = {
-            end: np.reshape([self.bands[channel, kind, noise][end] for kind, noise, channel in order], shape)
+            end: np.reshape([getattr(self.curves[channel, kind, noise], end) for kind, noise, channel in order], shape)
             for end in ("mean", "low", "high")
         }
         mpa, dims = {"units": "MPa"}, ("discrepancy", "noise", "stress", along)
@@ -238,33 +251,43 @@ def predicted(
     model = posterior.model
     kinds = (True, False) if model.discrepancy.parameters and speaks_of(model, target) else (False,)
     options: dict[str, Any] = {"prob": prob, "stress_type": stress_type}
-    order = product(range(len(target.stresses)), kinds, (False, True))
-    bands = {key: _band(posterior, target, grid, *key, options) for key in order}
+    curves = {
+        (channel, kind, noise): curve
+        for channel, kind in product(range(len(target.stresses)), kinds)
+        for noise, curve in _bands(posterior, target, grid, channel, kind, **options).items()
+    }
     scores = None if data is None else _scores(posterior, data, kinds, options)
     warnings = tuple(_prediction_warnings(posterior, target, grid, data))
-    return Prediction(posterior, target, grid, prob, stress_type, kinds, bands, data, scores, warnings)
+    return Prediction(posterior, target, grid, prob, stress_type, kinds, curves, data, scores, warnings)
 
 
-def _band(
+def _bands(
     posterior: Posterior,
     mode: LoadingMode,
     grid: FloatArray,
     channel: int,
     kind: bool,
-    noise: bool,
-    options: dict[str, Any],
-) -> pd.DataFrame:
-    """Return mean, low and high of a stress at points; refuse where it is too large for a number."""
+    *,
+    prob: float,
+    stress_type: str,
+) -> dict[bool, Band]:
+    """Return mean, low and high of a stress at points, without noise and with it; refuse what is no number."""
+    options: dict[str, Any] = {"discrepancy": kind, "prob": prob, "mode": mode, "channel": channel}
+    ratio, noises = stress_ratio(stress_type, mode, channel)(grid), (False, True)
     with np.errstate(over="ignore", invalid="ignore"):
-        band = posterior.predict(grid, mode=mode, channel=channel, discrepancy=kind, noise=noise, **options)
-    is_finite = np.isfinite(band.to_numpy()).all(axis=1)
-    if not is_finite.all():
-        value = grid.reshape(len(grid), -1)[~is_finite, 0][0]
-        raise ModelError(
-            f"the predicted stress overflows at a {mode.controls[0].name} of {value:g}: predict nearer to the "
-            "measured range."
-        )
-    return band
+        bands = [
+            replace(band, mean=ratio * band.mean, low=ratio * band.low, high=ratio * band.high)
+            for band in predict_bands([(1.0, posterior.solution)], grid, noises, **options)
+        ]
+    for band in bands:
+        is_finite = np.isfinite([band.mean, band.low, band.high]).all(axis=0)
+        if not is_finite.all():
+            value = grid.reshape(len(grid), -1)[~is_finite, 0][0]
+            raise ModelError(
+                f"the predicted stress overflows at a {mode.controls[0].name} of {value:g}: predict nearer to the "
+                "measured range."
+            )
+    return dict(zip(noises, bands, strict=True))
 
 
 def _mode(posterior: Posterior, mode: str | LoadingMode | None, data: Experiment | None) -> LoadingMode:

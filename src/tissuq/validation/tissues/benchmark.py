@@ -148,16 +148,16 @@ def predicted(posterior: Posterior, test: Experiment) -> dict[str, float]:
     measured, quantiles = [], []
     for curve in test.curves:
         is_loaded = curve.stress != 0
-        mixtures = predictive_mixtures(
+        blocks = predictive_mixtures(
             [(1.0, posterior.solution)],
             curve.points[is_loaded],
             curve.mode,
             curve.channel,
             discrepancy=speaks_of(model, curve.mode),
-            noise=True,
+            noises=(True,),
         )
         measured.append(curve.stress[is_loaded])
-        quantiles += [[mixture.quantile(tail) for tail in tails] for mixture in mixtures]
+        quantiles += [[mixture.quantile(tail) for tail in tails] for (mixture,) in blocks]
     stress, levels = np.concatenate(measured), np.concatenate(quantiles, axis=1)
     size = _root_mean_square(stress)
     result = {}
