@@ -63,7 +63,7 @@ def test_runs_are_compared(cli, two_runs):
 
 def test_a_comparison_is_never_overwritten_unasked(cli, two_runs):
     for options, status in (([], 0), ([], 2), (["--force"], 0)):
-        said = cli("compare", "first", "second", "--out", "compared", *options)
+        said = cli("compare", "first", "--out", "compared", *options)
         assert said.status == status
         assert ("compared" in said.err) == (status == 2)
     said = cli("compare", "first", "second", "--out", "second", "--force")

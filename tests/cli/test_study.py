@@ -86,4 +86,7 @@ def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, h
     assert "there is no protocol 'test'; choose from tests, modes, specimens, ends, halves" in " ".join(
         refused.err.split()
     )
+    refused = cli(*arguments, "--tolerance", "stres=10%", "--out", "other")
+    assert refused.status == 2
+    assert "'stres=10%' is not a tolerance" in refused.err
     assert not (here / "other").exists()

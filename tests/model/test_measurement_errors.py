@@ -5,7 +5,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.modes import SimpleShear, Uniaxial
-from tissuq.model.measurement_errors import ErrorPoints, MeasurementError, Tolerances
+from tissuq.model.error_model import whitening
+from tissuq.model.measurement_errors import ErrorPoints, FittedErrors, MeasurementError, Tolerances
 from tissuq.registry import variants
 
 STRETCH = np.linspace(1.02, 1.3, 15)
@@ -73,3 +74,57 @@ def test_sizes_of_zero_are_no_errors():
     assert not Tolerances(stress=0.0)
     assert Tolerances(stress=0.1, zero=0.0) == Tolerances(stress=0.1)
     assert Tolerances(stress=0.1).with_sizes(stress=0.0, slack=0.01) == Tolerances(slack=0.01)
+
+
+def smooth_covariance(strain):
+    """The covariance of a smooth relative error, written out: squared exponential, a third of the range long."""
+    length = (strain.max() - strain.min()) / 3
+    return np.exp(-0.5 * ((strain[:, None] - strain) / length) ** 2)
+
+
+def test_a_smooth_error_is_a_process_along_the_curve():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
+    model = tq.fit(data, discrepancy="none", noise_sd=0.002, tolerances=Tolerances(smooth=0.05)).model
+    curve = model.fitted_errors.curve
+    errors = smooth_covariance(STRETCH) * np.outer(curve, curve)
+    precision = np.linalg.inv(0.002**2 * np.eye(len(STRETCH)) + 0.05**2 * errors)
+    basis = 2 * (STRETCH - STRETCH**-2)
+    sd = (basis @ precision @ basis) ** -0.5
+    posterior = tq.fit(data, discrepancy="none", noise_sd=0.002, tolerances=Tolerances(smooth=0.05)).marginals["C10"]
+    assert posterior.mean == pytest.approx(sd**2 * (basis @ precision @ data.stress), rel=1e-5)
+    assert posterior.sd == pytest.approx(sd, rel=1e-4)
+    assert posterior.sd > 5 * tq.fit(data, discrepancy="none", noise_sd=0.002).marginals["C10"].sd
+
+
+@pytest.mark.parametrize("mode", ["uniaxial", "simple-shear", "biaxial"])
+def test_the_variance_of_a_smooth_error_is_that_of_the_stress_everywhere(mode):
+    along = np.linspace(-0.2, 0.4, 37)
+    loading = tq.loading_modes()[mode]()
+    stretch = loading.reference + (along if mode != "biaxial" else np.column_stack([along, 0.5 * along]))
+    stress = np.random.default_rng(1).random((4, 37))
+    variance = Tolerances(smooth=0.03).variance(ErrorPoints(loading, stretch, stress))
+    assert np.allclose(variance, (0.03 * stress) ** 2, rtol=2e-6)
+    alone = Tolerances(smooth=0.03).variance(ErrorPoints(loading, stretch[:1], stress[:, :1]))
+    assert np.allclose(alone, (0.03 * stress[:, :1]) ** 2, rtol=1e-12)
+
+
+def test_every_test_and_every_stress_has_a_smooth_error_of_its_own():
+    """Two tests of one specimen, one with two stresses: the covariance of the whitened data is that of blocks."""
+    along = np.linspace(0.02, 0.2, 9)
+    sheet = np.column_stack([1 + along, 1 + 0.5 * along])
+    tests = [
+        tq.Experiment("uniaxial", 1 + along, along, specimen="A"),
+        tq.Experiment("biaxial", sheet, np.column_stack([2 * along, along]), specimen="A"),
+    ]
+    curve = np.concatenate([along, 2 * along, along])
+    found = whitening(
+        tq.Experiment.of(tests), np.full(2, 0.01), 0.01, Tolerances(smooth=0.1), FittedErrors(curve=curve)
+    )
+    distance = np.linalg.norm(sheet - 1, axis=1)
+    block = [smooth_covariance(along), smooth_covariance(distance), smooth_covariance(distance)]
+    relative = np.zeros((27, 27))
+    for number, correlation in enumerate(block):
+        relative[9 * number : 9 * number + 9, 9 * number : 9 * number + 9] = correlation
+    covariance = 0.01**2 * np.eye(27) + 0.1**2 * relative * np.outer(curve, curve)
+    white = found(np.eye(27))
+    assert np.allclose(white @ covariance @ white.T, 0.01**2 * np.eye(27), atol=2e-5 * 0.01**2)

@@ -163,6 +163,16 @@ def test_a_fit_that_fails_is_counted_and_says_why(folder):
     assert summary.loc[0, ["predictions", "failed"]].tolist() == [1, 1]
 
 
+def test_tolerances_are_those_of_every_fit(folder):
+    settings = TissueSettings(folder=str(folder), sets=("gel-axial",), protocols=("tests",), formulations=("none",))
+    task = tasks_of(settings)[0]
+    wide = carry_out(settings.model_copy(update={"tolerances": {"stress": 0.3}}), task)["half_width"]
+    assert 1.9 * 0.3 < wide < 1.5 * 2 * 0.3 * 2**0.5  # of the fitted test and of the new one
+    assert carry_out(settings.model_copy(update={"tolerances": {}}), task)["half_width"] < 0.05
+    with pytest.raises(ValueError, match="there is no error of a test named 'stres'"):
+        TissueSettings(tolerances={"stres": 0.1})
+
+
 def test_no_more_predictions_are_made_than_asked_for(folder):
     settings = TissueSettings(folder=str(folder), protocols=("tests",), formulations=("none",), predictions=3)
     assert [task.number for task in tasks_of(settings) if task.tissue == "sheet"] == [0, 2, 3]

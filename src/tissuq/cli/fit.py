@@ -57,9 +57,9 @@ def fit(
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
-            help="Error of a whole test (standard deviation): stress=10%, length=2%, slack=0.01 (of stretch), zero=0.1 "
-            "(in the stress unit), or of every single stretch=0.001; or none; repeat [stress=18% for files of "
-            "different specimens]."
+            help="Error of a whole test (standard deviation): stress=10%, length=2%, slack=0.01 (of stretch), "
+            "smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single stretch=0.001; or none; "
+            "repeat [stress=18% for files of different specimens]."
         ),
     ] = None,
     specimen: Annotated[

@@ -201,8 +201,8 @@ def _tolerance(text: str) -> tuple[str, float]:
     if name not in errors or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
         names = ", ".join(errors)
         raise InputError(
-            f"'{text}' is not a tolerance; write stress=10%, length=2%, slack=0.01, zero=0.1 or stretch=0.001 (the "
-            f"errors are {names}; zero is in the unit of stress of the file)."
+            f"'{text}' is not a tolerance; write stress=10%, length=2%, slack=0.01, smooth=2%, zero=0.1 or "
+            f"stretch=0.001 (the errors are {names}; zero is in the unit of stress of the file)."
         )
     return name, value
 

@@ -177,11 +177,16 @@ def tissues(
     ] = None,
     formulation: Annotated[list[str] | None, typer.Option(help="A discrepancy; repeat for more [auto, none].")] = None,
     material: Annotated[str | None, typer.Option(help="The material that is fitted [neo-hookean].")] = None,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(help="Error of a test, as of tissuq fit (stresses in MPa): stress=10%, smooth=2% ...; or none."),
+    ] = None,
     predictions: Annotated[int | None, typer.Option(help="Predictions at most of a set and protocol [12].")] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
 ) -> None:
     """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
+    from tissuq.cli.reading import tolerances
     from tissuq.cli.tables import print_rows
     from tissuq.report.tissues import readable_tissues, write_tissues
     from tissuq.validation.tissues import TissueSettings, run_benchmark
@@ -190,7 +195,7 @@ def tissues(
     options: dict[str, Any] = {
         "folder": None if folder is None else str(folder.resolve()), "sets": dataset or None,
         "protocols": protocol or None, "formulations": formulation or None, "material": material,
-        "predictions": predictions,
+        "tolerances": tolerances(tolerance), "predictions": predictions,
     }  # fmt: skip
     settings = load_settings(TissueSettings, config, options)
     target = out or Path("runs") / (config.stem if config else "tissues")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.model.discrepancy import Discrepancy
-from tissuq.model.measurement_errors import FittedErrors, Tolerances, specimens_of
+from tissuq.model.measurement_errors import FittedErrors, Shared, Tolerances, specimens_of
 from tissuq.model.noise import Noise, stress_level
 
 __all__ = ["ErrorModel", "Whitening", "whitening"]
@@ -140,14 +140,24 @@ def _errors_of_tests(
 ) -> FloatArray:
     """Return what errors of whole specimens do to all measurements (n, q), for tests and their mean curves.
 
-    Of errors of the specimens only their differences from the specimens' mean.
+    Of errors of the specimens only their differences from the specimens' mean. Where tests have different numbers of
+    such columns, as of two stresses beside one, those that are missing are zero.
     """
-    shared = specimens.astype(np.float64)
-    deviations = shared - shared.mean(axis=1, keepdims=True)
+    of_specimen = specimens.astype(np.float64)
+    memberships: dict[Shared, FloatArray] = {
+        "differences": of_specimen - of_specimen.mean(axis=1, keepdims=True),
+        "specimen": of_specimen,
+        "test": np.eye(len(tests)),
+    }
+    widest = {shared: max(tolerances.columns(*pair, shared).shape[1] for pair in tests) for shared in memberships}
     rows = []
-    for (test, curve), deviation, specimen in zip(tests, deviations, shared, strict=True):
-        of_specimen, of_test = (tolerances.columns(test, curve, of_specimen=flag) for flag in (True, False))
-        rows.append(np.hstack([np.kron(of_specimen, deviation[None]), np.kron(of_test, specimen[None])]))
+    for number, (test, curve) in enumerate(tests):
+        blocks = []
+        for shared, membership in memberships.items():
+            columns = tolerances.columns(test, curve, shared)
+            padded = np.pad(columns, [(0, 0), (0, widest[shared] - columns.shape[1])])
+            blocks.append(np.kron(padded, membership[number][None]))
+        rows.append(np.hstack(blocks))
     return np.concatenate(rows)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
 from numbers import Real
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,15 @@ __all__ = [
 ]
 
 FloatArray = NDArray[np.float64]
+
+Shared = Literal["differences", "specimen", "test"]
+
+CORRELATION_SHARE = 1 / 3
+"""Correlation length of a smooth error over the range of the strain of its test."""
+PROCESS_NODES = 12
+"""Number of places along a test from which a smooth error is interpolated; its variance is right to 1e-6."""
+MIN_NODE_EIGENVALUE = 1e-11
+"""Eigenvalue, relative to the largest, below which a direction of the errors there is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +62,7 @@ class ErrorPoints:
 
 
 class MeasurementError(ABC):
-    """An error of a test: to first order it moves the measured stresses along a fixed curve.
+    """An error of a test: to first order it moves the measured stresses along a fixed curve, or a few of them.
 
     A new error is one subclass in one file: its name, what it is in words, and the stress that a unit of it adds. Its
     standard deviation is then one of `Tolerances`, in closed form like everything that is linear.
@@ -71,10 +80,25 @@ class MeasurementError(ABC):
     """Whether every measurement has one of its own, rather than all those of a specimen the same."""
     is_of_specimen: ClassVar[bool] = False
     """Whether only the specimens' differences from their mean are in the data: what all have in common is not."""
+    is_of_test: ClassVar[bool] = False
+    """Whether every test has one of its own, rather than all those of a specimen the same."""
+
+    @property
+    def shared(self) -> Shared:
+        """Between which tests it is the same."""
+        return "differences" if self.is_of_specimen else "test" if self.is_of_test else "specimen"
 
     @abstractmethod
     def effect(self, points: ErrorPoints) -> Any:
-        """Return what a unit of the error adds to the stresses (..., n), MPa."""
+        """Return what a unit of the error adds to the stresses (..., n), MPa.
+
+        One that is a sum of independent unit errors returns what each of them adds, (..., n, q).
+        """
+
+    def variance(self, points: ErrorPoints) -> Any:
+        """Return the variance (..., n) of the stress that a unit of the error gives, MPa^2."""
+        effect = np.asarray(self.effect(points))
+        return effect**2 if effect.ndim == np.ndim(points.stress) else (effect**2).sum(axis=-1)
 
 
 def measurement_errors() -> dict[str, type[MeasurementError]]:
@@ -127,6 +151,36 @@ class ZeroError(MeasurementError):
         return np.ones_like(points.stress)
 
 
+class SmoothError(MeasurementError):
+    """Relative, of the stress, and smooth along the curve: digitising, averaging, drift, half of a hysteresis.
+
+    A Gaussian process of the strain, squared exponential with a correlation length of a third of the range of the test;
+    of every stress of a test another one.
+    """
+
+    name = "smooth"
+    description = "of the stress, smooth along the curve"
+    is_of_test = True
+
+    def effect(self, points: ErrorPoints) -> Any:
+        strain = points.stretch - points.mode.reference
+        distance = strain if strain.ndim == 1 else np.linalg.norm(strain, axis=1)
+        root = _process_root(distance, CORRELATION_SHARE * float(np.ptp(distance)))
+        stresses_of_mode = np.shape(points.stress)[-1] // len(distance)
+        return np.asarray(points.stress)[..., None] * np.kron(np.eye(stresses_of_mode), root)
+
+
+def _process_root(places: FloatArray, length: float) -> FloatArray:
+    """Return a root (n, q) of the squared-exponential correlation of places (n,), from a few places among them."""
+    if length <= 0:
+        return np.ones((len(places), 1))
+    nodes = np.linspace(places.min(), places.max(), PROCESS_NODES)
+    values, vectors = np.linalg.eigh(np.exp(-0.5 * ((nodes[:, None] - nodes) / length) ** 2))
+    is_significant = values > MIN_NODE_EIGENVALUE * values[-1]
+    across = np.exp(-0.5 * ((places[:, None] - nodes) / length) ** 2)
+    return np.asarray(across @ vectors[:, is_significant] / np.sqrt(values[is_significant]))
+
+
 class StretchError(MeasurementError):
     """Of every single stretch: independent errors of the displacement, which are noise where the curve is steep."""
 
@@ -157,6 +211,8 @@ class Tolerances:
         Of the stretch at which the specimen is free of stress: slack, preload.
     zero : float, MPa
         Of the stress at rest: zero of the load cell.
+    smooth : float
+        Relative, of the stress, another one all along the curve of each test: digitising, averaging, drift, hysteresis.
     stretch : float
         Of every single stretch: independent errors of the displacement, which count as noise where the curve is steep.
     **sizes : float
@@ -224,7 +280,7 @@ class Tolerances:
 
     def variance(self, points: ErrorPoints) -> FloatArray:
         """Return the variance (..., n) of the stress of a new test at points."""
-        return np.asarray(sum((size * error.effect(points)) ** 2 for error, size in self))
+        return np.asarray(sum(size**2 * error.variance(points) for error, size in self))
 
     def noise(self, test: Experiment, curve: FloatArray) -> FloatArray:
         """Return what errors that every measurement has by itself are as noise of the stress: sd (n,), MPa."""
@@ -232,16 +288,18 @@ class Tolerances:
         variances = [(size * error.effect(points)) ** 2 for error, size in self if error.is_independent]
         return np.asarray(np.sqrt(sum(variances, start=np.zeros(len(curve)))))
 
-    def columns(self, test: Experiment, curve: FloatArray, *, of_specimen: bool) -> FloatArray:
-        """Return what one standard deviation of each error that a test shares does to its stresses (n, q), MPa.
+    def columns(self, test: Experiment, curve: FloatArray, shared: Shared) -> FloatArray:
+        """Return what one standard deviation of each error of a test as a whole does to its stresses (n, q), MPa.
 
         Parameters
         ----------
         test : Experiment
         curve : (n,) array, MPa
             About what stresses it has without errors.
-        of_specimen : bool
-            The errors of which only differences between specimens are in the data, or the others.
+        shared : str
+            The errors that are shared between the tests in one way: ``"differences"``, of which only differences
+            between specimens are in the data; ``"specimen"``, which all tests of a specimen share; ``"test"``, of
+            which every test has its own.
 
         Raises
         ------
@@ -250,9 +308,7 @@ class Tolerances:
         """
         points = self._points(test, curve)
         columns = [
-            size * error.effect(points)
-            for error, size in self
-            if not error.is_independent and error.is_of_specimen == of_specimen
+            size * error.effect(points) for error, size in self if not error.is_independent and error.shared == shared
         ]
         return np.column_stack([np.zeros((len(curve), 0)), *columns])
 

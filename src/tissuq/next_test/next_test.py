@@ -237,7 +237,8 @@ class NextTest:
         """
         sd, count = self.tolerances.stress * np.sqrt(1 + 1 / self._specimens), self._specimens + 1
         yield mean * sd, target_mean * self._common_error(sd / count)
-        for column in self.tolerances.columns(test, curve, of_specimen=False).T:
+        columns = [self.tolerances.columns(test, curve, shared) for shared in ("specimen", "test")]
+        for column in np.hstack(columns).T:
             if column.any():
                 yield np.broadcast_to(column, mean.shape), np.zeros_like(target_mean)
 

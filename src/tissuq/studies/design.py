@@ -69,7 +69,7 @@ class DesignStudy:
     posterior : Posterior
     targets : tuple of Target
     table : pandas.DataFrame
-        Of `tissuq.assessment.rank_tests`.
+        Of `tissuq.next_test.rank_tests`.
     specimen : str
         Whether the next test is on the same specimen or another one, and the relative error of its stress as a whole.
     error : float

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
+from tissuq.model.measurement_errors import Tolerances
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predictive_mixtures, speaks_of
@@ -118,13 +119,17 @@ def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
         "predicted": target.name,
         "mode": target.mode.name,
     }
+    tolerances = None if settings.tolerances is None else Tolerances(**settings.tolerances)
+    options: dict[str, Any] = {
+        "material": settings.material, "discrepancy": task.formulation, "tolerances": tolerances,
+    }  # fmt: skip
     try:
-        posterior = fit(fitted, material=settings.material, discrepancy=task.formulation)
+        posterior = fit(fitted, **options)
         row |= predicted(posterior, target)
         if task.protocol == MODULI:
-            own = fit(target, material=settings.material, discrepancy=task.formulation).initial_shear_modulus
+            of_target = fit(target, **options).initial_shear_modulus
             low, high = posterior.initial_shear_modulus.hdi(PROBABILITIES[-1])
-            row |= {"modulus_low": low, "modulus_high": high, "modulus_of_predicted": float(own.quantile(0.5))}
+            row |= {"modulus_low": low, "modulus_high": high, "modulus_of_predicted": float(of_target.quantile(0.5))}
         return row
     except (TissuqError, np.linalg.LinAlgError) as error:
         return row | {"failure": str(error)}

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from tissuq.errors import TissuqError
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.measurement_errors import Tolerances
 from tissuq.validation.tissues.protocols import PROTOCOLS
 
 __all__ = ["TissueSettings"]
+
+Named = TypeVar("Named")
 
 
 class TissueSettings(BaseModel):
@@ -28,6 +32,8 @@ class TissueSettings(BaseModel):
     formulations : tuple of str
         Discrepancies of the fits.
     material : str
+    tolerances : dict of str to float, optional
+        Standard deviations of errors of the tests (`tissuq.Tolerances`, stresses in MPa); as by default without it.
     points : int
         Number of measurements at most that are taken from a test, evenly along it.
     predictions : int
@@ -41,6 +47,7 @@ class TissueSettings(BaseModel):
     protocols: tuple[str, ...] = ("tests", "specimens", "ends")
     formulations: tuple[str, ...] = ("auto", "none")
     material: str = "neo-hookean"
+    tolerances: dict[str, float] | None = None
     points: int = Field(30, ge=4, le=10_000)
     predictions: int = Field(12, ge=1)
 
@@ -55,12 +62,18 @@ class TissueSettings(BaseModel):
     @field_validator("formulations")
     @classmethod
     def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(_named(discrepancy_named, name) for name in names)
+        return tuple(_looked_up(discrepancy_named, name) for name in names)
+
+    @field_validator("tolerances")
+    @classmethod
+    def _known_errors(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
+        _looked_up(lambda named: Tolerances(**named), sizes or {})
+        return sizes
 
     @field_validator("material")
     @classmethod
     def _known_material(cls, name: str) -> str:
-        return _named(material_named, name)
+        return _looked_up(material_named, name)
 
     @field_validator("protocols", "formulations")
     @classmethod
@@ -70,8 +83,8 @@ class TissueSettings(BaseModel):
         return names
 
 
-def _named(find: Any, name: str) -> str:
-    """Return a name that something has, or explain that nothing has."""
+def _looked_up(find: Callable[[Named], object], name: Named) -> Named:
+    """Return what something has as a name, or explain that nothing has."""
     try:
         find(name)
     except TissuqError as error:
