@@ -48,7 +48,7 @@ def log_mass_by_panels(covariance, low, high):
 
 
 def test_the_mass_within_two_bounds_is_that_of_dense_panels():
-    covariance, low, high = (each[:100] for each in gaussians(200, 2))
+    covariance, low, high = (each[:40] for each in gaussians(200, 2))
     log_mass, error = nested_log_mass(np.linalg.cholesky(covariance), low, high)
     truth = np.array([log_mass_by_panels(*each) for each in zip(covariance, low, high, strict=True)])
     assert truth.min() < -1000
@@ -60,7 +60,7 @@ def test_the_mass_within_two_bounds_is_that_of_dense_panels():
 
 
 def test_the_mass_within_three_bounds_does_not_depend_on_their_order():
-    covariance, low, high = gaussians(40, 3)
+    covariance, low, high = gaussians(16, 3)
     first, error = nested_log_mass(np.linalg.cholesky(covariance), low, high)
     assert first.min() < -1000
     assert error.max() < 2e-3
