@@ -28,7 +28,7 @@ def specimen_study_of(file, *names):
 
 @pytest.fixture(scope="session")
 def specimen_study(specimen_file):
-    return specimen_study_of(specimen_file, "none", "yeoh", "auto")
+    return specimen_study_of(specimen_file, "none", "constant", "yeoh", "auto")
 
 
 @pytest.fixture(scope="session")
