@@ -124,6 +124,12 @@ def save_no_figure(figure: object, folder: Path, name: str) -> None:
         (folder / f"{name}.{kind}").touch()
 
 
+@pytest.fixture
+def empty_figures(monkeypatch):
+    """Leave empty files in the place of figures."""
+    monkeypatch.setattr("tissuq.report.figures.save_figure", save_no_figure)
+
+
 @pytest.fixture(scope="session")
 def paper_run(tmp_path_factory):
     """A small run of the paper's study, on one range, with figures left empty: its folder and what was said."""
