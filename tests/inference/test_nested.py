@@ -119,7 +119,7 @@ def test_four_bounds_go_by_points_and_sweeps():
     log_mass, error = box.log_mass(np.zeros((1, 4)), root)
     assert abs(log_mass[0] - np.log(0.2)) < 3 * error[0] + 1e-4  # 1 / (k + 1) for correlations of one half
     drawn = box.draws(np.zeros((1, 4)), root, np.random.default_rng(0).random((1, 4000, 4)))[0]
-    free = np.random.default_rng(2).standard_normal((200_000, 4)) @ root[0].T
+    free = np.random.default_rng(2).standard_normal((100_000, 4)) @ root[0].T
     kept = free[(free >= 0).all(axis=1)]
     assert np.abs(drawn.mean(axis=0) - kept.mean(axis=0)).max() < 0.06
     assert np.abs(np.cov(drawn.T) - np.cov(kept.T)).max() < 0.06
