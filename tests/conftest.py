@@ -28,7 +28,7 @@ def paper():
 
 @pytest.fixture
 def one_range(monkeypatch):
-    """Leave out the study's other stretch ranges, of which `paper_run` in the tests of the command line has all."""
+    """Leave out the study's other stretch ranges, of which `whole_paper_run` of the command line has all."""
     monkeypatch.setattr("tissuq.validation.paper.study.RANGES", ())
 
 

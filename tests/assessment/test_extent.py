@@ -123,6 +123,7 @@ def test_a_sampler_that_has_nothing_to_sample_without_discrepancy_gives_no_compa
     assert found.width_against_none is None
 
 
+@pytest.mark.slow
 def test_a_parameter_that_no_closed_form_integrates_is_assessed_too(data):
     found = gallery.fit(data, discrepancy="taylor", noise_sd=0.05, priors={"C10": tq.LogNormal(0.5, 0.5)}).assess()
     assert 0 <= found.between <= 1

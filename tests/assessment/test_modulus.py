@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from marks import slow_but
 
 STRETCH = np.linspace(0.75, 1.7, 20)
 
@@ -44,10 +45,11 @@ def test_where_one_parameter_makes_it_it_is_that_one_scaled():
         ("mooney-rivlin", "determined by C10 and C01 together, each of which is less certain."),
     ],
 )
-def test_the_assessment_says_which_parameters_keep_their_meaning(material, words):
+@pytest.mark.parametrize("discrepancy", slow_but(["taylor"], ["taylor", "auto"]))
+def test_the_assessment_says_which_parameters_keep_their_meaning(material, words, discrepancy):
     data = measured()
     in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress, stress_unit="kPa")
-    found = tq.fit(in_kpa, material=material, noise_sd=0.03).assess()
+    found = tq.fit(in_kpa, material=material, discrepancy=discrepancy, noise_sd=0.03).assess()
     (sentence,) = (text for text in found.sentences if "initial shear modulus" in text)
     assert sentence.endswith(words)
     assert f"is {1000 * found.modulus[0]:.3g} kPa" in sentence

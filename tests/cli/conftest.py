@@ -105,23 +105,53 @@ def tree(folder: Path) -> dict[str, bytes | None]:
     }
 
 
-@pytest.fixture(scope="session")
-def paper_run(tmp_path_factory):
-    """A small run of the paper's study with figures: its folder and what was said."""
-    folder = tmp_path_factory.mktemp("paper")
+def carry_out_paper(folder: Path) -> tuple[Path, Outcome]:
     options = ["--points", 12, "--noise-sd", 0.4, "--seed", 7, "--prior", "c=uniform(0,2)"]
     said = run_in(folder, "paper", *options, "--out", "run")
     assert said.status == 0, said.err
     return folder / "run", said
 
 
+@pytest.fixture
+def empty_posteriors(monkeypatch):
+    """Leave empty files in the place of posteriors, which other tests write and read."""
+    monkeypatch.setattr("tissuq.posterior.posterior.Posterior.save", lambda self, path: path.touch())
+
+
+def save_no_figure(figure: object, folder: Path, name: str) -> None:
+    """Leave empty files where `save_figure` would draw."""
+    for kind in ("svg", "png"):
+        (folder / f"{name}.{kind}").touch()
+
+
+@pytest.fixture
+def empty_figures(monkeypatch):
+    """Leave empty files in the place of figures."""
+    monkeypatch.setattr("tissuq.report.figures.save_figure", save_no_figure)
+
+
+@pytest.fixture(scope="session")
+def paper_run(tmp_path_factory):
+    """A small run of the paper's study, on one range, with figures left empty: its folder and what was said."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tissuq.validation.paper.study.RANGES", ())
+        patch.setattr("tissuq.report.figures.save_figure", save_no_figure)
+        return carry_out_paper(tmp_path_factory.mktemp("paper"))
+
+
+@pytest.fixture(scope="session")
+def whole_paper_run(tmp_path_factory):
+    """The same run with every stretch range and its figures drawn, for slow tests."""
+    return carry_out_paper(tmp_path_factory.mktemp("whole_paper"))
+
+
 @pytest.fixture(scope="session")
 def fit_run(tmp_path_factory):
-    """A fit with figures of three discrepancies, in a process of its own: its folder and what was said."""
+    """A fit with figures of three discrepancies: its folder and what was said."""
     folder = tmp_path_factory.mktemp("fit")
     write_specimen(folder / "specimen.csv")
     chosen = [word for name in ("none", "constant", "gp") for word in ("--discrepancy", name)]
-    said = command("fit", "specimen.csv", *chosen, "--noise-sd", 1, "--seed", 3, folder=folder)
+    said = run_in(folder, "fit", "specimen.csv", *chosen, "--noise-sd", 1, "--seed", 3)
     assert said.status == 0, said.err
     return folder / "runs" / "specimen", said
 

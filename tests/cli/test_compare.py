@@ -61,9 +61,9 @@ def test_runs_are_compared(cli, two_runs):
     }
 
 
-def test_a_comparison_is_never_overwritten_unasked(cli, two_runs):
+def test_a_comparison_is_never_overwritten_unasked(cli, two_runs, empty_figures):
     for options, status in (([], 0), ([], 2), (["--force"], 0)):
-        said = cli("compare", "first", "second", "--out", "compared", *options)
+        said = cli("compare", "first", "--out", "compared", *options)
         assert said.status == status
         assert ("compared" in said.err) == (status == 2)
     said = cli("compare", "first", "second", "--out", "second", "--force")
@@ -87,7 +87,7 @@ def test_a_file_that_is_no_posterior_is_refused(cli, here):
     assert "cannot be read" in said.err
 
 
-def test_runs_of_one_name_are_kept_apart(cli, two_runs):
+def test_runs_of_one_name_are_kept_apart(cli, two_runs, empty_figures):
     (two_runs / "other").mkdir()
     (two_runs / "first").rename(two_runs / "other" / "run")
     (two_runs / "second").rename(two_runs / "run")
@@ -98,7 +98,7 @@ def test_runs_of_one_name_are_kept_apart(cli, two_runs):
 
 
 @pytest.mark.parametrize("text", slow_but(["nothing"], ["nothing", "[]", '[{"formulation": "auto"}]']))
-def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, text):
+def test_a_damaged_assessment_leaves_other_priors_unknown(cli, two_runs, empty_figures, text):
     (two_runs / "second" / "assessment.json").write_text(text)
     assert cli("compare", "first/posterior/none.nc", "second", "--out", "compared").status == 0
     assert rows_of(two_runs / "compared")["second/auto"]["evidence_change_quarter"] == ""

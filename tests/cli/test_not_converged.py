@@ -66,7 +66,9 @@ def test_an_rhat_that_is_not_a_number_is_null_in_json(cli, stuck, here, specimen
     assert cli("show", "runs/specimen").status == 0
 
 
-def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_results(cli, stuck, here, one_range):
+def test_the_study_of_the_paper_ends_with_status_3_too_and_keeps_its_exact_results(
+    cli, stuck, here, one_range, empty_posteriors
+):
     stuck()
     said = cli("paper", "--points", 6, "--sampler", "both", "--no-figures", "--out", "run")
     assert said.status == 3

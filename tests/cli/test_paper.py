@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import tissuq as tq
+from marks import slow_but
 
 from .conftest import command, without_wall_times
 
@@ -23,8 +24,9 @@ def rows_of(file):
         return list(csv.DictReader(lines))
 
 
-def test_a_run_leaves_the_promised_files(paper_run):
-    folder, _ = paper_run
+@pytest.mark.parametrize("name", slow_but(["paper_run"], ["paper_run", "whole_paper_run"]))
+def test_a_run_leaves_the_promised_files(request, name):
+    folder, _ = request.getfixturevalue(name)
     figures = {f"figures/figure{number}.{kind}" for number in range(1, 8) for kind in ("svg", "png")}
     tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv", "claims.csv", "sensitivity.csv"}
     posteriors = {f"posterior/{name}.nc" for name in FORMULATIONS}
@@ -109,9 +111,16 @@ def test_the_table_in_the_terminal_fits_80_columns_and_says_where_the_report_lie
     assert "Report: run/report.html" in said.out
 
 
+def test_show_prints_the_study(cli, paper_run):
+    folder, said = paper_run
+    shown = cli("show", folder)
+    assert shown.status == 0
+    assert shown.out.split("Report:")[0] == said.out.split("Report:")[0]
+
+
 @pytest.mark.slow
-def test_a_run_is_repeated_byte_for_byte_from_its_run_toml(paper_run, tmp_path):
-    folder, _ = paper_run
+def test_a_run_is_repeated_byte_for_byte_from_its_run_toml(whole_paper_run, tmp_path):
+    folder, _ = whole_paper_run
     said = command("paper", "--config", folder / "run.toml", "--out", "again", folder=tmp_path)
     assert (said.status, said.err) == (0, "")
     first, second = without_wall_times(folder), without_wall_times(tmp_path / "again")
@@ -180,7 +189,7 @@ def test_options_on_the_command_line_prevail_over_the_file_and_leave_its_other_p
     assert settings["priors"]["S"] == {"distribution": "half-normal", "sd": 2.0}
 
 
-def test_replicates_count_how_often_each_claim_holds(cli, here, one_range):
+def test_replicates_count_how_often_each_claim_holds(cli, here, one_range, empty_posteriors):
     said = cli("paper", "--points", 6, "--replicates", 2, "--no-figures", "--out", "run")
     assert said.status == 0, said.err
     claims = rows_of(here / "run" / "claims.csv")

@@ -9,6 +9,7 @@ from scipy.stats import binom, multivariate_normal, norm
 
 import tissuq as tq
 from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden
+from marks import slow_but
 from tissuq.emulation import emulate
 from tissuq.emulation.likelihood import Likelihood
 from tissuq.emulation.problem import pose
@@ -23,7 +24,7 @@ def measured(function, truth, noise, seed=0):
     return function(truth) + noise * np.random.default_rng(seed).standard_normal(len(DEPTH))
 
 
-@pytest.mark.parametrize("discrepancy", ["none", "gp", "gp-pinned"])
+@pytest.mark.parametrize("discrepancy", slow_but(["none", "gp-pinned"], ["none", "gp", "gp-pinned"]))
 def test_the_density_is_that_of_a_gaussian_with_all_three_errors(discrepancy):
     data = measured(ogden, TRUTH, 0.02)
     emulator = emulate(designed(ogden, OGDEN, 8), DEPTH)
@@ -62,7 +63,7 @@ def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     data = measured(ogden, TRUTH, 0.2)
     emulator = emulate(designed(ogden, OGDEN, 9), DEPTH)
     found = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.2, emulator=emulator)
-    mu, alpha = np.meshgrid(np.linspace(0.7, 2.4, 120), np.linspace(-13, -5.5, 120), indexing="ij")
+    mu, alpha = np.meshgrid(np.linspace(0.7, 2.4, 60), np.linspace(-13, -5.5, 60), indexing="ij")
     mean, cov = emulator.moments(np.column_stack([mu.ravel(), alpha.ravel()]))
     cov = cov + 0.2**2 * np.eye(len(DEPTH))
     score = np.linalg.solve(cov, (data - mean)[..., None])[..., 0]
@@ -74,7 +75,7 @@ def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
         own = found.marginals[symbol]
         assert own.mean == pytest.approx(centre, abs=0.03 * sd)
         assert own.sd == pytest.approx(sd, rel=0.03)
-    cell = (2.4 - 0.7) / 119 * (13 - 5.5) / 119 / (4.8 * 24)
+    cell = (2.4 - 0.7) / 59 * (13 - 5.5) / 59 / (4.8 * 24)
     assert found.log_evidence == pytest.approx(np.log(weights.sum() * cell) + logs.max(), abs=0.02)
 
 
@@ -109,14 +110,19 @@ def test_the_discrepancy_is_conditioned_on_the_data():
     np.testing.assert_allclose(variance[17], np.diag(process - gain @ process), atol=1e-6)
 
 
-@pytest.mark.parametrize(("count", "level"), [(5, 0.05), pytest.param(20, 1e-4, marks=pytest.mark.statistical)])
-def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emulator_knows_why(count, level):
+@pytest.mark.parametrize(
+    ("count", "size", "level", "seed"),
+    [(3, 0.01, 0.05, 12), pytest.param(20, 1e-4, 1e-4, 11, marks=pytest.mark.statistical)],
+)
+def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emulator_knows_why(
+    count, size, level, seed
+):
     """Truths from the prior, an emulator of seven runs each.
 
-    A correct 95 % fails this once in 1e4; without the emulator's error there are fewer than a correct 95 % has with a
-    probability of 1 - ``level``.
+    A correct 95 % fails this with a probability of ``size`` or less; without the emulator's error there are fewer than
+    a correct 95 % has with a probability of 1 - ``level``.
     """
-    generator, inside, exact = np.random.default_rng(11), [], []
+    generator, inside, exact = np.random.default_rng(seed), [], []
     for number in range(count):
         truth = {symbol: float(prior.quantile(generator.random())) for symbol, prior in OGDEN.items()}
         emulator = emulate(designed(ogden, OGDEN, 7, seed=number), DEPTH)
@@ -126,7 +132,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emu
         for each, results in ((found, inside), (found.without_emulator_error, exact)):
             low, high = each.marginals["alpha"].hdi()
             results.append(low <= truth["alpha"] <= high)
-    assert sum(inside) >= binom.ppf(1e-4, count, 0.95)
+    assert sum(inside) >= binom.ppf(size, count, 0.95)
     assert sum(exact) < binom.ppf(level, count, 0.95)
 
 
@@ -157,9 +163,9 @@ def test_further_runs_keep_away_from_those_that_failed():
         return stiffening(parameters)
 
     data = stiffening({"mu": 0.4, "b": 2.3}) + 0.01 * np.random.default_rng(1).standard_normal(10)
-    found = tq.calibrate(depth, data, failing, priors, discrepancy="none", noise_sd=0.01, runs=12, refine=8)
-    assert len(found.runs) == 20
-    assert len(np.unique(found.runs.points, axis=0)) == 20
+    found = tq.calibrate(depth, data, failing, priors, discrepancy="none", noise_sd=0.01, runs=12, refine=4)
+    assert len(found.runs) == 16
+    assert len(np.unique(found.runs.points, axis=0)) == 16
 
 
 def test_a_likelihood_by_itself_is_computed_in_double_precision():
@@ -202,9 +208,9 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     data = measured(ogden, TRUTH, 0.001)
     poor = tq.calibrate(DEPTH, data, ogden, OGDEN, noise_sd=0.001, runs=7)
     assert any("emulator's error is large beside the noise" in text for text in poor.warnings)
-    narrow = {"mu": tq.Uniform(0.2, 1.4), "alpha": tq.Uniform(-25.0, -1.0)}
-    found = tq.calibrate(DEPTH, data, ogden, narrow, noise_sd=0.02, runs=10)
-    assert any("reaches the end of the simulated range of mu (upper)" in text for text in found.warnings)
+    data = measured(neo_hooke, {"C10": 1.2}, 0.02)
+    found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 1.18)}, noise_sd=0.02, runs=6)
+    assert any("reaches the end of the simulated range of C10 (upper)" in text for text in found.warnings)
 
 
 def test_measurements_are_simulated_together():

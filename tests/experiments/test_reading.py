@@ -418,7 +418,7 @@ def test_numbers_are_read_to_the_last_digit(written):
     assert data.stress[1] == 0.30000000000000004
 
 
-@pytest.mark.parametrize("copies", slow_but([10], [10, 40]))
+@pytest.mark.parametrize("copies", slow_but([5], [5, 40]))
 def test_a_damaged_file_is_read_or_refused_but_never_breaks_the_program(tmp_path, copies):
     random = np.random.default_rng(7)
     path = tmp_path / "test.csv"

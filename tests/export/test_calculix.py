@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -25,11 +27,20 @@ LAWS = {
     "OGDEN, N=2": ("ogden-2", [0.9, 0.2, 3.0, -4.0]),
     "OGDEN, N=3": ("ogden-3", [0.4, 0.02, 0.1, 1.3, 5.0, -2.0]),
 }
+QUICK = [("YEOH", 20.0), ("POLYNOMIAL, N=2", 1000.0), ("OGDEN, N=2", 1000.0)]
+"""Laws and bulk moduli over the initial shear modulus in the quick tests."""
 AGREEMENT = 1e-5
 
 
-@pytest.mark.parametrize("keyword", LAWS)
-@pytest.mark.parametrize("stiffness", [20.0, 1000.0])
+@pytest.mark.parametrize(
+    ("keyword", "stiffness"),
+    [
+        (keyword, stiffness)
+        if (keyword, stiffness) in QUICK
+        else pytest.param(keyword, stiffness, marks=pytest.mark.finite_elements)
+        for keyword, stiffness in product(LAWS, [20.0, 1000.0])
+    ],
+)
 def test_calculix_computes_the_stress_of_the_draw(given, tmp_path, keyword, stiffness):
     ensemble = given([LAWS[keyword]])
     bulk = stiffness * card_format("calculix").cards(ensemble, CardSettings()).index[0]["initial_shear_modulus"]
@@ -40,7 +51,7 @@ def test_calculix_computes_the_stress_of_the_draw(given, tmp_path, keyword, stif
     assert calculix(text, LOADS, tmp_path) == pytest.approx(wanted, rel=AGREEMENT), NAMES
 
 
-@pytest.mark.parametrize("unit", ["MPa", "kPa"])
+@pytest.mark.parametrize("unit", [pytest.param("MPa", marks=pytest.mark.finite_elements), "kPa"])
 def test_calculix_computes_the_stress_of_a_free_energy_to_the_error_that_is_stated(auto, tmp_path, unit):
     cards = card_format("calculix").cards(auto, CardSettings(unit=unit))
     factor = {"MPa": 1.0, "kPa": 1e3}[unit]
@@ -52,6 +63,7 @@ def test_calculix_computes_the_stress_of_a_free_energy_to_the_error_that_is_stat
         assert np.abs(np.array(found) / own - 1).max() < 1.5 * row["error_states_max"] + 1e-3
 
 
+@pytest.mark.finite_elements
 def test_calculix_follows_to_the_ends_of_what_was_measured(tmp_path):
     """Rubber to a stretch of 7.5, nearly incompressible."""
     draws = tq.fit(tq.datasets.load("rubber-treloar-uniaxial")).ensemble(2)

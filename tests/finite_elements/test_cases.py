@@ -103,6 +103,7 @@ def test_a_case_of_ones_own_has_the_engineering_stress_of_a_draw(draws):
     np.testing.assert_allclose(found.fields.von_mises, expected[-1] / (np.pi * 1.5**2) * 1.15, rtol=2e-3)
 
 
+@pytest.mark.finite_elements
 def test_the_share_beyond_the_measurements_is_all_or_nothing_in_a_uniform_state(draws):
     max_invariants = (1.1**2 + 2 / 1.1 - 3, np.inf)
     found = respond(Cylinder(), draws[0], steps=3, max_invariants=max_invariants)
@@ -110,6 +111,7 @@ def test_the_share_beyond_the_measurements_is_all_or_nothing_in_a_uniform_state(
     np.testing.assert_array_equal(found.energy_beyond, [0, 0, 1])
 
 
+@pytest.mark.finite_elements
 def test_forces_grow_with_the_modulus_and_with_the_square_of_all_lengths():
     one = bar_force("yeoh", [1e-3, 2e-3, 1e-3], [0.5, 1.0], fineness=0.5)
     stiff = bar_force("yeoh", [3e-3, 6e-3, 3e-3], [0.5, 1.0], fineness=0.5)
@@ -124,6 +126,7 @@ def test_forces_do_not_depend_on_the_steps_on_the_way():
     assert every[-1] == pytest.approx(last[0], rel=1e-7)
 
 
+@pytest.mark.finite_elements
 def test_a_clamped_bar_necks_in_and_is_stiffer_than_one_whose_ends_slide():
     bar = ClampedBar()
     found = respond(bar, NEO_HOOKEAN, [MODULUS / 2], steps=2)

@@ -213,6 +213,7 @@ def cube(felupe, make, stretch):
     return make(field), boundaries, case
 
 
+@pytest.mark.finite_elements
 def test_a_cube_under_tension_has_the_engineering_stress_of_its_draw(draws):
     felupe = pytest.importorskip("felupe", reason="FElupe is not installed")
     modulus = distortional_energy(draws[0]).initial_shear_modulus

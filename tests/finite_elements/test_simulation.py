@@ -36,6 +36,7 @@ def test_every_family_has_the_forces_of_its_draws(found, posterior, without):
     assert found.failures == ()
 
 
+@pytest.mark.finite_elements
 def test_materials_that_differ_by_a_factor_are_computed_once(posterior, without):
     tasks = []
 

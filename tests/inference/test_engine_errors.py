@@ -32,7 +32,7 @@ def test_data_with_a_discrepancy(discrepancy):
 
 @pytest.mark.parametrize(
     ("discrepancy", "noise_sd"),
-    slow_but([(name, 0.1) for name in WITH_ERROR] + [("constant", 0.5), ("gp", 0.5)], product(WITH_ERROR, (0.1, 0.5))),
+    slow_but([("constant", 0.1), ("linear", 0.1), ("yeoh", 0.1), ("gp", 0.5)], product(WITH_ERROR, (0.1, 0.5))),
 )
 def test_data_without_any_discrepancy_whose_amplitude_is_pressed_to_zero(discrepancy, noise_sd):
     stress = 1.2 * neo_hookean(STRETCH) + 0.1 * NOISE  # a noise of 0.5 is overstated: nothing is left for S or c
@@ -40,7 +40,7 @@ def test_data_without_any_discrepancy_whose_amplitude_is_pressed_to_zero(discrep
     assert_agrees(posterior, problem)
 
 
-@pytest.mark.parametrize("discrepancy", ALL)
+@pytest.mark.parametrize("discrepancy", slow_but(["none", "constant", "yeoh", "gp"], ALL))
 def test_noise_of_a_ten_thousandth_of_the_stress(discrepancy):
     stress = (yeoh(STRETCH) if discrepancy != "none" else 1.2 * neo_hookean(STRETCH)) + 1e-4 * NOISE
     axes = AXES | {symbol: Axis(0, AXES[symbol].high, 1e-4) for symbol in ("S", "c")}
@@ -55,7 +55,8 @@ def test_noise_so_large_that_the_priors_decide(discrepancy):
 
 
 @pytest.mark.parametrize(
-    ("discrepancy", "factor"), slow_but([*product(ALL, [1e-3]), ("none", 1e3), ("gp", 1e3)], product(ALL, (1e-3, 1e3)))
+    ("discrepancy", "factor"),
+    slow_but([("none", 1e-3), ("yeoh", 1e-3), ("constant", 1e3), ("gp", 1e3)], product(ALL, (1e-3, 1e3))),
 )
 def test_stresses_of_kilopascals_and_gigapascals(discrepancy, factor):
     boxes = {symbol: (low * factor, high * factor) for symbol, (low, high) in BOXES.items()}

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 import tissuq as tq
 from against import both, columns_of, parts
 from dense import Axis, Linear, integrate
+from marks import slow_but
 
-QUIET = settings(
-    max_examples=30, deadline=None, derandomize=True, database=None, phases=[Phase.explicit, Phase.generate]
-)
+EXAMPLES = pytest.mark.parametrize("examples", slow_but([8], [8, 30]))
+QUIET = settings(deadline=None, derandomize=True, database=None, phases=[Phase.explicit, Phase.generate])
 SEED = st.integers(0, 2**32 - 1)
 SCALE = st.floats(-1.5, 1.5).map(lambda power: 10.0**power)
 
@@ -39,44 +39,58 @@ def assert_evidence_and_moments(posterior, problem):
     assert abs(c10.sd / truth.sd - 1) <= tolerance
 
 
-@QUIET
-@given(SEED, st.integers(6, 25), st.floats(0.0, 3.0), st.floats(-0.3, 0.3), SCALE, st.booleans(), st.floats(0.3, 30))
-def test_without_nonlinear_parameters(seed, points, c10, bend, noise, is_normal, width):
-    stretch, stress = measured(seed, points, c10, bend, 0.1 * noise)
-    linear = {"C10": Linear(0.0, width, 1.0, 0.5) if is_normal else Linear(0.0, width)}
-    assume(stress.any())
-    posterior, problem = both("none", stretch, stress, 0.1 * noise, linear, {})
-    assert_evidence_and_moments(posterior, problem)
+@EXAMPLES
+def test_without_nonlinear_parameters(examples):
+    @settings(QUIET, max_examples=examples)
+    @given(
+        SEED, st.integers(6, 25), st.floats(0.0, 3.0), st.floats(-0.3, 0.3), SCALE, st.booleans(), st.floats(0.3, 30)
+    )
+    def holds(seed, points, c10, bend, noise, is_normal, width):
+        stretch, stress = measured(seed, points, c10, bend, 0.1 * noise)
+        linear = {"C10": Linear(0.0, width, 1.0, 0.5) if is_normal else Linear(0.0, width)}
+        assume(stress.any())
+        posterior, problem = both("none", stretch, stress, 0.1 * noise, linear, {})
+        assert_evidence_and_moments(posterior, problem)
+
+    holds()
 
 
-@QUIET
-@given(
-    SEED,
-    st.sampled_from(["constant", "mooney-rivlin"]),
-    st.integers(6, 25),
-    st.floats(0.0, 3.0),
-    st.floats(-0.3, 0.3),
-    SCALE,
-    st.booleans(),
-)
-def test_with_one_nonlinear_parameter(seed, discrepancy, points, c10, bend, noise, is_normal):
-    stretch, stress = measured(seed, points, c10, bend, 0.1 * noise)
-    linear, _ = parts(discrepancy)
-    if is_normal:
-        linear |= {"C10": Linear(0.0, np.inf, 1.0, 0.7)}
-    axes = {"S": Axis(0, 3, min(0.02, 0.1 * noise))}
-    posterior, problem = both(discrepancy, stretch, stress, 0.1 * noise, linear, axes)
-    assert_evidence_and_moments(posterior, problem)
+@EXAMPLES
+def test_with_one_nonlinear_parameter(examples):
+    @settings(QUIET, max_examples=examples)
+    @given(
+        SEED,
+        st.sampled_from(["constant", "mooney-rivlin"]),
+        st.integers(6, 25),
+        st.floats(0.0, 3.0),
+        st.floats(-0.3, 0.3),
+        SCALE,
+        st.booleans(),
+    )
+    def holds(seed, discrepancy, points, c10, bend, noise, is_normal):
+        stretch, stress = measured(seed, points, c10, bend, 0.1 * noise)
+        linear, _ = parts(discrepancy)
+        if is_normal:
+            linear |= {"C10": Linear(0.0, np.inf, 1.0, 0.7)}
+        axes = {"S": Axis(0, 3, min(0.02, 0.1 * noise))}
+        posterior, problem = both(discrepancy, stretch, stress, 0.1 * noise, linear, axes)
+        assert_evidence_and_moments(posterior, problem)
+
+    holds()
 
 
-@QUIET
-@given(SEED, st.integers(6, 25), st.floats(0.1, 3.0), st.floats(-0.3, 0.3), SCALE)
-def test_with_unknown_noise(seed, points, c10, bend, noise):
-    stretch, stress = measured(seed, points, c10, bend, 0.1 * noise)
-    linear, _ = parts("none")
-    axes = {"noise_sd": Axis(1e-4, 10, 0.02)}
-    posterior, problem = both("none", stretch, stress, None, linear, axes, noise="unknown")
-    assert_evidence_and_moments(posterior, problem)
+@EXAMPLES
+def test_with_unknown_noise(examples):
+    @settings(QUIET, max_examples=examples)
+    @given(SEED, st.integers(6, 25), st.floats(0.1, 3.0), st.floats(-0.3, 0.3), SCALE)
+    def holds(seed, points, c10, bend, noise):
+        stretch, stress = measured(seed, points, c10, bend, 0.1 * noise)
+        linear, _ = parts("none")
+        axes = {"noise_sd": Axis(1e-4, 10, 0.02)}
+        posterior, problem = both("none", stretch, stress, None, linear, axes, noise="unknown")
+        assert_evidence_and_moments(posterior, problem)
+
+    holds()
 
 
 KINDS = {

@@ -161,7 +161,7 @@ def test_a_gaussian_process_with_unknown_noise_agrees_with_dense_tensor_quadratu
         "noise_sd": tq.Uniform(0, 1),
     }
     posterior = tq.fit(data, discrepancy="gp", priors=priors)
-    nodes, node_weights = np.polynomial.legendre.leggauss(32)
+    nodes, node_weights = np.polynomial.legendre.leggauss(24)
 
     def rule(low, high):  # in the logarithm, where the posterior is smooth down to small values
         a, b = np.log(low), np.log(high)
@@ -184,7 +184,7 @@ def test_a_gaussian_process_with_unknown_noise_agrees_with_dense_tensor_quadratu
     total = weights @ np.exp(log_density - top)
     assert posterior.log_evidence == pytest.approx(top + np.log(total), abs=2e-3)
     shares = weights * np.exp(log_density - top) / total
-    for symbol, values in (("c", np.repeat(c, 32 * 32)), ("noise_sd", np.tile(sd, 32 * 32))):
+    for symbol, values in (("c", np.repeat(c, 24 * 24)), ("noise_sd", np.tile(sd, 24 * 24))):
         marginal = posterior.solution.marginals[symbol]
         mean = shares @ values
         assert marginal.mean == pytest.approx(mean, abs=0.01 * marginal.sd)

@@ -48,7 +48,7 @@ def log_mass_by_panels(covariance, low, high):
 
 
 def test_the_mass_within_two_bounds_is_that_of_dense_panels():
-    covariance, low, high = (each[:100] for each in gaussians(200, 2))
+    covariance, low, high = (each[:40] for each in gaussians(200, 2))
     log_mass, error = nested_log_mass(np.linalg.cholesky(covariance), low, high)
     truth = np.array([log_mass_by_panels(*each) for each in zip(covariance, low, high, strict=True)])
     assert truth.min() < -1000
@@ -60,7 +60,7 @@ def test_the_mass_within_two_bounds_is_that_of_dense_panels():
 
 
 def test_the_mass_within_three_bounds_does_not_depend_on_their_order():
-    covariance, low, high = gaussians(40, 3)
+    covariance, low, high = gaussians(16, 3)
     first, error = nested_log_mass(np.linalg.cholesky(covariance), low, high)
     assert first.min() < -1000
     assert error.max() < 2e-3
@@ -119,7 +119,7 @@ def test_four_bounds_go_by_points_and_sweeps():
     log_mass, error = box.log_mass(np.zeros((1, 4)), root)
     assert abs(log_mass[0] - np.log(0.2)) < 3 * error[0] + 1e-4  # 1 / (k + 1) for correlations of one half
     drawn = box.draws(np.zeros((1, 4)), root, np.random.default_rng(0).random((1, 4000, 4)))[0]
-    free = np.random.default_rng(2).standard_normal((200_000, 4)) @ root[0].T
+    free = np.random.default_rng(2).standard_normal((100_000, 4)) @ root[0].T
     kept = free[(free >= 0).all(axis=1)]
     assert np.abs(drawn.mean(axis=0) - kept.mean(axis=0)).max() < 0.06
     assert np.abs(np.cov(drawn.T) - np.cov(kept.T)).max() < 0.06

@@ -87,7 +87,7 @@ def laws(tmp_path, monkeypatch):
         ("exponential", "demiray", [1.3, 0.7]),
         pytest.param("logarithmic", "hencky", [1.3], marks=pytest.mark.slow),
         ("Simple", "neo-hookean", [1.3]),
-        ("made", "neo-hookean", [1.3]),
+        pytest.param("made", "neo-hookean", [1.3], marks=pytest.mark.slow),
     ],
 )
 def test_a_law_in_a_file_is_the_law_of_the_library(laws, name, same, values):

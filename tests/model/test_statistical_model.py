@@ -192,16 +192,32 @@ def test_auto_samples_where_quadrature_does_not_reach_its_tolerance(monkeypatch)
         tq.fit(DATA, discrepancy="constant", noise_sd=0.1, method="exact")
 
 
+def fails(enumerator, models, seed):
+    raise tq.ConvergenceError("this fails")
+
+
+def test_auto_turns_to_samples_of_all_parameters_where_none_is_left_to_sample_alone(monkeypatch):
+    class Asked(Exception):
+        pass
+
+    def asked(model, seed=0, draws=1000, because=""):
+        raise Asked(because)
+
+    monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
+    monkeypatch.setattr("tissuq.inference.enumerators.sampled.sample_joint", asked)
+    with pytest.raises(Asked, match="this fails"):
+        tq.fit(DATA, discrepancy="none", noise_sd=0.1)
+    with pytest.raises(tq.ModelError, match="nothing is left to sample"):
+        tq.fit(DATA, discrepancy="none", noise_sd=0.1, method="nuts")
+
+
+@pytest.mark.slow
 def test_auto_samples_all_parameters_where_none_is_left_to_sample_alone(monkeypatch):
-    def fails(enumerator, models, seed):
-        raise tq.ConvergenceError("this fails")
 
     monkeypatch.setattr("tissuq.inference.enumerators.adaptive_cells.AdaptiveCells.solve", fails)
     solution = tq.fit(DATA, discrepancy="none", noise_sd=0.1).solution
     assert solution.route == "joint"
     assert "this fails" in solution.reason
-    with pytest.raises(tq.ModelError, match="nothing is left to sample"):
-        tq.fit(DATA, discrepancy="none", noise_sd=0.1, method="nuts")
 
 
 def test_a_material_that_is_not_linear_in_its_parameters_is_refused():

@@ -74,6 +74,12 @@ def test_one_parameter_agrees_with_quadrature(found, noise_sd):
     assert own.hierarchy.effective > 0.9
 
 
+def test_complete_pooling_is_the_fit_of_all_measurements_together(found):
+    joined = tq.fit(reduce(tq.Experiment.joined, specimens_of(MODULI).values()), discrepancy="none", noise_sd=NOISE_SD)
+    assert found.complete.marginals["C10"].hdi() == pytest.approx(joined.marginals["C10"].hdi(), rel=1e-6)
+
+
+@pytest.mark.slow
 def test_without_a_spread_it_is_complete_pooling():
     """On the line the mean's prior replaces the modulus' flat one, which is nothing beside these data."""
     specimens = specimens_of([0.5] * 6)

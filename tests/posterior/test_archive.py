@@ -37,18 +37,20 @@ FITS = {
     "process": lambda: tq.fit(measured(), discrepancy="gp", noise_sd=0.02),
     "energies": lambda: tq.fit(measured(), discrepancy="taylor+hencky", noise_sd=0.02),
     "average of two tests": lambda: tq.fit(two_specimens(), discrepancy="auto"),
+    "exponents": lambda: tq.fit(measured(), material="ogden-1", discrepancy="none", noise_sd=0.02),
     "exponents beside an energy": lambda: tq.fit(measured(), material="ogden-1", discrepancy="taylor"),
     "noise by test": lambda: tq.fit(two_specimens(), discrepancy="linear", noise_sd=[0.02, 0.03]),
     "proportional": lambda: tq.fit(measured(), discrepancy="none", noise="proportional"),
     "autoregressive": lambda: tq.fit(measured(), discrepancy="none", noise="autoregressive"),
     "nuts": lambda: tq.fit(measured(), discrepancy="linear", method="nuts"),
     "joint": gallery.sampled_jointly,
-    "stable": lambda: tq.fit(measured(), discrepancy="auto", noise_sd=0.02, stable_in="uniaxial"),
+    "stable": lambda: tq.fit(measured(), discrepancy="none", noise_sd=0.02, stable_in="uniaxial"),
+    "stable average": lambda: tq.fit(measured(), discrepancy="auto", noise_sd=0.02, stable_in="uniaxial"),
 }
 
 
-SLOW = ("nuts",)
-"""Of two posteriors that are sampled, the other is in the quick tests."""
+SLOW = ("nuts", "exponents beside an energy", "stable average")
+"""Of two that are sampled, have exponents or are stable, the other is in the quick tests."""
 SAVED_AGAIN = ("closed form", "process", "energies", "joint")
 """One of each representation, saved a second time in the quick tests, where all are saved once."""
 

@@ -22,10 +22,19 @@ def specimen_file(tmp_path_factory):
     return file
 
 
+def specimen_study_of(file, *names):
+    return run_specimen(SpecimenSettings(file=str(file), discrepancies=names, noise_sd=200.0, seed=5))
+
+
 @pytest.fixture(scope="session")
 def specimen_study(specimen_file):
-    names = ("none", "constant", "mooney-rivlin", "yeoh", "gp", "taylor", "auto")
-    return run_specimen(SpecimenSettings(file=str(specimen_file), discrepancies=names, noise_sd=200.0, seed=5))
+    return specimen_study_of(specimen_file, "none", "constant", "yeoh", "auto")
+
+
+@pytest.fixture(scope="session")
+def long_specimen_study(specimen_file):
+    """The study of more discrepancies, for slow tests."""
+    return specimen_study_of(specimen_file, "none", "constant", "mooney-rivlin", "yeoh", "gp", "taylor", "auto")
 
 
 @pytest.fixture(scope="session")

@@ -1,3 +1,5 @@
+from itertools import cycle, islice
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,9 @@ KPA = StressUnit("kPa", 1e-3)
 
 
 def first(posteriors, count):
-    return dict(list(posteriors.items())[:count])
+    """Return so many posteriors by name, further ones under further names."""
+    names = (f"{name}{' again' * turn}" for turn in range(count) for name in posteriors)
+    return dict(islice(zip(names, cycle(posteriors.values()), strict=False), count))
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, *(pytest.param(count, marks=pytest.mark.slow) for count in (3, 4, 5, 6))])

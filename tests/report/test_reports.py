@@ -2,13 +2,16 @@
 
 import base64
 import re
+import shutil
 from html.parser import HTMLParser
 from importlib.metadata import version
+from itertools import product
 from xml.etree import ElementTree
 
 import pytest
 
-from tissuq.report.run_folder import LIBRARIES
+from marks import slow_but
+from tissuq.report.run_folder import LIBRARIES, write_figures
 from tissuq.report.specimen import write_specimen_run
 from tissuq.report.validation import write_paper_run
 from tissuq.validation.paper.claims import CLAIMS
@@ -47,7 +50,23 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="session")
 def paper_folder(paper_study, tmp_path_factory):
+    """The report of the paper's study, with copies of figure 5 in the places of figures 1 to 4 and 6."""
+
+    def write_some(folder, figures):
+        write_figures(folder, {name: figures[name] for name in ("figure5", "figure7")})
+        for name, kind in product(figures.keys() - {"figure5", "figure7"}, ("svg", "png")):
+            shutil.copy(folder / "figures" / f"figure5.{kind}", folder / "figures" / f"{name}.{kind}")
+
     folder = tmp_path_factory.mktemp("paper")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tissuq.report.validation.write_figures", write_some)
+        write_paper_run(paper_study, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def long_paper_folder(paper_study, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("long_paper")
     write_paper_run(paper_study, folder)
     return folder
 
@@ -59,7 +78,17 @@ def specimen_folder(specimen_study, specimen_file, tmp_path_factory):
     return folder
 
 
-@pytest.fixture(params=["paper", "specimen"])
+@pytest.fixture(scope="session")
+def long_specimen_folder(long_specimen_study, specimen_file, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("long_specimen")
+    write_specimen_run(long_specimen_study, [specimen_file], folder)
+    return folder
+
+
+SHORT = ["paper", "specimen"]
+
+
+@pytest.fixture(params=slow_but(SHORT, [*SHORT, *(f"long_{name}" for name in SHORT)]))
 def folder(request):
     return request.getfixturevalue(f"{request.param}_folder")
 
@@ -147,9 +176,11 @@ def test_the_page_of_a_specimen_is_in_the_unit_of_its_file(specimen_folder, spec
     assert re.search(rf"yeoh {1000 * marginal.mean:.0f} {1000 * marginal.sd:.0f} \[", words)
 
 
-def test_cautions_of_the_discrepancies_are_told(specimen_folder, specimen_study):
-    words = words_of((specimen_folder / "report.html").read_text())
-    cautions = [each.model.discrepancy.caution for each in specimen_study.posteriors.values()]
+@pytest.mark.parametrize("kind", slow_but(["specimen"], ["specimen", "long_specimen"]))
+def test_cautions_of_the_discrepancies_are_told(request, kind):
+    words = words_of((request.getfixturevalue(f"{kind}_folder") / "report.html").read_text())
+    study = request.getfixturevalue(f"{kind}_study")
+    cautions = [each.model.discrepancy.caution for each in study.posteriors.values()]
     assert any(cautions)
     assert all(caution in words for caution in cautions)
 

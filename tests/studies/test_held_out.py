@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from marks import slow_but
 from tissuq.assessment.measurements import factors_of_tests
 
 STRETCH = {"uniaxial": np.linspace(0.8, 1.4, 12), "planar": np.linspace(1.02, 1.4, 9)}
@@ -60,13 +61,14 @@ def test_one_test_cannot_be_predicted_from_others(tests_of_two):
         tq.held_out_tests(tests_of_two[:1])
 
 
-def test_how_far_tests_are_apart_is_told(tests_of_two):
+@pytest.mark.parametrize("discrepancy", slow_but(["taylor"], ["taylor", "auto"]))
+def test_how_far_tests_are_apart_is_told(tests_of_two, discrepancy):
     posterior = tq.fit(tests_of_two, discrepancy="none", noise_sd=NOISE_SD)
-    factors = tq.fit(tests_of_two, noise_sd=NOISE_SD).assess().factors
+    factors = tq.fit(tests_of_two, discrepancy=discrepancy, noise_sd=NOISE_SD).assess().factors
     ratio = factors["uniaxial"] / factors["planar"]
     assert ratio == pytest.approx(1.1 / 0.95, rel=0.06)
     assert posterior.model.tolerances.stress > 0
-    assert tq.fit(tests_of_two[0], noise_sd=NOISE_SD).assess().factors == {}
+    assert tq.fit(tests_of_two[0], discrepancy=discrepancy, noise_sd=NOISE_SD).assess().factors == {}
 
 
 def test_tests_of_one_name_are_numbered_in_their_order(tests_of_two):

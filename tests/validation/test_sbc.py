@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from scipy.special import ndtr, ndtri
 from scipy.stats import binomtest, kstest
 
+from marks import slow_but
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import engineering_stress
 from tissuq.model.discrepancy import discrepancies
@@ -32,11 +33,12 @@ def settings_of(**changes):
     return SbcSettings.model_validate({"formulations": ["constant"], "noise": "known", "replicates": 20} | changes)
 
 
+@pytest.mark.parametrize("repeats", slow_but([400], [400, 1500]))
 @pytest.mark.parametrize("test", [shape_p_value, spread_p_value])
-def test_the_tests_have_the_size_that_they_say(test):
+def test_the_tests_have_the_size_that_they_say(test, repeats):
     generator = np.random.default_rng(0)
-    rejected = sum(test(generator.uniform(size=60)) <= 0.05 for _ in range(1500))
-    assert binomtest(rejected, 1500, 0.05).pvalue > SIZE
+    rejected = sum(test(generator.uniform(size=60)) <= 0.05 for _ in range(repeats))
+    assert binomtest(rejected, repeats, 0.05).pvalue > SIZE
 
 
 def test_the_band_holds_uniform_values_as_a_whole_as_often_as_it_says():
@@ -89,7 +91,10 @@ def test_parameters_are_drawn_from_their_priors_and_data_from_the_model(formulat
         assert np.mean(left) == pytest.approx(1.0, abs=4.5 * np.std(left) / 20)
 
 
-@pytest.mark.parametrize("replicates", [40, pytest.param(150, marks=pytest.mark.statistical)])
+@pytest.mark.parametrize(
+    "replicates",
+    [20, pytest.param(40, marks=pytest.mark.slow), pytest.param(150, marks=pytest.mark.statistical)],
+)
 def test_quick_formulations_are_calibrated(tmp_path, replicates):
     settings = settings_of(formulations=["constant", "yeoh", "taylor"], replicates=replicates, seed=4)
     table = summarise_ranks(settings, run_sbc(settings, tmp_path))
@@ -108,8 +113,9 @@ def test_noise_told_to_be_less_than_it_is_is_caught(monkeypatch):
     assert of_c10["spread"].min() > 1.2
 
 
-def test_results_do_not_depend_on_workers_and_are_streamed(tmp_path):
-    settings = settings_of(formulations=["none", "zero-modulus"], replicates=60)
+@pytest.mark.parametrize("replicates", slow_but([20], [20, 60]))
+def test_results_do_not_depend_on_workers_and_are_streamed(tmp_path, replicates):
+    settings = settings_of(formulations=["none", "zero-modulus"], replicates=replicates)
     contents = []
     for workers in (1, 2):
         folder = tmp_path / str(workers)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,8 @@ def largest_invariants(states: States) -> tuple[float, float]:
     return float(I1.max()), float(I2.max())
 
 
-def farthest_stretch(mode: LoadingMode, limits: Sequence[float], sign: int) -> float:
+@lru_cache(maxsize=256)
+def farthest_stretch(mode: LoadingMode, limits: tuple[float, float], sign: int) -> float:
     """Return the stretch of a mode, above (sign 1) or below (-1) its rest, where I1 - 3 or I2 - 3 reaches its limit."""
     (control,) = mode.controls
     farthest = LARGEST_STRETCH - 1

@@ -156,7 +156,8 @@ def _name(mode: LoadingMode, low: float, high: float, count: int) -> str:
 
 def farthest_range(data: Experiment, mode: LoadingMode, factor: float) -> tuple[float, float]:
     """Return the range of a mode's control in which I1 - 3 and I2 - 3 are at most so many times what was measured."""
-    limits, reference = [factor * largest for largest in largest_invariants(data.states)], float(mode.reference)
+    I1, I2 = largest_invariants(data.states)
+    limits, reference = (factor * I1, factor * I2), float(mode.reference)
     low, high = (_rounded(farthest_stretch(mode, limits, sign), reference) for sign in (-1, 1))
     return low, high
 

@@ -106,7 +106,7 @@ def calibrate(
     >>> depth = np.linspace(0.1, 1, 12)
     >>> measured = force({"mu": 0.4, "b": 1.5}, depth) + 0.01 * np.random.default_rng(1).standard_normal(12)
     >>> priors = {"mu": tq.Uniform(0.1, 1), "b": tq.Uniform(0.5, 3)}
-    >>> found = tq.calibrate(depth, measured, force, priors, noise_sd=0.01, runs=16)
+    >>> found = tq.calibrate(depth, measured, force, priors, noise_sd=0.01, runs=12)
     >>> low, high = found.marginals["b"].hdi()
     >>> bool(low < 1.5 < high), found.check.relative_error < 0.01
     (True, True)
