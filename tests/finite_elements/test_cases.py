@@ -21,6 +21,7 @@ from tissuq.finite_elements import (
     respond,
 )
 from tissuq.finite_elements.case import graded, grid
+from tissuq.finite_elements.solver import Solver
 from tissuq.mechanics import engineering_stress, material_named
 
 pytest.importorskip("felupe", reason="FElupe is not installed")
@@ -101,6 +102,17 @@ def test_a_case_of_ones_own_has_the_engineering_stress_of_a_draw(draws):
     np.testing.assert_allclose(found.fields.first_invariant, 1.15**2 + 2 / 1.15 - 3, rtol=5e-3)
     np.testing.assert_allclose(found.fields.second_invariant, 1.15**-2 + 2 * 1.15 - 3, rtol=5e-3)
     np.testing.assert_allclose(found.fields.von_mises, expected[-1] / (np.pi * 1.5**2) * 1.15, rtol=2e-3)
+
+
+def test_the_weights_of_the_cells_are_the_volumes_of_rings():
+    """By Pappus' theorem: the area of a rectangle, times the way of its centre."""
+    case = Indentation(depth=0.1)
+    points, cells = case.mesh()
+    corners = points[cells]
+    area = np.ptp(corners[..., 0], axis=1) * np.ptp(corners[..., 1], axis=1)
+    volumes = Solver(case, NEO_HOOKEAN, [0.5], 100.0)._volumes.sum(axis=0)
+    np.testing.assert_allclose(volumes, 2 * np.pi * corners[..., 1].mean(axis=1) * area, rtol=1e-10)
+    assert volumes.sum() == pytest.approx(np.pi * case.radius**2 * case.height, rel=1e-10)
 
 
 @pytest.mark.finite_elements
