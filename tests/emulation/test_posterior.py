@@ -110,6 +110,7 @@ def test_the_discrepancy_is_conditioned_on_the_data():
     np.testing.assert_allclose(variance[17], np.diag(process - gain @ process), atol=1e-6)
 
 
+@pytest.mark.slow  # quick: the errors that an emulator states, in test_emulator.py
 @pytest.mark.parametrize(("count", "level"), [(5, 0.05), pytest.param(20, 1e-4, marks=pytest.mark.statistical)])
 def test_intervals_hold_the_truth_as_often_as_they_say_with_few_runs_and_the_emulator_knows_why(count, level):
     """Truths from the prior, an emulator of seven runs each.

@@ -108,7 +108,7 @@ def test_beyond_the_reach_further_terms_make_up_the_whole_variance(name):
     block, measured, path = of(name), loading_mode("uniaxial"), loading_mode("equibiaxial")
     stretched = np.linspace(1.0, 2.0, 30)
     most = [float(each.max()) for each in invariants(measured.at(stretched))]  # which leaves ln l free beyond its reach
-    beyond = np.linspace(*(farthest_stretch(path, most, sign) for sign in (-1, 1)), 25)
+    beyond = np.linspace(*(farthest_stretch(path, tuple(most), sign) for sign in (-1, 1)), 25)
     for reach, length in settings(block, measured, stretched):
         count = block.count(reach, length)
         found = by_chain_rule(block, path, beyond, reach, length)
