@@ -233,10 +233,10 @@ def test_priors_that_the_data_contradict_are_obeyed(prior, low, high, noise):
     ids=str,
 )
 def test_the_prior_of_proportional_noise_is_obeyed(share):
-    count = 10 if share == tq.Uniform(0.04, 0.06) else 60  # enough to see each prior evenly
+    count, steps = (10, 50) if share == tq.Uniform(0.04, 0.06) else (60, 100)  # enough to see each prior evenly
     level = stress_level(DATA)
     noises, shares = (
-        np.linspace(2e-4, 0.2, 50),
+        np.linspace(2e-4, 0.2, steps),
         np.array([float(share.quantile(p)) for p in (np.arange(count) + 0.5) / count]),
     )
     values = [[conditional(UNIT, s + own * level, 2)[:2] for own in shares] for s in noises]
