@@ -98,7 +98,7 @@ def save_groups(groups: Mapping[str, LabelledGroup], path: Path) -> None:
     with h5netcdf.File(content, "w") as file:
         for name, group in groups.items():
             group.write(file if name == "/" else file.create_group(name))
-    path.write_bytes(content.getbuffer())
+    path.write_bytes(content.getvalue())
 
 
 def read_groups(path: Path, root: str) -> dict[str, Group]:
