@@ -15,7 +15,7 @@ from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.finite_elements.case import Case, ClampedBar, Indentation
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.solver import CellFields, Solver
-from tissuq.inference.reduction import one_thread
+from tissuq.inference.threads import one_thread
 from tissuq.mechanics import Material, material_named
 from tissuq.posterior.ensemble import EnergyDraw
 

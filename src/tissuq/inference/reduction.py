@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.modes import States
+from tissuq.inference.threads import one_thread
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK, upper_triangle
@@ -23,7 +23,6 @@ __all__ = [
     "Spectrum",
     "correlation_spectrum",
     "divided_columns",
-    "one_thread",
     "scaled_spectrum",
 ]
 
@@ -318,15 +317,3 @@ def divided_columns(model: StatisticalModel) -> tuple[list[int], list[int]]:
     """Return the places of the columns that are integrated in closed form, and of the others."""
     free = [model.column_symbols.index(symbol) for symbol in model.linear]
     return free, [column for column in range(len(model.column_symbols)) if column not in free]
-
-
-def one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which BLAS and LAPACK use one thread."""
-    return _controller().limit(limits=1, user_api="blas")  # type: ignore[no-any-return]
-
-
-@lru_cache
-def _controller() -> Any:
-    from threadpoolctl import ThreadpoolController
-
-    return ThreadpoolController()

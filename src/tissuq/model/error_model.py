@@ -149,16 +149,13 @@ def _errors_of_tests(
         "specimen": of_specimen,
         "test": np.eye(len(tests)),
     }
-    widest = {shared: max(tolerances.columns(*pair, shared).shape[1] for pair in tests) for shared in memberships}
-    rows = []
-    for number, (test, curve) in enumerate(tests):
-        blocks = []
-        for shared, membership in memberships.items():
-            columns = tolerances.columns(test, curve, shared)
-            padded = np.pad(columns, [(0, 0), (0, widest[shared] - columns.shape[1])])
-            blocks.append(np.kron(padded, membership[number][None]))
-        rows.append(np.hstack(blocks))
-    return np.concatenate(rows)
+    groups = []
+    for shared, membership in memberships.items():
+        columns = [tolerances.columns(test, curve, shared) for test, curve in tests]
+        widest = max(part.shape[1] for part in columns)
+        padded = [np.pad(part, [(0, 0), (0, widest - part.shape[1])]) for part in columns]
+        groups.append(np.concatenate([np.kron(part, row[None]) for part, row in zip(padded, membership, strict=True)]))
+    return np.hstack(groups)
 
 
 class ErrorModel:

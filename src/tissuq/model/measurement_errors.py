@@ -78,15 +78,9 @@ class MeasurementError(ABC):
     """Whether it moves the curve along the stretch."""
     is_independent: ClassVar[bool] = False
     """Whether every measurement has one of its own, rather than all those of a specimen the same."""
-    is_of_specimen: ClassVar[bool] = False
-    """Whether only the specimens' differences from their mean are in the data: what all have in common is not."""
-    is_of_test: ClassVar[bool] = False
-    """Whether every test has one of its own, rather than all those of a specimen the same."""
-
-    @property
-    def shared(self) -> Shared:
-        """Between which tests it is the same."""
-        return "differences" if self.is_of_specimen else "test" if self.is_of_test else "specimen"
+    shared: ClassVar[Shared] = "specimen"
+    """Between which tests it is the same: ``"specimen"``, all those of a specimen; ``"differences"``, these too, but
+    only the specimens' differences from their mean are in the data; ``"test"``, none."""
 
     @abstractmethod
     def effect(self, points: ErrorPoints) -> Any:
@@ -112,7 +106,7 @@ class ScaleError(MeasurementError):
 
     name = "stress"
     description = "of the stress (spread between specimens)"
-    is_of_specimen = True
+    shared = "differences"
 
     def effect(self, points: ErrorPoints) -> Any:
         return points.stress
@@ -160,7 +154,7 @@ class SmoothError(MeasurementError):
 
     name = "smooth"
     description = "of the stress, smooth along the curve"
-    is_of_test = True
+    shared = "test"
 
     def effect(self, points: ErrorPoints) -> Any:
         strain = points.stretch - points.mode.reference
@@ -297,9 +291,7 @@ class Tolerances:
         curve : (n,) array, MPa
             About what stresses it has without errors.
         shared : str
-            The errors that are shared between the tests in one way: ``"differences"``, of which only differences
-            between specimens are in the data; ``"specimen"``, which all tests of a specimen share; ``"test"``, of
-            which every test has its own.
+            Which errors: those with this value of `MeasurementError.shared`.
 
         Raises
         ------

@@ -15,8 +15,8 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.experiment_file import STRESS_TYPES
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
-from tissuq.inference.reduction import one_thread
 from tissuq.inference.solution import Solution
+from tissuq.inference.threads import one_thread
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import stress_moments, variance_of_noise

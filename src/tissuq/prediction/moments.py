@@ -12,8 +12,9 @@ from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import SpectralCovariance
-from tissuq.inference.reduction import correlation_spectrum, one_thread, scaled_spectrum
+from tissuq.inference.reduction import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
+from tissuq.inference.threads import one_thread
 from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 

@@ -13,7 +13,7 @@ from tissuq.experiments.experiment import Curve
 from tissuq.inference.solution import Solution
 from tissuq.prediction.bands import asked_for, predictive_mixtures
 
-__all__ = ["Judged", "interval_score", "judged"]
+__all__ = ["Judged", "interval_score", "judged", "root_mean_square"]
 
 FloatArray = NDArray[np.float64]
 
@@ -76,11 +76,11 @@ class Judged:
         """
         if not len(self.measured):
             return dict.fromkeys(("inside", "half_width", "error", "crps", "interval_score"), np.nan)
-        size = _root_mean_square(self.measured)
+        size = root_mean_square(self.measured)
         return {
             "inside": float(self.is_inside.mean()),
-            "half_width": _root_mean_square(0.5 * (self.high - self.low)) / size,
-            "error": _root_mean_square(self.mean - self.measured) / size,
+            "half_width": root_mean_square(0.5 * (self.high - self.low)) / size,
+            "error": root_mean_square(self.mean - self.measured) / size,
             "crps": float(self.crps.mean()),
             "interval_score": float(interval_score(self.low, self.high, self.measured, self.prob).mean()),
         }
@@ -112,5 +112,6 @@ def judged(solution: Solution, curve: Curve, *, discrepancy: bool = True, prob: 
     return Judged(points, measured, mean, low, high, crps, prob)
 
 
-def _root_mean_square(values: FloatArray) -> float:
+def root_mean_square(values: FloatArray) -> float:
+    """Return the root of the mean of the squares of values."""
     return float(np.sqrt((values**2).mean()))

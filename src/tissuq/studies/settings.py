@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tissuq.errors import InputError
+from tissuq.errors import InputError, TissuqError
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["DAMAGE", "RECIPE", "damage_reported", "load_settings"]
+__all__ = ["DAMAGE", "RECIPE", "damage_reported", "load_settings", "looked_up"]
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
@@ -22,6 +22,7 @@ DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, R
 """What readers of damaged files raise: no TOML, JSON or UTF-8, values of other kinds, endless nesting."""
 
 Settings = TypeVar("Settings", bound="BaseModel")
+Named = TypeVar("Named")
 
 
 def load_settings(
@@ -120,3 +121,11 @@ def _explain(item: Any) -> str:
 
 def _place(item: Any) -> str:
     return ".".join(str(key) for key in item["loc"])
+
+
+def looked_up(find: Callable[[Any], Named], name: Any) -> Named:
+    """Return what a name refers to; a ValueError, which pydantic reports with the setting, where there is nothing."""
+    try:
+        return find(name)
+    except TissuqError as error:
+        raise ValueError(str(error)) from error

@@ -34,6 +34,7 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.warnings import PRIOR_BOUND_REACHED
 from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
+from tissuq.studies.settings import looked_up
 
 __all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "fitted", "run_specimen"]
 
@@ -65,10 +66,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     @field_validator("tolerances")
     @classmethod
     def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        try:
-            Tolerances(**sizes or {})
-        except InputError as error:
-            raise ValueError(str(error)) from error
+        looked_up(lambda given: Tolerances(**given), sizes or {})
         return sizes
 
     @model_validator(mode="after")

@@ -28,8 +28,8 @@ from tissuq.inference.enumerators.survey import (
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import Conditional, ConditionalGaussian
 from tissuq.inference.marginal import TABLE_POINTS, Marginal, moments_of_values, weighted_grid
-from tissuq.inference.reduction import one_thread
 from tissuq.inference.solution import Marginals, Solution
+from tissuq.inference.threads import one_thread
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat

@@ -29,8 +29,8 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
 from tissuq.inference.quasi_monte_carlo import systematic
-from tissuq.inference.reduction import one_thread
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
+from tissuq.inference.threads import one_thread
 from tissuq.inference.truncated_mixture import TruncatedMixture
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
 from importlib.resources import files
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,11 @@ from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.parameters.seeds import MAX_SEED
+from tissuq.studies.settings import looked_up
 from tissuq.validation.coverage.fitted import model_of, parameters_of, parts_of
 from tissuq.validation.coverage.truths import FAMILIES, FIXED, MIN_LOCKING_LIMIT, TRUTHS
 
 __all__ = ["BLOCK", "PRESETS", "CoverageSettings", "Design", "preset"]
-
-Named = TypeVar("Named")
 
 PRESETS = ("paper", "panel", "random-materials", "strength", "formulations", "transfer", "rivals", "further-families")
 BLOCK = 50
@@ -51,7 +49,7 @@ class Design(BaseModel):
     @field_validator("mode")
     @classmethod
     def _known_mode(cls, name: str) -> str:
-        _looked_up(_curve, name)
+        looked_up(_curve, name)
         return name
 
     @property
@@ -117,14 +115,14 @@ class CoverageSettings(BaseModel):
     def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
             for discrepancy in parts_of(name):
-                _looked_up(discrepancy_named, discrepancy)
+                looked_up(discrepancy_named, discrepancy)
         return names
 
     @field_validator("unseen")
     @classmethod
     def _known_modes(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         for name in names:
-            _looked_up(_curve, name)
+            looked_up(_curve, name)
         return names
 
     @field_validator("scale")
@@ -137,7 +135,7 @@ class CoverageSettings(BaseModel):
     @field_validator("priors")
     @classmethod
     def _known_priors(cls, priors: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        return {symbol: _looked_up(prior_from, prior).as_dict() for symbol, prior in priors.items()}
+        return {symbol: looked_up(prior_from, prior).as_dict() for symbol, prior in priors.items()}
 
     @model_validator(mode="after")
     def _within_limits(self) -> Self:
@@ -212,11 +210,3 @@ def preset(name: str) -> dict[str, object]:
 def _curve(name: str) -> None:
     if not loading_mode(name).is_curve:
         raise ModelError(f"a campaign needs a loading mode with one stress and one stretch, which '{name}' is not")
-
-
-def _looked_up(find: Callable[[Any], Named], name: Any) -> Named:
-    """Return what a name refers to, or explain why there is nothing of that name."""
-    try:
-        return find(name)
-    except TissuqError as error:
-        raise ValueError(str(error)) from error

@@ -18,7 +18,7 @@ from tissuq.model.measurement_errors import Tolerances
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predictive_mixtures, speaks_of
-from tissuq.prediction.scores import interval_score
+from tissuq.prediction.scores import interval_score, root_mean_square
 from tissuq.studies.stream import Step, run_tasks, silent
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
 from tissuq.validation.tissues.protocols import PROTOCOLS, Split
@@ -164,14 +164,14 @@ def predicted(posterior: Posterior, test: Experiment) -> dict[str, float]:
         measured.append(curve.stress[is_loaded])
         quantiles += [[mixture.quantile(tail) for tail in tails] for (mixture,) in blocks]
     stress, levels = np.concatenate(measured), np.concatenate(quantiles, axis=1)
-    size = _root_mean_square(stress)
+    size = root_mean_square(stress)
     result = {}
     for prob, low, high in zip(PROBABILITIES[::-1], levels, levels[::-1], strict=False):
         result[f"inside_{100 * prob:.0f}"] = float(((low <= stress) & (stress <= high)).mean())
     low, centre, high = levels[0], levels[len(tails) // 2], levels[-1]
     return result | {
-        "half_width": _root_mean_square(0.5 * (high - low)) / size,
-        "error": _root_mean_square(centre - stress) / size,
+        "half_width": root_mean_square(0.5 * (high - low)) / size,
+        "error": root_mean_square(centre - stress) / size,
         "score": float(interval_score(low, high, stress, PROBABILITIES[-1]).mean()) / size,
     }
 
@@ -194,18 +194,16 @@ def summarise_tissues(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
     low, modulus, high = (table[f"modulus_{name}"] for name in ("low", "of_predicted", "high"))
     table["modulus_inside"] = ((low <= modulus) & (modulus <= high)).where(modulus.notna()).astype(float)
     table["modulus_ratio"] = high / low.clip(lower=0)
-    classes = list(dict.fromkeys(table["class"]))
-    parts = [table, table.assign(**{"class": ALL})] if len(classes) > 1 else [table]
-    groups = pd.concat(parts).groupby(["protocol", "class", "formulation"], sort=False)
+    parts = [table, table.assign(**{"class": ALL})] if table["class"].nunique() > 1 else [table]
+    rows = pd.concat(parts)
+    for name in ("protocol", "class", "formulation"):  # in the order of the results
+        rows[name] = pd.Categorical(rows[name], list(dict.fromkeys(rows[name])))
+    groups = rows.groupby(["protocol", "class", "formulation"], observed=True)
     count = groups["inside_95"].count()
     summary = pd.DataFrame({"predictions": count, "failed": groups.size() - count})
     for name in (*scores, "useful", "modulus_inside", "modulus_ratio"):
         summary[name] = groups[name].mean() if "inside" in name or name == "useful" else groups[name].median()
-    order = {name: number for number, name in enumerate([*classes, ALL])}
-    protocols = list(dict.fromkeys(table["protocol"]))
-    rows = summary.reset_index()
-    keys = rows["protocol"].map(protocols.index), rows["class"].map(order.get)
-    return rows.iloc[np.lexsort((np.arange(len(rows)), keys[1], keys[0]))].reset_index(drop=True)
+    return summary.reset_index()
 
 
 @lru_cache(maxsize=1)
@@ -225,7 +223,3 @@ def _taken(count: int, most: int) -> list[int]:
 
 def _thinned(test: Experiment, points: int) -> Experiment:
     return test if len(test) <= points else test.where(np.array(_taken(len(test), points)))
-
-
-def _root_mean_square(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeVar
-
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from tissuq.errors import TissuqError
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.measurement_errors import Tolerances
+from tissuq.studies.settings import looked_up
 from tissuq.validation.tissues.protocols import PROTOCOLS
 
 __all__ = ["TissueSettings"]
-
-Named = TypeVar("Named")
 
 
 class TissueSettings(BaseModel):
@@ -62,18 +57,21 @@ class TissueSettings(BaseModel):
     @field_validator("formulations")
     @classmethod
     def _known_formulations(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(_looked_up(discrepancy_named, name) for name in names)
+        for name in names:
+            looked_up(discrepancy_named, name)
+        return names
 
     @field_validator("tolerances")
     @classmethod
     def _known_errors(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        _looked_up(lambda named: Tolerances(**named), sizes or {})
+        looked_up(lambda given: Tolerances(**given), sizes or {})
         return sizes
 
     @field_validator("material")
     @classmethod
     def _known_material(cls, name: str) -> str:
-        return _looked_up(material_named, name)
+        looked_up(material_named, name)
+        return name
 
     @field_validator("protocols", "formulations")
     @classmethod
@@ -81,12 +79,3 @@ class TissueSettings(BaseModel):
         if not names or len(set(names)) < len(names):
             raise ValueError("give one or more names, each once")
         return names
-
-
-def _looked_up(find: Callable[[Named], object], name: Named) -> Named:
-    """Return what something has as a name, or explain that nothing has."""
-    try:
-        find(name)
-    except TissuqError as error:
-        raise ValueError(str(error)) from error
-    return name
