@@ -64,6 +64,7 @@ def both(
         noise_sd=noise_sd,
         noise=noise,
         priors=uniform_priors(linear, axes),
+        tolerances="as-tested",
         method=method,
     )
     return posterior, problem_of(discrepancy, stretch, stress, linear, axes, noise_sd, **options)

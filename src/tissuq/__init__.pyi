@@ -25,7 +25,11 @@ from tissuq.mechanics.material import Material as Material, StretchMaterial as S
 from tissuq.mechanics.user_law import FunctionLaw as FunctionLaw
 from tissuq.model.discrepancy import discrepancies as discrepancies
 from tissuq.model.discrepancy.discrepancy import Discrepancy as Discrepancy
-from tissuq.model.measurement_errors import MeasurementError as MeasurementError, Tolerances as Tolerances
+from tissuq.model.measurement_errors import (
+    MeasurementError as MeasurementError,
+    Tolerances as Tolerances,
+    estimands as estimands,
+)
 from tissuq.model.noise import (
     KnownNoise as KnownNoise,
     Noise as Noise,

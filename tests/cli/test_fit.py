@@ -5,6 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
+import tissuq as tq
 from marks import slow_but
 
 from .conftest import STRESS_KPA, STRETCH, command, without_wall_times
@@ -300,3 +301,37 @@ def test_a_fit_of_stable_materials_is_repeated_from_its_run_toml(cli, here, mate
     assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "second").status == 0
     first, second = summary_of(here / "first")[0], summary_of(here / "second")[0]
     assert (first["C10_mean"], first["stable"]) == (second["C10_mean"], "1.0")
+
+
+def test_the_default_interval_of_a_file_is_of_the_specimen_and_says_so(cli, here, specimen):
+    options = [specimen, *ALONE]
+    said = {name: cli("fit", *options, "--estimand", name, "--out", name) for name in ("as-tested", "tissue")}
+    said["specimen"] = cli("fit", *options, "--out", "specimen")
+    assert all(one.status == 0 for one in said.values())
+    widths = {}
+    for name, one in said.items():
+        (row,) = summary_of(here / name)
+        assert row["estimand"] == name
+        meaning = tq.estimands()[name].description
+        assert f"The intervals are of {meaning}." in one.out.replace("\n", " ")
+        assert f"Intervals are of {meaning}." in (here / name / "report.html").read_text()
+        widths[name] = float(row["C10_hdi_high"]) - float(row["C10_hdi_low"])
+    assert widths["as-tested"] < widths["specimen"] < widths["tissue"]
+    assert "of the stress (spread between specimens)" not in (here / "as-tested" / "report.html").read_text()
+
+
+def test_a_size_replaces_that_of_the_estimand_and_a_run_repeats_with_both(cli, here, specimen):
+    options = ["--estimand", "specimen", "--tolerance", "test=0", "--tolerance", "slack=2%"]
+    assert cli("fit", specimen, *options, *ALONE, "--out", "first").status == 0
+    model = tq.load(here / "first").model
+    assert model.tolerances == tq.Tolerances("specimen", test=0, slack=0.02)
+    assert (model.tolerances.sizes["length"], "test" in model.tolerances.sizes) == (0.01, False)
+    assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "second").status == 0
+    assert tq.load(here / "second").model.tolerances == model.tolerances
+
+
+def test_an_estimand_that_does_not_exist_is_refused(cli, here, specimen):
+    said = cli("fit", specimen, "--estimand", "patient", *ALONE)
+    assert said.status == 2
+    assert "there is no estimand 'patient'. Choose one of: as-tested, specimen, tissue." in said.err.replace("\n", " ")
+    assert not (here / "runs").exists()

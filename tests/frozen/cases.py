@@ -201,8 +201,10 @@ def of_posterior(
 def fitted(
     data: Callable[[], Any], options: Mapping[str, Any], description: Mapping[str, Any], seed: int, rounding: float
 ) -> Numbers:
-    """Return the numbers of `tissuq.fit`."""
-    return of_posterior(tq.fit(rounded(data(), rounding), seed=seed, **options), **description)
+    """Return the numbers of `tissuq.fit`; of one test, unless said, as tested."""
+    tests = tq.Experiment.of(rounded(data(), rounding))
+    defaults = {"tolerances": "as-tested"} if len(tests.tests) == 1 else {}
+    return of_posterior(tq.fit(tests, seed=seed, **(defaults | options)), **description)
 
 
 def fit_case(

@@ -154,7 +154,7 @@ def test_an_energy_or_a_sum_of_two_is_its_dense_covariance(names):
 def test_unknown_noise_is_integrated_too():
     data = measured(seed=2)
     priors = {"C10": tq.Uniform(0, 50), "noise_sd": tq.Uniform(0, 2)}
-    posterior = tq.fit(data, discrepancy="taylor", priors=priors)
+    posterior = tq.fit(data, discrepancy="taylor", priors=priors, tolerances="as-tested")
     noise = np.exp(np.arange(np.log(0.005), np.log(1.9), 0.08))
     evidence, mean, sd = dense("taylor", data, noise, log_noise_prior=np.log(0.08 * noise / 2))
     assert abs(posterior.log_evidence - evidence) < posterior.log_evidence_error + 2e-3
@@ -283,7 +283,7 @@ def test_an_energy_among_a_hundred_thousand_points():
 def test_the_noise_has_the_marginal_of_its_dense_grid():
     data = measured(seed=2)
     priors = {"C10": tq.Uniform(0, 50), "noise_sd": tq.Uniform(0, 2)}
-    found = tq.fit(data, discrepancy="taylor", priors=priors).solution.marginals["noise_sd"]
+    found = tq.fit(data, discrepancy="taylor", priors=priors, tolerances="as-tested").solution.marginals["noise_sd"]
     noise = np.exp(np.arange(np.log(0.01), np.log(1.0), 0.03))
     evidences = np.array([dense("taylor", data, sd)[0] for sd in noise])
     weights = np.exp(evidences - evidences.max()) * noise
@@ -349,7 +349,7 @@ def test_any_prior_of_the_noise_is_integrated(prior):
     # Against Gauss's rule in the logarithm of the noise within the prior, each with the noise known.
     data = measured(seed=2)
     fixed = {"C10": tq.Uniform(0, 50)}
-    posterior = tq.fit(data, discrepancy="taylor", priors=fixed | {"noise_sd": prior})
+    posterior = tq.fit(data, discrepancy="taylor", priors=fixed | {"noise_sd": prior}, tolerances="as-tested")
     low, high = np.log(np.clip(prior.quantile(np.array([1e-9, 1 - 1e-9])), 4e-3, 2.0))
     nodes, shares = np.polynomial.legendre.leggauss(60)
     noise = np.exp(0.5 * (low + high) + 0.5 * (high - low) * nodes)

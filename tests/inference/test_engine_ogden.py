@@ -79,6 +79,7 @@ def test_one_term_with_an_amplitude_or_unknown_noise(kind):
         discrepancy="constant" if kind == "S" else "none",
         noise_sd=0.05 if kind == "S" else "unknown",
         priors=priors,
+        tolerances="as-tested",
     )
     problem = problem_of_ogden(stress(), linear, axes, ["alpha1"], 0.05, others)
     truth = assert_agrees_for("mu1", posterior, problem, nodes=14)

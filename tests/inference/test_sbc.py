@@ -106,7 +106,8 @@ def test_unknown_noise_is_calibrated_and_a_fault_is_caught(count, fault):
     """100 data sets see a standard deviation that is 40 % too small, 2000 one that is 10 %."""
     values, priors, generator = truths("none", count, seed=2, noise=("noise_sd",))
     stresses = simulate("none", STRETCH, values, values["noise_sd"], generator)
-    posteriors = tq.fit_many(experiments(stresses), discrepancy="none", priors=priors, method="exact")
+    options = {"discrepancy": "none", "priors": priors, "tolerances": "as-tested"}
+    posteriors = tq.fit_many(experiments(stresses), method="exact", **options)
     for symbol in ("C10", "noise_sd"):
         pit = [
             probability_below(p.solution.marginals[symbol], v) for p, v in zip(posteriors, values[symbol], strict=True)

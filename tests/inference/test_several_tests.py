@@ -30,8 +30,12 @@ def experiments(specimens=("", "")):
     return [tq.Experiment(mode, stretch, stress, name=mode, specimen=name) for mode, stretch, stress, name in parts]
 
 
-def fit(discrepancy, **options):
-    return tq.fit(experiments(), discrepancy=discrepancy, **({"noise_sd": list(NOISE_SD)} | options))
+APART = tq.Tolerances(stress=0.18)
+
+
+def fit(discrepancy, tolerances=APART, **options):
+    options = {"noise_sd": list(NOISE_SD), "tolerances": tolerances} | options
+    return tq.fit(experiments(), discrepancy=discrepancy, **options)
 
 
 def between(model):
@@ -55,11 +59,10 @@ def width(posterior, *symbols):
     return np.prod([np.ptp(posterior.model.priors[symbol].support) for symbol in symbols])
 
 
-@pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
+@pytest.mark.parametrize("tolerances", [tq.Tolerances(), APART])
 def test_without_discrepancy_it_is_generalised_least_squares(tolerances):
     posterior = fit("none", tolerances=tolerances)
-    model, usual = posterior.model, 0.18 if tolerances is None else 0.0
-    assert model.tolerances.stress == usual
+    model, usual = posterior.model, tolerances.stress
     covariance = np.diag(SIZE**2) + (between(model) if usual else 0.0)
     mean, sd, evidence = given(covariance, X[:, None], width(posterior, "C10"))
     found = posterior.solution.marginals["C10"]
@@ -75,7 +78,7 @@ def test_the_curve_along_which_tests_err_is_that_of_the_fit_itself():
     assert model.fitted_errors.curve[0] / X[0] == pytest.approx(again, rel=0.02)
 
 
-@pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
+@pytest.mark.parametrize("tolerances", [tq.Tolerances(), APART])
 def test_an_energy_acts_in_all_tests(tolerances):
     posterior = fit("taylor", tolerances=tolerances)
     model = posterior.model
@@ -115,7 +118,7 @@ def test_a_mean_in_stress_is_another_in_each_test_and_its_scatter_goes_with_the_
 
 
 def test_a_process_in_stress_is_independent_between_tests():
-    posterior = fit("gp")
+    posterior = fit("gp", tolerances=None)
     model = posterior.model
     assert not model.tolerances
     same = TEST[:, None] == TEST
@@ -140,14 +143,14 @@ def test_parts_of_one_test_are_the_test():
         for own in (slice(0, 8), slice(8, None))
     ]
     whole = tq.fit(data, noise_sd=0.05)
-    both = tq.fit(parts, noise_sd=0.05)
+    both = tq.fit(parts, noise_sd=0.05, tolerances="as-tested")
     assert np.allclose(both.summary(), whole.summary(), rtol=1e-6, equal_nan=True)
     assert both.solution.log_evidence == pytest.approx(whole.solution.log_evidence, abs=1e-6)
     asked = np.array([0.7, 1.5, 2.2])
     assert np.allclose(both.predict(asked, mode="planar"), whole.predict(asked, mode="planar"), rtol=1e-6)
 
 
-@pytest.mark.parametrize("tolerances", [tq.Tolerances(), None])
+@pytest.mark.parametrize("tolerances", [tq.Tolerances(), APART])
 def test_leaving_out_a_measurement_is_conditioning_on_the_others(tolerances):
     posterior = fit("none", tolerances=tolerances)
     model = posterior.model

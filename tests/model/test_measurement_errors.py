@@ -40,11 +40,12 @@ def test_each_error_is_the_difference_that_a_small_one_makes(mode, stretch):
         "slack": stress(stretch * (1 + step) if reference else stretch + step),
         "zero": stress(stretch) + step,
         "stretch": stress(stretch + step),
+        "test": (1 + step) * stress(stretch),
     }
-    points = ErrorPoints(mode, stretch, stress(stretch), slope(stretch))
+    points = ErrorPoints(mode, stretch, stress(stretch), slope(stretch)[:, None])
     for name, moved in truth.items():
         error = variants(MeasurementError)[name]()
-        assert np.allclose(error.effect(points), (moved - stress(stretch)) / step, rtol=1e-4, atol=1e-4), name
+        assert np.allclose(error.effect(points).ravel(), (moved - stress(stretch)) / step, rtol=1e-4, atol=1e-4), name
 
 
 def test_an_error_of_ones_own_is_integrated_like_the_others():
@@ -128,3 +129,54 @@ def test_every_test_and_every_stress_has_a_smooth_error_of_its_own():
     covariance = 0.01**2 * np.eye(27) + 0.1**2 * relative * np.outer(curve, curve)
     white = found(np.eye(27))
     assert np.allclose(white @ covariance @ white.T, 0.01**2 * np.eye(27), atol=2e-5 * 0.01**2)
+
+
+def test_an_estimand_is_a_set_of_sizes_that_single_ones_replace():
+    specimen, tissue = Tolerances("specimen"), Tolerances("tissue")
+    assert specimen.estimand == "specimen"
+    assert tissue.stress > specimen.stress > 0
+    assert not Tolerances("as-tested")
+    assert Tolerances() == Tolerances("as-tested")
+    other = Tolerances("specimen", slack=0, zero=0.1)
+    assert "slack" not in other.sizes
+    assert (other.sizes["zero"], other.sizes["length"]) == (0.1, specimen.sizes["length"])
+    assert other.with_sizes(stress=0.3).sizes == other.sizes | {"stress": 0.3}
+    assert eval(repr(other)) == other
+    assert (specimen.has_standard_spreads, Tolerances("specimen", test=0.3).has_standard_spreads) == (True, False)
+    with pytest.raises(tq.InputError, match="there is no estimand 'patient'"):
+        Tolerances("patient")
+
+
+def test_one_file_of_one_test_is_as_tested_where_its_errors_are_known_or_taken_up():
+    test = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.002, seed=3)
+    assert tq.fit(test, discrepancy="none").model.tolerances == Tolerances("specimen")
+    for options in ({"noise_sd": 0.002}, {"noise": "autoregressive"}, {"noise": "proportional"}):
+        assert not tq.fit(test, discrepancy="none", **options).model.tolerances
+    assert not tq.fit(test, discrepancy="constant").model.tolerances
+
+
+def test_several_controls_have_an_error_of_length_and_slack_each():
+    along = np.linspace(0.02, 0.2, 9)
+    sheet = np.column_stack([1 + along, 1 + 0.5 * along])
+    truth = tq.simulate("neo-hookean", {"C10": 0.5}, sheet, mode="biaxial", noise_sd=0.001, seed=2)
+    tolerances = Tolerances(length=0.03, slack=0.01)
+    model = tq.fit(truth, discrepancy="none", noise_sd=0.001, tolerances=tolerances).model
+    path_1, path_2 = truth.mode.paths
+    C10, step = model.fitted_errors.curve @ model.design[:, 0], 1e-6
+    columns = []
+    for control in range(2):
+        moved = sheet + step * (np.arange(2) == control)
+        both = [path.at(points) for path in (path_1, path_2) for points in (sheet, moved)]
+        first, after_1, second, after_2 = (model.basis(states)[:, 0] for states in both)
+        columns.append(np.concatenate([after_1 - first, after_2 - second]) / step)
+    basis = np.concatenate([model.basis(path.at(sheet))[:, 0] for path in (path_1, path_2)])
+    assert C10 != 0
+    scale = (model.fitted_errors.curve @ basis) / (basis @ basis)
+    assert np.allclose(model.fitted_errors.slopes, scale * np.column_stack(columns), rtol=1e-3, atol=1e-4)
+    errors = []
+    for control, slope in enumerate(np.array(columns) * scale):
+        stretch = np.concatenate([sheet[:, control]] * 2)
+        errors += [0.03 * (stretch - 1) * slope, 0.01 * stretch * slope]
+    covariance = 0.001**2 * np.eye(18) + sum(np.outer(error, error) for error in errors)
+    white = model.whitening(np.eye(18))
+    assert np.allclose(white @ covariance @ white.T, 0.001**2 * np.eye(18), atol=1e-3 * 0.001**2)

@@ -23,7 +23,7 @@ def two_tests(*specimens):
 
 
 def of(tolerances, *specimens, lag=0.0):
-    return whitening(two_tests(*specimens), NOISE_SD, 0.03, tolerances, FittedErrors(CURVE, lag=lag))
+    return whitening(two_tests(*specimens), NOISE_SD, 0.03, tolerances, FittedErrors(CURVE, SLOPE[:, None], lag=lag))
 
 
 def noise(size, lag):
@@ -39,11 +39,15 @@ def covariance(tolerances, *specimens, lag=0.0):
     shared = np.kron(same, np.ones(1))[np.ix_(np.repeat([0, 1], [3, 4]), np.repeat([0, 1], [3, 4]))]
     apart = np.outer(CURVE, CURVE) * (np.outer(2 * first - 1, 2 * first - 1) / 2 if not same.all() else 0.0)
     strain = np.concatenate(STRETCH) - 1
+    largest = np.repeat([np.abs(CURVE[:3]).max(), np.abs(CURVE[3:]).max()], [3, 4])
+    of_stretch, of_stress = tolerances.sizes.get("stretch", 0.0), tolerances.sizes.get("resolution", 0.0)
     found = (
-        noise(np.hypot(SIZE, tolerances.sizes.get("stretch", 0.0) * SLOPE), lag)
+        noise(np.sqrt(SIZE**2 + (of_stretch * SLOPE) ** 2 + (of_stress * largest) ** 2), lag)
         + tolerances.stress**2 * apart
         + tolerances.sizes.get("zero", 0.0) ** 2 * shared
     )
+    sign = 2 * first - 1
+    found += tolerances.sizes.get("test", 0.0) ** 2 / 2 * np.outer(sign * CURVE, sign * CURVE)
     found += tolerances.sizes.get("slack", 0.0) ** 2 * shared * np.outer((strain + 1) * SLOPE, (strain + 1) * SLOPE)
     return found + tolerances.sizes.get("length", 0.0) ** 2 * shared * np.outer(strain * SLOPE, strain * SLOPE)
 
@@ -53,8 +57,10 @@ CASES = [
     (Tolerances(stress=0.15), ("a", "b"), 1e-12),
     (Tolerances(stress=0.15, zero=0.01), ("a", "a"), 1e-12),
     (Tolerances(stress=0.3, zero=0.1), ("a", "b"), 1e-12),
-    (Tolerances(length=0.02), ("a", "b"), 0.5),  # the slope is that of few points
-    (Tolerances(stretch=0.001), ("a", "b"), 0.1),
+    (Tolerances(length=0.02), ("a", "b"), 1e-12),
+    (Tolerances(stretch=0.001), ("a", "b"), 1e-12),
+    (Tolerances(test=0.1), ("a", "a"), 1e-12),
+    (Tolerances(resolution=0.01), ("a", "b"), 1e-12),
 ]
 
 
@@ -86,11 +92,12 @@ def test_one_specimen_has_all_its_error_of_stress_in_common():
     assert Tolerances(stress=0.2).in_common(two_tests("a", "a")) == 0.2
     assert Tolerances(stress=0.2).in_common(two_tests("a", "b")) == pytest.approx(0.2 / np.sqrt(2))
     assert Tolerances(stress=0.2).in_common(two_tests("", "")) == pytest.approx(0.2 / np.sqrt(2))
+    assert Tolerances(stress=0.2, test=0.1).in_common(two_tests("a", "a")) == pytest.approx(np.sqrt(0.045))
 
 
 def test_the_variance_of_a_new_test_is_that_of_its_errors():
     found = Tolerances(stress=0.1, length=0.02, slack=0.03, zero=0.5).variance(
-        ErrorPoints(Uniaxial(), np.array([1.5]), np.array([2.0]), 4.0)
+        ErrorPoints(Uniaxial(), np.array([1.5]), np.array([2.0]), np.array([[4.0]]))
     )
     assert found == pytest.approx(0.2**2 + 0.5**2 + (0.02 * 0.5 * 4) ** 2 + (0.03 * 1.5 * 4) ** 2)
 

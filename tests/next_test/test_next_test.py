@@ -109,12 +109,13 @@ def simulated(posterior, candidate, count, seed=2):
 )
 def test_fits_of_simulated_outcomes_have_the_expected_variance(discrepancy, noise_sd, count):
     data = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.05, "C30": 0.0}, np.linspace(0.75, 1.5, 12), NOISE, seed=1)
-    posterior = tq.fit(data, discrepancy=discrepancy, noise_sd=noise_sd)
+    posterior = tq.fit(data, discrepancy=discrepancy, noise_sd=noise_sd, tolerances="as-tested")
     candidate = tq.Candidate("uniaxial", np.linspace(0.76, 1.4, 12))
     expected = asked_of(posterior, "C10").expected(candidate)
     both = [data.joined(test) for test in simulated(posterior, candidate, count)]
     priors = posterior.model.priors
-    after = tq.fit_many(both, discrepancy=discrepancy, noise_sd=noise_sd, priors=priors)
+    options = {"noise_sd": noise_sd, "priors": priors, "tolerances": "as-tested"}
+    after = tq.fit_many(both, discrepancy=discrepancy, **options)
     variance = np.array([each.marginals["C10"].sd ** 2 for each in after])
     error = np.hypot(
         variance.std(ddof=1) / np.sqrt(count), 2 * expected.sd_after[0] * expected.error[0] * expected.sd_now[0]
@@ -155,7 +156,7 @@ def test_noise_that_grows_with_the_stress_makes_large_stretches_worth_less():
     data = tq.Experiment("uniaxial", data.stretch, loud)
     gains = {}
     for noise in ("unknown", "proportional"):
-        posterior = tq.fit(data, discrepancy="none", noise=noise)
+        posterior = tq.fit(data, discrepancy="none", noise=noise, tolerances="as-tested")
         asked = asked_of(posterior, "C10")
         near, far = (
             asked.expected(tq.Candidate("uniaxial", np.linspace(low, high, 10))).reduction[0]

@@ -111,11 +111,11 @@ def test_measurements_are_scored_with_the_discrepancy_and_without(fits, planar):
 
 
 def test_a_reader_is_told_what_the_comparison_cannot_say(fits, data, planar):
-    assert any("--tolerance" in text for text in predicted(fits["none"], data=planar).warnings)
+    assert any("--estimand tissue" in text for text in predicted(fits["none"], data=planar).warnings)
     (only,) = predicted(fits["none"], data=data).warnings
     assert "fitted to these measurements" in only
     tolerant = tq.fit(data, discrepancy="none", noise_sd=NOISE_SD, tolerances=tq.Tolerances(stress=0.1))
-    assert not any("--tolerance" in text for text in predicted(tolerant, data=planar).warnings)
+    assert not any("--estimand" in text for text in predicted(tolerant, data=planar).warnings)
 
 
 def test_labelled_arrays_hold_every_band_in_mpa(fits, planar, tmp_path):

@@ -138,9 +138,7 @@ def _stable_draws(
             "a stable material of this kind. Choose another one, measure in more loading modes, or fit without "
             "stable_in."
         )
-    draws = batches[0]
-    for batch in batches[1:]:
-        draws = draws.joined(batch)
+    draws = GaussianMixture.of_all(batches)
     return draws.weighted(np.full(stable_count, 1 / stable_count)), draw_count
 
 

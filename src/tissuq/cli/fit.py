@@ -54,12 +54,19 @@ def fit(
         list[str] | None,
         typer.Option(help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more."),
     ] = None,
+    estimand: Annotated[
+        str | None,
+        typer.Option(
+            help="What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a "
+            "careful laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens]."
+        ),
+    ] = None,
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
-            help="Error of a whole test (standard deviation): stress=10%, length=2%, slack=0.01 (of stretch), "
-            "smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single stretch=0.001; or none; "
-            "repeat [stress=18% for files of different specimens]."
+            help="Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, "
+            "length=2%, slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of "
+            "every single stretch=0.001 or stress, resolution=0.2% (of the largest); or none; repeat."
         ),
     ] = None,
     specimen: Annotated[
@@ -96,7 +103,7 @@ def fit(
     files = reading.files_of(file or [])
     options: dict[str, Any] = {
         "material": material, "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
-        "tolerances": reading.tolerances(tolerance), "stable_in": stable_in or None,
+        "estimand": estimand, "tolerances": reading.tolerances(tolerance), "stable_in": stable_in or None,
         "held_out": held_out,
     }  # fmt: skip
     options |= reading.measured([] if config else files, read_as, mode, specimen, noise_sd)

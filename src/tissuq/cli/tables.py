@@ -59,6 +59,8 @@ def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
     InputError
         When the folder is not that of a complete run.
     """
+    from tissuq.model.measurement_errors import ESTIMANDS
+
     try:
         rows, readable, unit, title = _read_run(folder, experiment)
         has_verdict = [row["contains_truth"] is not None for row in rows]
@@ -79,6 +81,8 @@ def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
             f"'{folder}' is not the folder of a complete run: {SUMMARY} or {RECIPE} is missing or damaged."
         ) from error
     print_rows(title, headers, table)
+    if rows[0].get("estimand") in ESTIMANDS:
+        print(f"The intervals are of {ESTIMANDS[rows[0]['estimand']].description}.")
     print(
         "HPD: 95 %. In band, alone: share of measurements inside the 95 % band with the discrepancy, and inside that "
         "of the material alone."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,6 +61,27 @@ class GaussianMixture:
         root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
         return cls(weights, np.zeros((len(weights), 0)), mean, root)
 
+    @classmethod
+    def of_all(cls, mixtures: Sequence[GaussianMixture]) -> GaussianMixture:
+        """Return the components of several mixtures; their weights together must sum to one.
+
+        Where they have different numbers of linear parameters, those that are missing are zero.
+        """
+        p, r = (max(mixture.root.shape[axis] for mixture in mixtures) for axis in (1, 2))
+        mean = [np.pad(mixture.mean, [(0, 0), (0, p - mixture.mean.shape[1])]) for mixture in mixtures]
+        root = [
+            np.pad(mixture.root, [(0, 0), (0, p - mixture.root.shape[1]), (0, r - mixture.root.shape[2])])
+            for mixture in mixtures
+        ]
+        members = [mixture.member for mixture in mixtures if mixture.member is not None]
+        return cls(
+            np.concatenate([mixture.weights for mixture in mixtures]),
+            np.concatenate([mixture.settings for mixture in mixtures]),
+            np.concatenate(mean),
+            np.concatenate(root),
+            np.concatenate(members) if len(members) == len(mixtures) else None,
+        )
+
     def __getitem__(self, index: NDArray[Any] | slice) -> GaussianMixture:
         member = None if self.member is None else self.member[index]
         return GaussianMixture(self.weights[index], self.settings[index], self.mean[index], self.root[index], member)
@@ -85,12 +106,6 @@ class GaussianMixture:
         """Return the marginal of the linear parameter with an index; no component may be a point."""
         sds = np.sqrt((self.root[:, index] ** 2).sum(axis=1))
         return marginal_of_mixture(self.weights, self.mean[:, index], sds)
-
-    def joined(self, more: GaussianMixture) -> GaussianMixture:
-        """Return these components followed by others; the weights of both together must sum to one."""
-        is_average = self.member is not None and more.member is not None
-        names = ("weights", "settings", "mean", "root", *(["member"] if is_average else []))
-        return GaussianMixture(*(np.concatenate([getattr(self, name), getattr(more, name)]) for name in names))
 
     def draw(self, seed: int) -> tuple[NDArray[np.intp], FloatArray]:
         """Return the component (chains, draws) of every draw, and its linear parameters (chains, draws, p)."""

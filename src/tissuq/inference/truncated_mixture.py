@@ -101,7 +101,7 @@ class TruncatedMixture:
         mixture = self.free
         for gaussians in (*self.cut.values(), self.crossed):
             if len(gaussians):
-                mixture = mixture.joined(self._drawn(gaussians))
+                mixture = GaussianMixture.of_all([mixture, self._drawn(gaussians)])
         return mixture
 
     def marginal(self, index: int) -> Marginal:

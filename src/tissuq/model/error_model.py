@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.model.discrepancy import Discrepancy
-from tissuq.model.measurement_errors import FittedErrors, Shared, Tolerances, specimens_of
+from tissuq.model.measurement_errors import ErrorPoints, FittedErrors, Shared, Tolerances, specimens_of
 from tissuq.model.noise import Noise, stress_level
 
 __all__ = ["ErrorModel", "Whitening", "whitening"]
 
 FloatArray = NDArray[np.float64]
+
+NEGLIGIBLE_SPREAD, ROUNDING = 1e-9, 1e-14
+"""Variance of a shared error over that of the noise, and over the largest one, below which it is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,44 +117,43 @@ def whitening(
         Their geometric mean, for which the parameter noise_sd stands.
     tolerances : Tolerances
     errors : FittedErrors
-        The curve along which whole tests err, the level of the independent errors where it is not noise_sd's, and the
-        correlation of the noise of consecutive measurements.
+        The curve along which whole tests err and its slopes, the level of the independent errors where it is not
+        noise_sd's, and the correlation of the noise of consecutive measurements.
     """
-    level, curve, lag = errors.level or mean_sd, errors.curve, errors.lag or 0.0
+    level, lag = errors.level or mean_sd, errors.lag or 0.0
     count = [test.size for test in experiment.tests]
     size, shared = np.repeat(noise_sd / mean_sd, count), np.zeros((sum(count), 0))
-    if tolerances and curve is not None:
-        pairs = list(zip(experiment.tests, np.split(curve, np.cumsum(count)[:-1]), strict=True))
-        size = np.hypot(size, np.concatenate([tolerances.noise(*pair) for pair in pairs]) / level)
-        shared = _errors_of_tests(specimens_of(experiment), tolerances, pairs)
+    if tolerances and (tests := errors.points_of(experiment)):
+        size = np.hypot(size, np.concatenate([tolerances.noise(points) for points in tests]) / level)
+        shared = _errors_of_tests(specimens_of(experiment), tolerances, tests)
     starts = np.cumsum([0, *(len(measured) for measured in experiment.curves[:-1])])
     lags = np.where(np.isin(np.arange(len(size)), starts), 0.0, lag)
     bare = Whitening(size, lags, np.zeros((len(size), 0)), np.zeros(0))
     columns = bare(shared) / level
-    along, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    is_significant = singular > 1e-8 * singular.max(initial=0.0)
+    spread, vectors = np.linalg.eigh(columns.T @ columns)
+    is_significant = spread > np.maximum(NEGLIGIBLE_SPREAD, ROUNDING * spread.max(initial=0.0))
     if not is_significant.any() and not lag and np.allclose(size, 1, rtol=1e-12):
         return None
-    return Whitening(size, lags, along[:, is_significant], singular[is_significant] ** 2)
+    along = columns @ (vectors[:, is_significant] / np.sqrt(spread[is_significant]))
+    return Whitening(size, lags, along, spread[is_significant])
 
 
-def _errors_of_tests(
-    specimens: NDArray[np.bool_], tolerances: Tolerances, tests: Sequence[tuple[Experiment, FloatArray]]
-) -> FloatArray:
-    """Return what errors of whole specimens do to all measurements (n, q), for tests and their mean curves.
+def _errors_of_tests(specimens: NDArray[np.bool_], tolerances: Tolerances, tests: Sequence[ErrorPoints]) -> FloatArray:
+    """Return what errors of whole tests do to all measurements (n, q), at the points of these.
 
-    Of errors of the specimens only their differences from the specimens' mean. Where tests have different numbers of
+    Of some errors only the differences of specimens or tests from their mean. Where tests have different numbers of
     such columns, as of two stresses beside one, those that are missing are zero.
     """
     of_specimen = specimens.astype(np.float64)
     memberships: dict[Shared, FloatArray] = {
-        "differences": of_specimen - of_specimen.mean(axis=1, keepdims=True),
+        "specimens' differences": of_specimen - of_specimen.mean(axis=1, keepdims=True),
+        "tests' differences": np.eye(len(tests)) - 1 / len(tests),
         "specimen": of_specimen,
         "test": np.eye(len(tests)),
     }
     groups = []
     for shared, membership in memberships.items():
-        columns = [tolerances.columns(test, curve, shared) for test, curve in tests]
+        columns = [tolerances.columns(points, shared) for points in tests]
         widest = max(part.shape[1] for part in columns)
         padded = [np.pad(part, [(0, 0), (0, widest - part.shape[1])]) for part in columns]
         groups.append(np.concatenate([np.kron(part, row[None]) for part, row in zip(padded, membership, strict=True)]))

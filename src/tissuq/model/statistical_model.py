@@ -16,6 +16,7 @@ from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.model.compatibility import check_linearity, check_parts, check_separable
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
+from tissuq.model.discrepancy.blocks import EnergyBlock
 from tissuq.model.error_model import ErrorModel
 from tissuq.model.measurement_errors import FittedErrors, Tolerances
 from tissuq.model.noise import Noise, noise_named
@@ -233,8 +234,18 @@ class StatisticalModel(ErrorModel):
 
     def energy_features(self, member: int) -> list[FloatArray]:
         """Return the stresses of each block's terms of a member as `rows`."""
-        features = self.energy_members[member].stress_features(self.states)
-        return [np.asarray(self.rows(columns)) for columns in features]
+        return [self._rows_of_block(*scaled_block) for scaled_block in self.energy_members[member].scaled_blocks]
+
+    def _rows_of_block(self, block: EnergyBlock, reach: tuple[float, float], length: float) -> FloatArray:
+        """Return the stresses of the terms of a block as `rows`, remembered, as many members have it."""
+        key = block, reach, length
+        if key not in self._known_blocks:
+            self._known_blocks[key] = np.asarray(self.rows(block.stress_features(self.states, reach, length)))
+        return self._known_blocks[key]
+
+    @cached_property
+    def _known_blocks(self) -> dict[tuple[EnergyBlock, tuple[float, float], float], FloatArray]:
+        return {}
 
     @cached_property
     def statistics(self) -> Statistics:

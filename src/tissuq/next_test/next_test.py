@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.experiment import Experiment
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
-from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, Tolerances, specimens_of
+from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, ErrorPoints, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test.candidates import Candidate, Target, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
+from tissuq.prediction.moments import stress_moments, stress_slopes
 
 __all__ = ["MAX_REACH", "Expected", "NextTest", "Specimen"]
 
@@ -138,11 +138,16 @@ class NextTest:
     @property
     def errors_after(self) -> float:
         """The same after a further test."""
-        return self.errors_now if self.specimen == "same" else self.tolerances.stress / np.sqrt(self._specimens + 1)
+        if self.specimen == "same":
+            return self.errors_now
+        spreads = [size / np.sqrt(count + 1) for size, count in self._spreads]
+        return float(np.linalg.norm(spreads))
 
     @property
-    def _specimens(self) -> int:
-        return int(specimens_of(self.model.experiment).shape[1])
+    def _spreads(self) -> list[tuple[float, int]]:
+        """The spread of the stress between specimens, and between tests, and how many of them there are."""
+        tests, specimens = specimens_of(self.model.experiment).shape
+        return [(self.tolerances.stress, specimens), (self.tolerances.test, tests)]
 
     def _common_error(self, error: float) -> FloatArray:
         """Return the error (t,) of each target that all stresses have in common."""
@@ -204,15 +209,25 @@ class NextTest:
         curve = components.weights @ mean / components.weights.sum()
         noise_sd = self._noise(components, candidate, points, curve)
         if self.specimen == "other":
-            kinds = len(candidate.mode.stresses)
-            stress = curve if kinds == 1 else curve.reshape(kinds, -1).T
-            test = Experiment(candidate.mode, points, stress)
-            columns = list(self._errors_of_specimen(test, curve, mean, target_mean))
+            test = self._error_points(components, candidate, points, curve)
+            columns = list(self._errors_of_specimen(test, mean, target_mean))
             root = np.concatenate([root, *(column[:, :, None] for column, _ in columns)], axis=2)
             target_root = np.concatenate([target_root, *(column[:, :, None] for _, column in columns)], axis=2)
-            noise_sd = np.hypot(noise_sd, self.tolerances.noise(test, curve))
+            noise_sd = np.hypot(noise_sd, self.tolerances.noise(test))
         moments = np.concatenate([mean, target_mean], axis=1), np.concatenate([root, target_root], axis=1)
         return GaussianMixture(components.weights, components.settings, *moments), noise_sd * np.sqrt(share)
+
+    def _error_points(
+        self, components: GaussianMixture, candidate: Candidate, points: FloatArray, curve: FloatArray
+    ) -> ErrorPoints:
+        """Return the points of a candidate at which its errors act, for its mean curve (n,)."""
+        if not self.tolerances.need_slope:
+            return ErrorPoints(candidate.mode, points, curve)
+        states = states_of(self.model, [(candidate.mode, points)])
+        mean, _ = stress_moments(self.model, components, states, discrepancy=True, noise=False)
+        slopes = stress_slopes(self.model, components, states, mean)
+        weights = components.weights / components.weights.sum()
+        return ErrorPoints(candidate.mode, points, curve, np.einsum("m,mgc->gc", weights, slopes))
 
     def _noise(
         self, components: GaussianMixture, candidate: Candidate, points: FloatArray, curve: FloatArray
@@ -227,17 +242,18 @@ class NextTest:
         total = variance + _scatter(model, components)[:, None] ** 2
         return np.asarray(np.sqrt(np.broadcast_to(total, (len(components.weights), len(curve)))))
 
-    def _errors_of_specimen(
-        self, test: Experiment, curve: FloatArray, mean: FloatArray, target_mean: FloatArray
-    ) -> Iterator[Column]:
+    def _errors_of_specimen(self, test: ErrorPoints, mean: FloatArray, target_mean: FloatArray) -> Iterator[Column]:
         """Yield the effects of standard errors of a new specimen on its stresses (M, n) and on the targets (M, t).
 
-        With e the errors of stress of K + 1 specimens, the data determine the tissue's stress times 1 + the mean of K.
-        The new stress is that times 1 + d, d = e_new - mean of K, and the mean of K + 1 is that of K plus d / (K + 1).
+        With e the errors of stress of K + 1 specimens, or tests, the data determine the tissue's stress times 1 + the
+        mean of K. The new stress is that times 1 + d, d = e_new - mean of K, and the mean of K + 1 is that of K plus
+        d / (K + 1).
         """
-        sd, count = self.tolerances.stress * np.sqrt(1 + 1 / self._specimens), self._specimens + 1
-        yield mean * sd, target_mean * self._common_error(sd / count)
-        columns = [self.tolerances.columns(test, curve, shared) for shared in ("specimen", "test")]
+        for size, count in self._spreads:
+            sd = size * np.sqrt(1 + 1 / count)
+            if sd:
+                yield mean * sd, target_mean * self._common_error(sd / (count + 1))
+        columns = [self.tolerances.columns(test, shared) for shared in ("specimen", "test")]
         for column in np.hstack(columns).T:
             if column.any():
                 yield np.broadcast_to(column, mean.shape), np.zeros_like(target_mean)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,7 +169,7 @@ def _on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
         pieces.append(_split(reduced(mixture[~is_narrow & ~is_point], MAX_WIDE_COMPONENTS), coordinates))
     if is_point.any():
         pieces.append(_smoothed(mixture[is_point], coordinates))
-    return reduce(GaussianMixture.joined, pieces)
+    return GaussianMixture.of_all(pieces)
 
 
 def _mapped(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMixture:

@@ -13,6 +13,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.measurement_errors import AS_TESTED
 from tissuq.model.noise import Noise
 from tissuq.parameters.priors import Prior
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
@@ -107,6 +108,7 @@ def fit_population(
         noise_sd=noise_sd,
         noise=noise,
         priors=priors,
+        tolerances=AS_TESTED,
         method=method,
         seed=seed,
     )

@@ -49,13 +49,16 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
         "noise": _plain_noise(model.noise),
         "chosen_priors": {symbol: prior.as_dict() for symbol, prior in model.chosen_priors.items()},
         "priors": {symbol: prior.as_dict() for symbol, prior in model.priors.items()},
-        "tolerances": model.tolerances.sizes,
-        "fitted_errors": vars(model.fitted_errors) | {"curve": None},
+        "estimand": model.tolerances.estimand,
+        "tolerances": model.tolerances.stated,
+        "fitted_errors": vars(model.fitted_errors) | {"curve": None, "slopes": None},
         "count": model.statistics.count,
     }
     arrays: dict[str, Any] = {"triangle": (("row", "column"), model.statistics.triangle)}
     if model.fitted_errors.curve is not None:
         arrays["curve"] = ("measurement", model.fitted_errors.curve, {"units": "MPa"})
+    if model.fitted_errors.slopes is not None:
+        arrays["slopes"] = (("measurement", "control"), model.fitted_errors.slopes, {"units": "MPa"})
     groups = {MODEL: LabelledGroup(arrays, attrs={"settings": json.dumps(plain)})}
     for number, test in enumerate(experiment.tests):
         groups[f"{TESTS}/{number}"] = LabelledGroup(
@@ -104,8 +107,8 @@ def _recorded_model(
         error,
         noise_named(plain["noise"]),
         {symbol: prior_from(prior) for symbol, prior in plain["chosen_priors"].items()},
-        Tolerances(**plain["tolerances"]),
-        FittedErrors(**plain["fitted_errors"] | {"curve": group.arrays.get("curve")}),
+        Tolerances(plain["estimand"], **plain["tolerances"]),
+        FittedErrors(**plain["fitted_errors"] | {name: group.arrays.get(name) for name in ("curve", "slopes")}),
         Statistics(plain["count"], group.arrays["triangle"]),
     )
     priors = {symbol: prior_from(prior) for symbol, prior in plain["priors"].items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from tissuq.assessment.stable_posterior import modes_named
@@ -11,11 +12,12 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
-from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.measurement_errors import ESTIMANDS, Tolerances
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 from tissuq.parameters.seeds import check_seed
+from tissuq.posterior.plug_in import default_tolerances
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import METHODS, Method, Solver
 
@@ -30,7 +32,7 @@ def fit(
     noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    tolerances: Tolerances | None = None,
+    tolerances: Tolerances | str | None = None,
     method: Method = "auto",
     stable_in: str | Sequence[str] = (),
     seed: int = 0,
@@ -57,10 +59,13 @@ def fit(
         correlated).
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
-    tolerances : Tolerances
-        By how much whole tests may be off, such as ``Tolerances(stress=0.1, length=0.02)``; by default tests of
-        different specimens agree to 18 % in stress (four or more tell by themselves how far they are apart), and a
-        single test has no such errors.
+    tolerances : Tolerances or str
+        By how much whole tests may be off, and so what the intervals are of: ``"as-tested"``, ``"specimen"`` or
+        ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances(stress=0.1, length=0.02)`` or
+        ``Tolerances("specimen", slack=0)``. By default they are of the specimen, or where tests are of several, of the
+        tissue; as tested where the noise of one test is known, or a discrepancy that is no energy alone takes up errors
+        of the test. Unless they are stated as numbers, the spreads between specimens and tests are as large as several
+        tests tell.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
@@ -121,7 +126,7 @@ def fit_many(
     noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
-    tolerances: Tolerances | None = None,
+    tolerances: Tolerances | str | None = None,
     method: Method = "auto",
     stable_in: str | Sequence[str] = (),
     seed: int = 0,
@@ -152,8 +157,13 @@ def fit_many(
     >>> len(held)
     20
     """
+    if isinstance(tolerances, str):
+        tolerances = Tolerances(tolerances)
     if tolerances is not None and not isinstance(tolerances, Tolerances):
-        raise InputError(f"tolerances must be such as tissuq.Tolerances(stress=0.1), not {tolerances!r}.")
+        raise InputError(
+            f"tolerances must be such as tissuq.Tolerances(stress=0.1), or one of {', '.join(ESTIMANDS)}, not "
+            f"{tolerances!r}."
+        )
     if method not in METHODS:
         raise InputError(f"there is no method '{method}'. Choose one of: {', '.join(METHODS)}.")
     check_seed(seed)
@@ -165,15 +175,17 @@ def fit_many(
 
     def model_of(data: Experiment) -> StatisticalModel:
         model = StatisticalModel(data, *options, tolerances or Tolerances())
-        return model if tolerances is not None else solver.with_default_tolerances(model)
+        if tolerances is None and (default := default_tolerances(model)):
+            model = replace(model, tolerances=default)
+        return solver.with_estimated_factor(model) if model.tolerances.has_standard_spreads else model
 
-    experiments = [Experiment.of(data) for data in datasets]
+    models = [model_of(Experiment.of(data)) for data in datasets]
     groups: dict[tuple[States, int], list[int]] = {}
-    for number, data in enumerate(experiments):
-        is_shared = len(data.tests) == 1 and not tolerances and not noise_model.is_consecutive
-        groups.setdefault((data.states, 0 if is_shared else number), []).append(number)
+    for number, model in enumerate(models):
+        is_shared = len(model.experiment.tests) == 1 and not model.tolerances and not noise_model.is_consecutive
+        groups.setdefault((model.experiment.states, 0 if is_shared else number), []).append(number)
     posteriors: dict[int, Posterior] = {}
     for numbers in groups.values():
-        solutions = solver.solve([model_of(experiments[number]) for number in numbers])
+        solutions = solver.solve([models[number] for number in numbers])
         posteriors |= {number: Posterior(solution, solver) for number, solution in zip(numbers, solutions, strict=True)}
     return [posteriors[number] for number in range(len(datasets))]

@@ -6,21 +6,28 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
+from tissuq.inference.enumerators.noise_grid import with_known_noise
 from tissuq.inference.solution import Solution
-from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, Tolerances, specimens_of
+from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import level_of_errors, mean_curve
+from tissuq.model.statistics import CHUNK
+from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
-__all__ = ["ErrorEstimates"]
+__all__ = ["ErrorEstimates", "default_tolerances"]
 
-MIN_SPECIMENS_FOR_SPREAD = 4
-"""Number of specimens from which their spread is estimated."""
-SPREAD_FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0])
-"""Spreads between specimens that are tried, over the default one."""
+FloatArray = NDArray[np.float64]
+
+FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0])
+"""Factors of the spreads between specimens and tests that are tried."""
 CURVE_ITERATIONS = 3
 """Fits from which the mean curve and the level of the errors are found in turn."""
+PILOT_NOISE_SHARE = 0.03
+"""Noise over the root mean square stress of a test, at the least, of the fit from which its mean curve is."""
+CURVE_COMPONENTS = 200
+"""Components that stand for the posterior in the mean curve."""
 LAG_GRID = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99)
 """Correlations of consecutive errors that are tried."""
 
@@ -32,10 +39,19 @@ class ErrorEstimates:
     ----------
     solve : callable
         Returns the solution of a model.
+    has_evidence : callable
+        Returns whether a model is solved with its evidence, without sampling.
+    sums_noise : callable
+        Returns whether a model is solved as a sum over values of its noise.
     """
 
-    def __init__(self, solve: Callable[[StatisticalModel], Solution]) -> None:
-        self._solve, self._fits = solve, 0
+    def __init__(
+        self,
+        solve: Callable[[StatisticalModel], Solution],
+        has_evidence: Callable[[StatisticalModel], bool],
+        sums_noise: Callable[[StatisticalModel], bool],
+    ) -> None:
+        self._solve, self._has_evidence, self._sums_noise, self._fits = solve, has_evidence, sums_noise, 0
 
     def of(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with every estimate that its errors need: curve and level, and lag."""
@@ -45,31 +61,32 @@ class ErrorEstimates:
             with_lag = self._with_curve(with_lag.with_errors(curve=None))
         return with_lag.with_errors(fits=model.fitted_errors.fits + self._fits) if self._fits else with_lag
 
-    def with_default_tolerances(self, model: StatisticalModel, *, has_evidence: bool) -> StatisticalModel:
-        """Return a model with the tolerances that hold where the user gives none.
+    def with_estimated_factor(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model whose spreads of the stress, between specimens and tests, are as large as several tests tell.
 
-        None within a specimen, or where something else takes up errors of whole tests; else those of
-        `BETWEEN_SPECIMENS`, of which the spread is estimated where there are specimens enough and an evidence: the root
-        of its posterior mean square over a grid, under a half-Cauchy prior of the default spread, which is what the
-        error in common needs of it.
+        Tests in different modes do not tell it: an energy reconciles them whatever they differ by. They are the stated
+        ones times a factor, the root of its posterior mean square over a grid, under a prior of
+        mean square one, half Student's t with three degrees of freedom; at the noise that is likely without it.
         """
-        default = default_tolerances(model)
-        if not default:
-            return model
-        model = replace(model, tolerances=default)
-        if specimens_of(model.experiment).shape[1] < MIN_SPECIMENS_FOR_SPREAD or not has_evidence:
+        stated = model.tolerances
+        is_told = len(model.experiment.tests) > 1 and len(model.experiment.modes) == 1
+        if not is_told or not (stated.stress or stated.test) or not self._has_evidence(model):
             return model
         model = self._with_curve(model)
-        spreads = default.stress * SPREAD_FACTORS
-        candidates = [replace(model, tolerances=default.with_sizes(stress=float(spread))) for spread in spreads]
+        sketch = replace(model, discrepancy=model.discrepancy.sketch)
+        candidates = [replace(sketch, tolerances=stated.with_factor(float(factor))) for factor in FACTORS]
+        if self._sums_noise(model):
+            level = self._solution(sketch).model.fitted_errors.level or 1.0
+            of_tests = model.noise.of_tests(model.experiment)
+            noise_sd = np.asarray(level * of_tests / np.exp(np.log(of_tests).mean()))
+            candidates = [with_known_noise(candidate, noise_sd) for candidate in candidates]
         evidences = [self._solution(candidate).log_evidence for candidate in candidates]
         if any(evidence is None for evidence in evidences):
             return model.with_errors(fits=self._fits)
         log_evidence = np.array(evidences, dtype=np.float64)
-        weight = np.exp(log_evidence - log_evidence.max()) / (1 + SPREAD_FACTORS**2) * spreads  # even in the logarithm
-        spread = float(np.sqrt(weight @ spreads**2 / weight.sum()))
-        with_spread = replace(model, tolerances=default.with_sizes(stress=spread))
-        return self.of(with_spread.with_errors(curve=None, level=None, spread=spread))
+        weight = np.exp(log_evidence - log_evidence.max()) * FACTORS / (1 + FACTORS**2) ** 2  # even in the logarithm
+        factor = float(np.sqrt(weight @ FACTORS**2 / weight.sum()))
+        return replace(model, tolerances=stated.with_factor(factor)).with_errors(factor=factor, fits=self._fits)
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""
@@ -92,10 +109,15 @@ class ErrorEstimates:
         """
         if not model.tolerances or model.fitted_errors.curve is not None:
             return model
+        if self._sums_noise(model):
+            curve, slopes = _curve_of(self._solution(_pilot(model)), model)
+            residual = float(np.sqrt(((model.experiment.measured - curve) ** 2).mean()))
+            return model.with_errors(curve=curve, slopes=slopes, level=residual)
         pilot = replace(model, tolerances=Tolerances())
         for _ in range(CURVE_ITERATIONS):
             solution = self._solution(pilot)
-            pilot = model.with_errors(curve=mean_curve(solution), level=level_of_errors(solution))
+            curve, slopes = _curve_of(solution, model)
+            pilot = model.with_errors(curve=curve, slopes=slopes, level=level_of_errors(solution))
         return pilot
 
     def _evidence(self, model: StatisticalModel) -> float:
@@ -112,7 +134,35 @@ class ErrorEstimates:
         return self._solve(model)
 
 
+def _pilot(model: StatisticalModel) -> StatisticalModel:
+    """Return a model without errors of whole tests, of known noise: what these add to it at the least.
+
+    So that its mean curve is the smooth one of the material, and does not follow those errors.
+    """
+    tests = model.experiment.tests
+    size = np.array([np.sqrt((test.measured**2).mean()) for test in tests])
+    noise_sd = np.hypot(model.noise.of_tests(model.experiment), PILOT_NOISE_SHARE * size)
+    sketch = replace(model, discrepancy=model.discrepancy.sketch, tolerances=Tolerances())
+    return with_known_noise(sketch, noise_sd)
+
+
+def _curve_of(solution: Solution, model: StatisticalModel) -> tuple[FloatArray, FloatArray | None]:
+    """Return the mean curve of a solution of the same data as a model, and its slopes where its errors need them."""
+    return mean_curve_and_slopes(solution, CURVE_COMPONENTS, with_slopes=model.tolerances.need_slope)
+
+
 def default_tolerances(model: StatisticalModel) -> Tolerances:
-    """Return the tolerances of a model for which the user gives none."""
-    is_plain = not (model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy)
-    return BETWEEN_SPECIMENS if specimens_of(model.experiment).shape[1] > 1 and is_plain else Tolerances()
+    """Return the tolerances of a model for which the user gives none.
+
+    Those of the specimen, or where tests are of several, of the tissue. None where something else takes up errors of
+    the test (a discrepancy with errors of its own, noise that is more than one number), of one test with known noise,
+    and of very many measurements.
+    """
+    if model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy:
+        return Tolerances()
+    discrepancy = model.discrepancy
+    takes_up_errors = model.noise.is_consecutive or discrepancy.is_scattered or not discrepancy.is_energy
+    if specimens_of(model.experiment).shape[1] > 1:
+        return BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)
+    is_told = len(model.experiment.tests) == 1 and (not model.noise.parameters or model.experiment.size > CHUNK)
+    return Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)

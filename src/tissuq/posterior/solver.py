@@ -10,6 +10,7 @@ from tissuq.assessment.stable_posterior import stable_part
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
+from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates
@@ -47,16 +48,20 @@ class Solver:
             solutions = [stable_part(solution, self.stable_in, self.seed) for solution in solutions]
         return list(solutions)
 
-    def with_default_tolerances(self, model: StatisticalModel) -> StatisticalModel:
-        """Return a model with the tolerances that hold where the user gives none."""
-        return self._error_estimates().with_default_tolerances(model, has_evidence=self._is_integrated(model))
+    def with_estimated_factor(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model whose spreads between specimens and tests are as large as several tests tell."""
+        return self._error_estimates().with_estimated_factor(model)
 
     def _error_estimates(self) -> ErrorEstimates:
-        return ErrorEstimates(lambda model: self._solve([model])[0])
+        return ErrorEstimates(lambda model: self._solve([model])[0], self._is_integrated, self._sums_noise)
 
     def _is_integrated(self, model: StatisticalModel) -> bool:
         """Return whether there is an evidence without sampling."""
         return self.method in ("auto", "exact") and (bool(model.energy_symbols) or not AdaptiveCells().why_not(model))
+
+    def _sums_noise(self, model: StatisticalModel) -> bool:
+        """Return whether a model is solved as a sum over values of its noise."""
+        return self._is_integrated(model) and not NoiseGrid.why_not(model)
 
     def _solve(self, models: Sequence[StatisticalModel]) -> Sequence[Solution]:
         """Solve models on the same stretches: together by one enumerator, or each by NUTS where that does not serve."""
@@ -78,6 +83,8 @@ class Solver:
         ModelError
             When it does not serve this model.
         """
+        if self._sums_noise(model):
+            return NoiseGrid(lambda known: self._solve([known])[0])
         if model.energy_symbols and self.method in ("auto", "exact"):
             return AmplitudeLattice()
         if self.method == "auto":

@@ -19,7 +19,7 @@ from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import stress_moments, variance_of_noise
+from tissuq.prediction.moments import stress_moments, stress_slopes, variance_of_noise
 
 __all__ = [
     "Band",
@@ -126,8 +126,6 @@ def _mean_distance(mean: FloatArray, variance: FloatArray) -> FloatArray:
 
 STRETCHES_OF_BLOCK = 2000
 """Stretches predicted at once: what bounds the memory."""
-STEP = 1e-5
-"""Of the stretch, for the slope of a curve."""
 COMPONENTS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 1500, 200
 """Components that stand for the posterior at a block of stretches, and at more."""
 
@@ -321,20 +319,19 @@ def _moments(
 
     With noise they are those of a new test with its own errors.
     """
-
-    def at(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        states = model.experiment.states_at(points, mode, channel)
-        return stress_moments(model, components, states, discrepancy=discrepancy, noise=False)
-
-    mean, of_stress = at(points)
+    states = model.experiment.states_at(points, mode, channel)
+    mean, of_stress = stress_moments(model, components, states, discrepancy=discrepancy, noise=False)
     of_stress = of_stress + (model.common_error * mean) ** 2
     if not any(noises):
         return mean, *(of_stress for _ in noises)
-    states = model.experiment.states_at(points, mode, channel)
     of_measurements = of_stress + variance_of_noise(model, components, states, mean)
     if model.tolerances:
-        slope = (at(points + STEP)[0] - mean) / STEP if model.tolerances.need_slope else 0.0
-        of_measurements = of_measurements + model.tolerances.variance(ErrorPoints(mode, points, mean, slope))
+        slope: FloatArray | float = 0.0
+        if model.tolerances.need_slope:
+            slope = stress_slopes(model, components, states, mean, discrepancy=discrepancy)
+        largest = float(np.abs(model.experiment.measured).max())  # as the band is one at each point by itself
+        error_points = ErrorPoints(mode, points, mean, slope, largest)
+        of_measurements = of_measurements + model.tolerances.variance(error_points)
     return mean, *(of_measurements if noise else of_stress for noise in noises)
 
 

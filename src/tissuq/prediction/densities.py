@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import log, pi
 
@@ -12,6 +13,7 @@ from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import integrated
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import side_by_side
+from tissuq.model.noise import NOISE_SD
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import basis_of, coefficients, correlated_groups, mean_stress, stress_moments
 
@@ -31,6 +33,10 @@ FloatArray = NDArray[np.float64]
 
 MAX_VALUES_AT_ONCE, MAX_VALUES_CONDENSED = 40_000_000, 4_000_000
 """Values at most in an array over draws and measurements (320 MB), and where the measurements are condensed."""
+
+
+MAX_NOISE_VALUES = 100
+"""Values of the noise that a sum over it has at most."""
 
 
 def stride(solution: Solution) -> int:
@@ -58,7 +64,10 @@ def replicate_data(solution: Solution, seed: int) -> FloatArray:
             along += np.sqrt(share * group.covariance.white[:, None]) * score
             replicate[group.components] += (along @ group.covariance.spectrum.vectors.T) * group.covariance.size
     if solution.model.whitening is not None:
-        replicate = solution.model.whitening.undone(replicate.T).T
+        noise, stress = replicate - mean, solution.model.whitening.undone(mean.T).T
+        for model, rows in _at_noise(solution.model, settings):
+            assert model.whitening is not None  # noqa: S101 (another level has one, too)
+            replicate[rows] = stress[rows] + model.whitening.undone(noise[rows].T).T
     return replicate.reshape(solution.shape[0], -1, mean.shape[1])
 
 
@@ -69,20 +78,42 @@ def pointwise_log_likelihood(solution: Solution) -> FloatArray:
     form of leave-one-out conditioning (Sundararajan & Keerthi 2001), which is what PSIS-LOO of the draws needs.
     """
     mean, settings, white = _given_draws(solution)
-    whitening = solution.model.whitening
+    density = np.empty_like(mean)
+    for model, rows in _at_noise(solution.model, settings):
+        if model is not solution.model and solution.model.whitening is not None:
+            mean[rows] = model.white(solution.model.whitening.undone(mean[rows].T)).T
+        density[rows] = _pointwise(model, mean[rows], settings[rows], white[rows])
+    return density.reshape(solution.shape[0], -1, mean.shape[1])
+
+
+def _pointwise(model: StatisticalModel, mean: FloatArray, settings: FloatArray, white: FloatArray) -> FloatArray:
     precision = 1 / np.broadcast_to(white, mean.shape)
-    stress = solution.model.stress if solution.model.condensed is None else solution.model.experiment.stress
+    stress = model.stress if model.condensed is None else model.experiment.stress
     solved = (stress - mean) * precision
-    if solution.model.is_correlated:
-        residual = solution.model.stress - mean
-        for group in correlated_groups(solution.model, settings):
+    if model.is_correlated:
+        residual = model.stress - mean
+        for group in correlated_groups(model, settings):
             solved[group.components] = group.covariance.solved(residual[group.components][:, :, None])[..., 0]
             precision[group.components] = group.covariance.precision
-    if whitening is not None:
-        solved, precision = whitening.transposed(solved.T).T, whitening.precisions(precision)
+    if model.whitening is not None:
+        solved, precision = model.whitening.transposed(solved.T).T, model.whitening.precisions(precision)
     residual, variance = solved / precision, 1 / precision
-    density = -0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi))
-    return density.reshape(solution.shape[0], -1, mean.shape[1])
+    return np.asarray(-0.5 * (residual**2 / variance + np.log(variance) + log(2 * pi)))
+
+
+def _at_noise(model: StatisticalModel, settings: FloatArray) -> Iterator[tuple[StatisticalModel, NDArray[np.intp]]]:
+    """Yield a model for every value of the noise, and at which settings (M, d) of the nonlinear parameters that is.
+
+    It matters beside errors of whole tests, whose sizes do not grow with the noise. Where the noise was sampled, or
+    adds to that of the discrepancy, they are those at its estimated level.
+    """
+    noise = settings[:, model.nonlinear.index(NOISE_SD.symbol)] if NOISE_SD.symbol in model.nonlinear else np.zeros(0)
+    values = np.unique(noise)
+    if not model.tolerances or model.discrepancy.is_scattered or not 0 < len(values) <= MAX_NOISE_VALUES:
+        yield model, np.arange(len(settings))
+        return
+    for value in values:
+        yield model.with_errors(level=float(value)), np.flatnonzero(noise == value)
 
 
 def draws_by_symbol(solution: Solution, step: int) -> dict[str, FloatArray]:
@@ -182,8 +213,11 @@ def left_out_log_density(model: StatisticalModel, components: GaussianMixture) -
     if model.condensed is not None:
         return _left_out_of_condensed(model, components)
     count, size = len(components.weights), model.experiment.size * max(1, components.root.shape[2])
-    blocks = np.array_split(np.arange(count), min(count, 1 + count * size // BLOCK))
-    return np.concatenate([_left_out(model, components[block]) for block in blocks])
+    density = np.empty((count, model.experiment.size))
+    for at_noise, rows in _at_noise(model, components.settings):
+        for block in np.array_split(rows, min(len(rows), 1 + len(rows) * size // BLOCK)):
+            density[block] = _left_out(at_noise, components[block])
+    return density
 
 
 def _left_out_of_condensed(model: StatisticalModel, components: GaussianMixture) -> FloatArray:
@@ -249,11 +283,12 @@ def joint_log_likelihood(solution: Solution) -> FloatArray:
     )
     component_index = solution.component_of_draw[:, ::step]
     member = None if solution.mixture.member is None else solution.mixture.member[component_index].ravel()
-    blocks = np.array_split(np.arange(count), min(count, 1 + count * len(model.stress) // BLOCK))
-    densities = [
-        _joint(model, columns[block], settings[block], None if member is None else member[block]) for block in blocks
-    ]
-    return np.concatenate(densities).reshape(component_index.shape)
+    density = np.empty(count)
+    for at_noise, rows in _at_noise(model, settings):
+        for block in np.array_split(rows, min(len(rows), 1 + len(rows) * len(model.stress) // BLOCK)):
+            members = None if member is None else member[block]
+            density[block] = _joint(at_noise, columns[block], settings[block], members)
+    return density.reshape(component_index.shape)
 
 
 def _joint(

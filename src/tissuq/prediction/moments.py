@@ -29,8 +29,10 @@ __all__ = [
     "drawn_curves",
     "level_of_errors",
     "mean_curve",
+    "mean_curve_and_slopes",
     "mean_stress",
     "stress_moments",
+    "stress_slopes",
     "values_of",
     "variance_of_noise",
 ]
@@ -39,6 +41,8 @@ FloatArray = NDArray[np.float64]
 
 MAX_LOCKED_PROBABILITY = 1e-6
 """Probability that the material locks before a stretch, below which a stress there is predicted."""
+STRETCH_STEP = 1e-5
+"""Step of the stretch, or of the amount of shear, for the slope of a curve."""
 MAX_STRESSES_AT_ONCE = 1_000_000
 """Number of stresses computed at once: what bounds the memory."""
 
@@ -192,10 +196,35 @@ def mean_curve(solution: Solution, thinned: int | None = None) -> FloatArray:
 
     With a number, from so many components that stand for all.
     """
+    return mean_curve_and_slopes(solution, thinned, with_slopes=False)[0]
+
+
+def mean_curve_and_slopes(
+    solution: Solution, thinned: int | None = None, *, with_slopes: bool = True
+) -> tuple[FloatArray, FloatArray | None]:
+    """Return `mean_curve` (n,), and its slopes (n, c) along the controls of every test, MPa."""
     model = solution.model
     components = solution.mixture if thinned is None else solution.mixture.thinned(thinned)
     mean, _ = stress_moments(model, components, model.states, discrepancy=True, noise=False)
-    return model.at_measurements(components.weights @ mean)
+    curve = model.at_measurements(components.weights @ mean)
+    if not with_slopes:
+        return curve, None
+    slopes = stress_slopes(model, components, model.states, mean)
+    return curve, model.at_measurements(np.einsum("m,mgc->gc", components.weights, slopes))
+
+
+def stress_slopes(
+    model: StatisticalModel,
+    components: GaussianMixture,
+    states: States,
+    mean: FloatArray,
+    *,
+    discrepancy: bool = True,
+) -> FloatArray:
+    """Return the slopes (M, g, c) of mean stresses (M, g) along the controls of their paths, MPa; zero beyond these."""
+    displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
+    moved = [stress_moments(model, components, there, discrepancy=discrepancy, noise=False)[0] for there in displaced]
+    return (np.stack(moved, axis=-1) - mean[:, :, None]) / STRETCH_STEP
 
 
 def level_of_errors(solution: Solution) -> float:

@@ -113,6 +113,7 @@ def specimen_summary(study: SpecimenStudy) -> list[Row]:
     for name, posterior in study.posteriors.items():
         row = summary_row(name, posterior, study.seconds[name])
         seconds = row.pop("seconds")
+        row["estimand"] = posterior.model.tolerances.estimand
         rows.append(row | stability_cells(posterior) | {"seconds": seconds})
     return rows
 
@@ -135,7 +136,8 @@ def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
         "settings": study.settings,
         "experiment": study.experiment,
         "tests": [_test_line(test) for test in study.experiment.tests],
-        "tolerances": tolerances_in_words(next(iter(study.posteriors.values())).model.tolerances, study.unit),
+        "tolerances": tolerances_in_words(study.tolerances, study.unit),
+        "estimand": study.tolerances.meaning,
         "unit": study.unit.name,
         "lead": _lead(summary, study),
         "summary": readable_summary(summary, study.unit),
@@ -182,7 +184,7 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
         low, high = (significant(row[f"{name}_hdi_{end}"] / scale) for end in ("low", "high"))
         return (
             f"With the discrepancy '{row['formulation']}', {name} is {significant(means[0])} {unit}, "
-            f"95 % HPD {low} to {high} {unit}."
+            f"95 % HPD {low} to {high} {unit}. The interval is of {study.tolerances.meaning}."
         )
     low, high = (min(means), max(means))
     overlap = max(row[f"{name}_hdi_low"] for row in summary) <= min(row[f"{name}_hdi_high"] for row in summary)

@@ -19,6 +19,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
+from tissuq.model.measurement_errors import AS_TESTED, SPECIMEN
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands, speaks_of, stress_ratio
@@ -374,11 +375,10 @@ def _prediction_warnings(
     outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
         texts.append(f"{outside} lie outside the measured range: {_calibrated_in_words(posterior, mode)}.")
-    if data is not None and not was_fitted and not model.tolerances:
+    if data is not None and not was_fitted and model.tolerances.estimand in (AS_TESTED, SPECIMEN):
         texts.append(
-            "the run has no tolerances for errors of whole tests, so its bands hold for the fitted specimen only: they "
-            "do not cover another specimen, area or gauge length. To include these in the bands, fit with "
-            "--tolerance stress=18% (or the spread between your specimens)."
+            f"the bands of this run are of {model.tolerances.meaning}: they do not cover another specimen. To include "
+            "the spread between specimens and tests, fit with --estimand tissue."
         )
     return texts
 

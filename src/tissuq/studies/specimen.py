@@ -50,6 +50,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
 
     file: str = ""
     tests: tuple[MeasuredTest, ...] = ()
+    estimand: str | None = None
     tolerances: dict[str, float] | None = None
     discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
     priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
@@ -68,6 +69,13 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
         looked_up(lambda given: Tolerances(**given), sizes or {})
         return sizes
+
+    @field_validator("estimand")
+    @classmethod
+    def _estimand_there_is(cls, name: str | None) -> str | None:
+        if name is not None:
+            looked_up(Tolerances, name)
+        return name
 
     @model_validator(mode="after")
     def _measured(self) -> Self:
@@ -93,12 +101,13 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         return Experiment.of([reading.experiment for reading in self.readings(folder)])
 
     def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
-        """Return the tolerances, those of stresses converted from a unit to MPa; None for the usual ones."""
-        if self.tolerances is None:
+        """Return the tolerances, those of stresses converted from a unit to MPa; None for those of `tissuq.fit`."""
+        if self.tolerances is None and self.estimand is None:
             return None
-        is_stress = {error.name for error, _ in Tolerances(**self.tolerances) if error.is_stress}
-        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in self.tolerances}
-        return Tolerances(**{name: size * scale[name] for name, size in self.tolerances.items()})
+        sizes = self.tolerances or {}
+        is_stress = {error.name for error, _ in Tolerances(**sizes) if error.is_stress}
+        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in sizes}
+        return Tolerances(self.estimand or "", **{name: size * scale[name] for name, size in sizes.items()})
 
     def noise_in(self, unit: StressUnit) -> Noise:
         """Return the noise, known standard deviations converted from a unit to MPa."""
@@ -140,6 +149,11 @@ class SpecimenStudy:
                 concerned.setdefault(text, []).append(name)
         texts = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
         return [*self.data_warnings, *texts, *measurement_warnings(self.experiment)]
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """The errors of the tests that the intervals include."""
+        return next(iter(self.posteriors.values())).model.tolerances
 
     @property
     def headline(self) -> str:

@@ -135,6 +135,16 @@ class States:
         """Whether some of them belong to a measured curve."""
         return any(curve != UNMEASURED for curve in self.curves)
 
+    @property
+    def controls(self) -> int:
+        """The largest number of controls of a path."""
+        return max(1 if points.ndim == 1 else points.shape[1] for points in self.points)
+
+    def displaced(self, control: int, step: float) -> States:
+        """Return the states with one control of every path that has it a step further."""
+        points = (p + step * (np.arange(p.shape[-1]) == control if p.ndim > 1 else control == 0) for p in self.points)
+        return States(self.paths, tuple(points), self.curves)
+
     def in_curve(self, number: int) -> Any:
         """Return one for every state (n,) that belongs to that curve and zero for the others; 1.0 where all do."""
         return 1.0 if self.curves == (number,) else (self.curve == number).astype(np.float64)

@@ -56,6 +56,11 @@ class Discrepancy(ABC):
         """Return the discrepancy for this material and the curves of this experiment."""
         return self if self.is_energy else replace(self, curves=len(experiment.curves))
 
+    @property
+    def sketch(self) -> Discrepancy:
+        """One that costs less to integrate and stands for it where only a first idea of a posterior is wanted."""
+        return self
+
     def mean_basis(self, states: States) -> NDArray[np.float64]:
         """Return the (n, k) mean stresses of unit linear parameters, in their order."""
         return np.zeros((len(states), 0))

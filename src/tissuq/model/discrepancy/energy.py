@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import ClassVar, NamedTuple
 
@@ -46,6 +46,8 @@ AMPLITUDES = tuple(
     Parameter(symbol, f"amplitude of the {index} energy", "modulus", (0.0, float("inf")), False, HalfCauchy(1.0))
     for symbol, index in (("c1", "first"), ("c2", "second"))
 )
+MEMBERS_OF_SKETCH = 12
+"""Members, about, of what stands for all."""
 SOURCE = "tissuq (energy discrepancy)"
 
 
@@ -133,6 +135,10 @@ class EnergyDiscrepancy(Discrepancy):
     )
     sums: ClassVar[tuple[Sum, ...]]
 
+    @property
+    def sketch(self) -> Discrepancy:
+        return Sketch(self)
+
     def members(self, states: States) -> list[Member]:
         """Return every sum of blocks at every combination of their length scales, over the range of states (n,)."""
         members, total = [], sum(energy_sum.odds for energy_sum in self.sums)
@@ -207,6 +213,29 @@ class EnergySum(EnergyDiscrepancy):
     def formula(self) -> str:  # type: ignore[override]
         """The blocks' formulas, joined."""
         return "; and ".join(block.formula for block in self.blocks)
+
+
+@dataclass(frozen=True)
+class Sketch(EnergyDiscrepancy):
+    """A few members of an energy discrepancy, evenly among all."""
+
+    whole: EnergyDiscrepancy
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # of the object, not the class
+        """That of the whole."""
+        return self.whole.name
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        """Those of the whole."""
+        return self.whole.parameters
+
+    def members(self, states: States) -> list[Member]:
+        members = self.whole.members(states)
+        few = members[:: 1 + len(members) // MEMBERS_OF_SKETCH]
+        total = sum(member.probability for member in few)
+        return [replace(member, probability=member.probability / total) for member in few]
 
 
 FIRST_BLOCKS, SECOND_BLOCKS = (TaylorBlock(), LogBlock()), (SecondInvariantBlock(), HenckyBlock())

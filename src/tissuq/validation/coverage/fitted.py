@@ -14,6 +14,7 @@ from tissuq.experiments.modes import loading_mode
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.mechanics import Material, NeoHookean, engineering_stress
 from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.measurement_errors import AS_TESTED
 from tissuq.model.noise import noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
@@ -102,7 +103,10 @@ def _fit_together(
         fits = []
         for name in names:
             applicable = _applicable_priors(name, noise_sd, priors, material)
-            fits.append(fit_many(data, material=material, discrepancy=name, noise=noise, priors=applicable))
+            of_name = fit_many(
+                data, material=material, discrepancy=name, noise=noise, priors=applicable, tolerances=AS_TESTED
+            )
+            fits.append(of_name)
         if len(names) == 1:
             return list(fits[0])
         return [average(dict(zip(names, fit, strict=True))) for fit in zip(*fits, strict=True)]

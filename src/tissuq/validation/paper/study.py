@@ -15,6 +15,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics import NeoHookean, Yeoh, simulate
 from tissuq.model.discrepancy import discrepancy_named
+from tissuq.model.measurement_errors import AS_TESTED
 from tissuq.parameters.priors import Prior, Uniform, prior_from
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.fitting import fit, fit_many
@@ -156,6 +157,7 @@ def _fitted(settings: PaperSettings, formulation: str, bound: float | None) -> C
         discrepancy=formulation,
         noise_sd=settings.noise_sd,
         priors=priors,
+        tolerances=AS_TESTED,
         method="exact",
     )
     intervals = [posterior.solution.marginals["C10"].hdi() for posterior in posteriors]
@@ -234,6 +236,7 @@ def _find_in_replicates(settings: PaperSettings, step: Callable[[str], None]) ->
             discrepancy=name,
             noise_sd=settings.noise_sd,
             priors=settings.priors_of(name),
+            tolerances=AS_TESTED,
             method="exact",
             seed=settings.seed,
         )
@@ -260,6 +263,7 @@ def _fit_all(
             discrepancy=name,
             noise_sd=settings.noise_sd,
             priors=settings.priors_of(name),
+            tolerances=AS_TESTED,
             method="joint" if sampler == "nuts" else "exact",
             seed=settings.seed,
         )

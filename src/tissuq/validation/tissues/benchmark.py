@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
+from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.measurement_errors import Tolerances
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
@@ -21,7 +22,7 @@ from tissuq.prediction.bands import predictive_mixtures, speaks_of
 from tissuq.prediction.scores import interval_score, root_mean_square
 from tissuq.studies.stream import Step, run_tasks, silent
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
-from tissuq.validation.tissues.protocols import PROTOCOLS, Split
+from tissuq.validation.tissues.protocols import ESTIMAND_OF_PROTOCOL, PROTOCOLS, Split
 from tissuq.validation.tissues.settings import TissueSettings
 
 if TYPE_CHECKING:
@@ -119,10 +120,10 @@ def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
         "predicted": target.name,
         "mode": target.mode.name,
     }
-    tolerances = None if settings.tolerances is None else Tolerances(**settings.tolerances)
-    options: dict[str, Any] = {
-        "material": settings.material, "discrepancy": task.formulation, "tolerances": tolerances,
-    }  # fmt: skip
+    options: dict[str, Any] = {"material": settings.material, "discrepancy": task.formulation}
+    if discrepancy_named(task.formulation).is_energy:  # others take up errors of the test themselves
+        estimand = ESTIMAND_OF_PROTOCOL[task.protocol]
+        options["tolerances"] = Tolerances(estimand if settings.tolerances is None else "", **settings.tolerances or {})
     try:
         posterior = fit(fitted, **options)
         row |= predicted(posterior, target)

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tissuq.experiments.experiment import Experiment
+from tissuq.model.measurement_errors import AS_TESTED, SPECIMEN, TISSUE
 
-__all__ = ["END_SHARE", "PROTOCOLS", "Split"]
+__all__ = ["END_SHARE", "ESTIMAND_OF_PROTOCOL", "PROTOCOLS", "Split"]
 
 END_SHARE = 0.3
 """Share of the range of a test, farthest from the reference, that is predicted from the rest of it."""
@@ -75,3 +76,7 @@ PROTOCOLS: Mapping[str, Callable[[Sequence[Experiment]], Iterator[Split]]] = Map
     }
 )
 """How the tests of a set become fitted and predicted ones, by name."""
+ESTIMAND_OF_PROTOCOL: Mapping[str, str] = MappingProxyType(
+    {"tests": TISSUE, "modes": TISSUE, "specimens": SPECIMEN, "ends": AS_TESTED, "halves": AS_TESTED}
+)
+"""What the intervals of a fit must be of, so that they hold for what is predicted."""

@@ -28,7 +28,9 @@ class TissueSettings(BaseModel):
         Discrepancies of the fits.
     material : str
     tolerances : dict of str to float, optional
-        Standard deviations of errors of the tests (`tissuq.Tolerances`, stresses in MPa); as by default without it.
+        Standard deviations of errors of the tests (`tissuq.Tolerances`, stresses in MPa); without it those of what is
+        predicted (`ESTIMAND_OF_PROTOCOL`): of the tissue for a new test, of the specimen for a test of the same one,
+        none for a part of the same test.
     points : int
         Number of measurements at most that are taken from a test, evenly along it.
     predictions : int

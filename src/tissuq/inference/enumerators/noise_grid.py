@@ -1,0 +1,251 @@
+"""Unknown noise beside errors of whole tests: the sum over values of the noise, each of them taken as known.
+
+The errors of whole tests have sizes of their own, which do not grow with the noise: the covariance of the data,
+noise_sd^2 R + C C', has other directions at every noise_sd. So each value needs a factorisation, and is a fit with
+known noise; the logarithm of noise_sd is nearly Gaussian, and few equally spaced values of it integrate it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import ConvergenceError
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.marginal import Marginal, blended, marginal_of_table
+from tissuq.inference.solution import Marginals, Solution
+from tissuq.model.noise import NOISE_SD, noise_named
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Flat, Prior
+
+__all__ = ["NoiseGrid", "with_known_noise"]
+
+FloatArray = NDArray[np.float64]
+
+SYMBOL = NOISE_SD.symbol
+END_FACTOR = 2.0
+"""By which the noise may lie beyond the resolution of the tests and the noise of a fit without tolerances."""
+MIN_NOISE_SHARE = 3e-4
+"""Least noise over the largest stress, at first, where no resolution is stated."""
+MAX_STEP, MIN_STEP = 1.1, 0.03
+"""Between values of the logarithm of the noise."""
+MAX_DROP = 1.5
+"""Largest difference of the log density of consecutive values."""
+NEGLIGIBLE_DROP, WIDENING_DROP = 6.5, 5.0
+"""By how much the log density at the ends is to lie below the largest one, and does at the least."""
+INTERVALS, MAX_NODE_STEP = 8, 0.4
+"""Number of intervals of the sum, at the least, and their largest length in the logarithm of the noise."""
+MIN_SLOPE = 0.5
+"""Slope of the log density from which it falls, like the prior, towards noise that is too small to matter."""
+TAIL = 12.0
+"""Length of that fall."""
+NEGLIGIBLE_SHARE = 1e-5
+"""Share of the posterior, below which a value of the noise is left out."""
+POSSIBLE_PROBABILITIES, TINY = (1e-9, 1 - 1e-9), 1e-300
+"""Of the noise before the data, beyond which it is not sought; the smallest number of which there is a logarithm."""
+MAX_VALUES = 40
+"""Of the noise in one sum."""
+MAX_COMPONENTS = 3000
+"""Components, about, that represent the posterior."""
+MIN_SPLINE = 4
+"""Values from which a cubic spline goes through the log density, which is nearly a parabola."""
+TABLE_POINTS = 801
+"""Of the marginal of the noise."""
+
+
+@dataclass(frozen=True)
+class NoiseGrid:
+    """Sums posteriors with known noise over values of the noise.
+
+    Parameters
+    ----------
+    solve_known : callable
+        Returns the solution of a model with known noise, with its evidence.
+    """
+
+    solve_known: Callable[[StatisticalModel], Solution]
+
+    @staticmethod
+    def why_not(model: StatisticalModel) -> str:
+        """Return why it does not serve a model; nothing where it does."""
+        if not model.tolerances:
+            return "there are no errors of whole tests beside the noise"
+        if model.noise.parameters != (NOISE_SD,):
+            return f"noise '{model.noise}' is not one unknown number"
+        if model.discrepancy.is_scattered:
+            return f"discrepancy '{model.discrepancy.name}' adds to the noise"
+        flat = [symbol for symbol, prior in model.priors.items() if isinstance(prior, Flat)]
+        return f"the flat prior of {flat[0]} gives no evidence" if flat else ""
+
+    def solve(self, models: Sequence[StatisticalModel], seed: int = 0) -> list[Solution]:
+        """Return the posteriors of models, whose fitted errors have the noise at which the sums begin."""
+        return [self._sum(model, seed) for model in models]
+
+    def _sum(self, model: StatisticalModel, seed: int) -> Solution:
+        known: dict[float, Solution] = {}
+        sketch = replace(model, discrepancy=model.discrepancy.sketch)
+        of_tests = model.noise.of_tests(model.experiment)
+        scatter = float(np.exp(np.log(of_tests).mean()))
+        ratios = of_tests / scatter
+
+        def log_weight(of: StatisticalModel, log_noise: float) -> float:
+            """Return the logarithm of the posterior density of the logarithm of the noise, up to a constant."""
+            noise_sd = np.exp(log_noise)
+            known[log_noise] = self.solve_known(with_known_noise(of, noise_sd * ratios))
+            log_evidence = known[log_noise].log_evidence
+            if log_evidence is None:
+                raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
+            return log_evidence + float(model.priors[SYMBOL].log_density(noise_sd)) + log_noise
+
+        largest = float(np.abs(model.experiment.measured).max())
+        ends = _ends(model.priors[SYMBOL])
+        high = np.log(END_FACTOR * (model.fitted_errors.level or scatter))
+        low = min(np.log((model.tolerances.resolution or MIN_NOISE_SHARE) * largest / END_FACTOR), high - MAX_STEP)
+        low, high = (low, high) if ends[0] < high and low < ends[1] else ends
+        first = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
+        nodes = _nodes(*_refined(partial(log_weight, sketch), first, ends))
+        logs, log_weights = _widened(partial(log_weight, model), nodes, ends)
+        return _joined(model, [known[float(value)] for value in logs], logs, log_weights, seed)
+
+
+def with_known_noise(model: StatisticalModel, noise_sd: FloatArray) -> StatisticalModel:
+    """Return a model with the noise (tests,) of every test known."""
+    sds = tuple(map(float, noise_sd))
+    priors = {symbol: prior for symbol, prior in model.chosen_priors.items() if symbol != SYMBOL}
+    errors = replace(model.fitted_errors, level=None)
+    return replace(model, noise=noise_named(sds), chosen_priors=priors, fitted_errors=errors)
+
+
+def _ends(prior: Prior) -> tuple[float, float]:
+    """Return the logarithms of the noise between which its prior leaves it."""
+    low, high = prior.quantile(np.array(POSSIBLE_PROBABILITIES))
+    return float(np.log(max(low, TINY))), float(np.log(high))
+
+
+def _spaced(low: float, high: float) -> FloatArray:
+    """Return places between two ends, no farther apart than the largest step."""
+    return np.linspace(low, high, 2 + int((high - low) / MAX_STEP))
+
+
+def _refined(
+    function: Callable[[float], float], first: FloatArray, ends: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return places between two ends, between which a function is known, and its values; elsewhere it is negligible."""
+    values = {float(place): function(float(place)) for place in first}
+    while len(values) < MAX_VALUES:
+        places = np.array(sorted(values))
+        logs = np.array([values[place] for place in places])
+        least = logs.max() - NEGLIGIBLE_DROP
+        matters = np.maximum(logs[1:], logs[:-1]) > least
+        is_rough = matters & (np.abs(np.diff(logs)) > MAX_DROP) & (np.diff(places) > MIN_STEP)
+        new = list(0.5 * (places[1:] + places[:-1])[is_rough])
+        # Below the resolution of the tests, nothing but the prior depends on the noise: it is the end's.
+        new += [places[0] - MAX_STEP] if logs[0] > least and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP else []
+        new += [places[-1] + MAX_STEP] if logs[-1] > least else []
+        new = [float(np.clip(place, *ends)) for place in new]
+        if all(place in values for place in new):
+            break
+        values |= {place: function(place) for place in new if place not in values}
+    places = np.array(sorted(values))
+    return places, np.array([values[place] for place in places])
+
+
+def _nodes(places: FloatArray, logs: FloatArray) -> FloatArray:
+    """Return equally spaced places over the range in which a function, roughly known, is not negligible."""
+    table, density = _table(places, logs)
+    matters = table[density > np.exp(-NEGLIGIBLE_DROP)]
+    low, high = max(float(matters[0]), float(places[0])), float(matters[-1])
+    return np.linspace(low, high, 1 + max(INTERVALS, int(np.ceil((high - low) / MAX_NODE_STEP))))
+
+
+def _widened(
+    function: Callable[[float], float], places: FloatArray, ends: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return equally spaced places between two ends, more where the function is not negligible, and its values."""
+    values, step = {float(place): function(float(place)) for place in places}, float(places[1] - places[0])
+    while len(values) < MAX_VALUES:
+        ordered = sorted(values)
+        least, (first, second), last = max(values.values()) - WIDENING_DROP, ordered[:2], ordered[-1]
+        if values[last] > least and last + step <= ends[1]:
+            values[last + step] = function(last + step)
+        elif values[first] > least and first - step >= ends[0] and values[first] - values[second] > -MIN_SLOPE * step:
+            values[first - step] = function(first - step)
+        else:
+            break
+    ordered = sorted(values)
+    return np.array(ordered), np.array([values[place] for place in ordered])
+
+
+def _joined(
+    model: StatisticalModel, known: Sequence[Solution], logs: FloatArray, log_weights: FloatArray, seed: int
+) -> Solution:
+    """Return the posterior from those at values of the logarithm of the noise, and its log density at these."""
+    table, density = _table(logs, log_weights)
+    shares, other = _shares(logs, table, density), _shares(logs, *_table(logs, log_weights, is_local=True)).sum()
+    total = shares.sum()
+    shares = shares / total
+
+    def marginal(symbol: str) -> Marginal:
+        if symbol == SYMBOL:
+            return marginal_of_table(np.exp(table), density / np.exp(table))
+        parts = [(float(share), solution.marginals[symbol]) for share, solution in zip(shares, known, strict=True)]
+        return blended(parts, model.priors[symbol].support)
+
+    matters = shares > NEGLIGIBLE_SHARE
+    known = [solution for solution, is_kept in zip(known, matters, strict=True) if is_kept]
+    logs, shares = logs[matters], shares[matters] / shares[matters].sum()
+    best = int(np.argmax(shares))
+    members: dict[str, float] = {}
+    for share, solution in zip(shares, known, strict=True):
+        for name, probability in solution.members.items():
+            members[name] = members.get(name, 0.0) + float(share * probability)
+    return Solution(
+        model.with_errors(level=float(np.exp(shares @ logs))),
+        known[best].route,
+        f"the noise integrated over {len(known)} values; at each of them {known[best].reason}",
+        partial(_represented, model, known, shares, logs, wide=False),
+        Marginals(model.symbols, marginal),
+        partial(_represented, model, known, shares, logs, wide=True),
+        seed,
+        log_evidence=float(log_weights.max() + np.log(total)),
+        log_evidence_error=float(shares @ [solution.log_evidence_error or 0.0 for solution in known])
+        + float(abs(other / total - 1)),
+        members=members,
+    )
+
+
+def _table(logs: FloatArray, log_weights: FloatArray, *, is_local: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Return many values of the logarithm of the noise, and their density over its largest known value."""
+    from scipy.interpolate import Akima1DInterpolator, CubicSpline
+
+    heights, slope = log_weights - log_weights.max(), (log_weights[1] - log_weights[0]) / (logs[1] - logs[0])
+    tail = logs[0] - np.linspace(TAIL, 0, TABLE_POINTS // 10, endpoint=False) if slope > MIN_SLOPE else logs[:0]
+    table = np.linspace(logs[0], logs[-1], TABLE_POINTS)
+    interpolator = Akima1DInterpolator if is_local or len(logs) < MIN_SPLINE else CubicSpline
+    density = np.exp(interpolator(logs, heights)(table))
+    return np.append(tail, table), np.append(np.exp(heights[0] + slope * (tail - logs[0])), density)
+
+
+def _shares(logs: FloatArray, table: FloatArray, density: FloatArray) -> FloatArray:
+    """Return the mass that belongs to every value (k,): of the density about it, between it and its neighbours."""
+    cells = density * np.gradient(table)
+    return np.array([cells @ np.interp(table, logs, unit) for unit in np.eye(len(logs))])
+
+
+def _represented(
+    model: StatisticalModel, known: Sequence[Solution], shares: FloatArray, logs: FloatArray, *, wide: bool
+) -> GaussianMixture:
+    """Return the components of all solutions, fewer of those of less weight."""
+    mixtures = []
+    for solution, share, log in zip(known, shares, logs, strict=True):
+        mixture = solution.wide_mixture if wide else solution.mixture
+        few = mixture.resampled(max(1, int(share * MAX_COMPONENTS)))
+        values = dict(zip(solution.model.nonlinear, few.settings.T, strict=True))
+        values[SYMBOL] = np.full(len(few), np.exp(log))
+        settings = np.column_stack([values[symbol] for symbol in model.nonlinear])
+        mixtures.append(replace(few, settings=settings, weights=share * few.weights / few.weights.sum()))
+    return GaussianMixture.of_all(mixtures)

@@ -1,0 +1,149 @@
+"""Unknown noise beside errors of whole tests: against dense covariances on a grid of the noise, written out here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import halfcauchy, halfnorm, multivariate_normal, norm
+
+import tissuq as tq
+from tissuq.prediction.densities import joint_log_likelihood, leave_one_out, pointwise_log_likelihood
+
+STRETCH = np.linspace(0.85, 1.4, 12)
+X = 2 * (STRETCH - STRETCH**-2)
+STRAIN = STRETCH**2 + 2 / STRETCH - 3
+STRESS = 0.5 * X * (1 + 0.2 * STRAIN) + 0.01 * np.random.default_rng(4).standard_normal(12)
+PRIORS = {"C10": tq.Uniform(0, 5), "noise_sd": tq.HalfNormal(0.1)}
+TOLERANCES = tq.Tolerances(slack=0.01, length=0.02, smooth=0.03, zero=0.005, resolution=0.004)
+LOG_NOISE = np.linspace(np.log(1e-5), np.log(0.4), 500)
+LOG_AMPLITUDE = np.linspace(-9, 7, 321)
+
+
+def errors(model):
+    """The covariance of the errors of the test, along the model's own curve."""
+    curve, slope = model.fitted_errors.curve, model.fitted_errors.slopes[:, 0]
+    slack, length, zero = 0.01 * STRETCH * slope, 0.02 * (STRETCH - 1) * slope, 0.005 * np.ones(12)
+    smooth = np.exp(-0.5 * ((STRETCH[:, None] - STRETCH) / (np.ptp(STRETCH) / 3)) ** 2)
+    resolution = (0.004 * np.abs(curve).max()) ** 2 * np.eye(12)
+    shared = sum(np.outer(column, column) for column in (slack, length, zero))
+    return shared + 0.03**2 * smooth * np.outer(curve, curve) + resolution
+
+
+def given(covariance):
+    """Log densities of the data, and means and variances of C10, for covariances (..., 12, 12) and a prior width of 5.
+
+    The prior's ends are far away.
+    """
+    inverse = np.linalg.inv(covariance)
+    precision, pull = X @ inverse @ X, X @ inverse @ STRESS
+    rest = STRESS @ inverse @ STRESS - pull**2 / precision
+    constant = 11 * np.log(2 * np.pi) + 2 * np.log(5)
+    density = -0.5 * (rest + np.linalg.slogdet(covariance)[1] + np.log(precision) + constant)
+    return density, pull / precision, 1 / precision
+
+
+def assert_agrees(posterior, log_noise, log_weights, mean, variance):
+    """Compare with log weights (noise, ...) on a grid of the noise, and C10's means and variances there."""
+    weights = np.exp(log_weights - log_weights.max())
+    total = weights.sum()
+    weights = weights / total
+    evidence = log_weights.max() + np.log(total)
+    centre = (weights * mean).sum()
+    sd = np.sqrt((weights * (variance + (mean - centre) ** 2)).sum())
+    assert posterior.log_evidence == pytest.approx(evidence, abs=0.02)
+    assert abs(posterior.log_evidence - evidence) < max(posterior.log_evidence_error, 0.01)
+    found = posterior.marginals["C10"]
+    assert abs(found.mean - centre) < 0.01 * sd
+    assert found.sd == pytest.approx(sd, rel=0.01)
+    of_noise = weights.reshape(len(log_noise), -1).sum(axis=1)
+    noise = posterior.marginals["noise_sd"]
+    assert noise.mean == pytest.approx(of_noise @ np.exp(log_noise), rel=0.02)
+    for probability in (0.1, 0.5, 0.9):
+        expected = np.exp(np.interp(probability, np.cumsum(of_noise), log_noise))
+        assert noise.quantile(probability) == pytest.approx(expected, rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def data():
+    return tq.Experiment("uniaxial", STRETCH, STRESS)
+
+
+@pytest.mark.parametrize("tolerances", [TOLERANCES, tq.Tolerances(zero=0.005)], ids=["many", "one"])
+def test_errors_of_the_test_do_not_grow_with_the_noise(data, tolerances):
+    posterior = tq.fit(data, discrepancy="none", priors=PRIORS, tolerances=tolerances)
+    fixed = errors(posterior.model) if tolerances is TOLERANCES else 0.005**2 * np.ones((12, 12))
+    noise = np.exp(LOG_NOISE)
+    density, mean, variance = given(noise[:, None, None] ** 2 * np.eye(12) + fixed)
+    prior = halfnorm(scale=0.1).logpdf(noise) + LOG_NOISE + np.log(LOG_NOISE[1] - LOG_NOISE[0])
+    assert_agrees(posterior, LOG_NOISE, density + prior, mean, variance)
+
+
+def test_an_energy_beside_them_is_summed_over_its_amplitudes_and_lengths(data):
+    posterior = tq.fit(data, discrepancy="taylor", priors=PRIORS, tolerances=TOLERANCES)
+    fixed, scale = errors(posterior.model), posterior.model.priors["c1"].quantile(0.5)
+    noise, amplitudes = np.exp(LOG_NOISE[::4]), np.exp(LOG_AMPLITUDE[::3])
+    log_weights, means, variances = [], [], []
+    for length in (0.4, 0.8, 1.6, 3.2):
+        energy = np.outer(X, X) * np.expm1(np.outer(STRAIN, STRAIN) / (length * STRAIN.max()) ** 2)
+        for c in amplitudes:
+            density, mean, variance = given(noise[:, None, None] ** 2 * np.eye(12) + fixed + c**2 * energy)
+            prior = halfcauchy(scale=scale).logpdf(c) + np.log(c) + np.log(3 * (LOG_AMPLITUDE[1] - LOG_AMPLITUDE[0]))
+            log_weights.append(density + prior - np.log(4))
+            means.append(mean)
+            variances.append(variance)
+    of_noise = halfnorm(scale=0.1).logpdf(noise) + np.log(noise) + np.log(4 * (LOG_NOISE[1] - LOG_NOISE[0]))
+    weights, mean, variance = (np.array(part).T for part in (log_weights, means, variances))
+    assert_agrees(posterior, np.log(noise), weights + of_noise[:, None], mean, variance)
+
+
+@pytest.mark.parametrize("ends", [(0.012, 0.014), (0.03, 0.2), (1e-4, 0.02)], ids=str)
+def test_bounds_of_the_noise_are_obeyed(data, ends):
+    priors = {"C10": tq.Uniform(0, 5), "noise_sd": tq.Uniform(*ends)}
+    posterior = tq.fit(data, discrepancy="none", priors=priors, tolerances=TOLERANCES)
+    log_noise = np.linspace(*np.log(ends), 2001)
+    noise = np.exp(log_noise)
+    density, mean, variance = given(noise[:, None, None] ** 2 * np.eye(12) + errors(posterior.model))
+    cell = np.full(2001, log_noise[1] - log_noise[0])
+    cell[[0, -1]] /= 2
+    assert_agrees(posterior, log_noise, density + log_noise + np.log(cell) - np.log(ends[1] - ends[0]), mean, variance)
+
+
+def test_noise_far_below_the_resolution_of_the_test_does_not_matter(data):
+    """Measurements without any scatter: the posterior of C10 is that of the errors of the test alone."""
+    smooth = tq.Experiment("uniaxial", STRETCH, 0.5 * X)
+    posterior = tq.fit(smooth, discrepancy="none", priors=PRIORS, tolerances=TOLERANCES)
+    inverse = np.linalg.inv(errors(posterior.model))
+    found = posterior.marginals["C10"]
+    assert found.mean == pytest.approx(0.5, rel=1e-3)
+    assert found.sd == pytest.approx((X @ inverse @ X) ** -0.5, rel=0.05)
+
+
+def test_very_different_noise_levels_are_both_found():
+    """An exact curve explained by errors of the test, not by noise as large as its misfit of the material."""
+    stress = 0.5 * X * (1 + 0.05 * STRAIN)
+    posterior = tq.fit(
+        tq.Experiment("uniaxial", STRETCH, stress), discrepancy="none", tolerances=tq.Tolerances(smooth=0.05)
+    )
+    alone = tq.fit(tq.Experiment("uniaxial", STRETCH, stress), discrepancy="none", tolerances="as-tested")
+    assert posterior.marginals["noise_sd"].quantile(0.5) < 0.1 * alone.marginals["noise_sd"].quantile(0.5)
+
+
+def test_densities_of_the_data_are_those_of_the_covariance_at_the_noise_of_the_draw(data):
+    posterior = tq.fit(data, discrepancy="none", priors=PRIORS, tolerances=TOLERANCES)
+    solution, fixed = posterior.solution, errors(posterior.model)
+    joint, pointwise = joint_log_likelihood(solution), pointwise_log_likelihood(solution)
+    noise = solution.draws["noise_sd"]
+    assert np.ptp(np.log(noise)) > 1
+    for place in ((0, 0), (1, 10), (3, 999), np.unravel_index(noise.argmin(), noise.shape)):
+        covariance = noise[place] ** 2 * np.eye(12) + fixed
+        mean = solution.draws["C10"][place] * X
+        assert joint[place] == pytest.approx(multivariate_normal(mean, covariance).logpdf(STRESS), abs=1e-5)
+        solved, precision = np.linalg.solve(covariance, STRESS - mean), np.diag(np.linalg.inv(covariance))
+        expected = norm(0, precision**-0.5).logpdf(solved / precision)
+        assert np.allclose(pointwise[place], expected, atol=1e-5)
+    replicate = posterior.data["posterior_predictive"]["stress"].to_numpy().reshape(-1, 12)
+    scale = np.sqrt((noise**2).mean() + np.diag(fixed) + solution.draws["C10"].var() * X**2)
+    assert np.allclose(replicate.std(axis=0), scale, rtol=0.1)
+    # one measurement left out: the posterior mean of the inverse of its density given the others
+    left_out = leave_one_out(solution).log_density
+    assert np.allclose(left_out, -np.log(np.exp(-pointwise.reshape(-1, 12)).mean(axis=0)), atol=0.1)
