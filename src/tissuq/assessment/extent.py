@@ -23,6 +23,7 @@ from tissuq.assessment.stability import StableRange
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.experiments.modes import States
 from tissuq.experiments.reading.units import stress_unit
+from tissuq.inference.enumerators.noise_grid import at_level
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
@@ -217,7 +218,11 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
     share, initial_share = _shares(solution)
     stiffness = modulus(solution)
     scales = scale_symbols(model)
-    rescaled_solutions = _rescaled(model, solve) if scales and solution.diagnostics is None else {}
+    is_rescaled = bool(scales) and solution.diagnostics is None
+    likely = at_level(model)  # where the noise would be summed over, other priors are tried at its level
+    reference = solve([likely])[0] if is_rescaled and likely is not model else solution
+    rescaled_solutions = _rescaled(likely, solve) if is_rescaled else {}
+    expected = reference.marginals[model.headline].mean
     return Assessment(
         parameter=model.headline,
         share=share,
@@ -235,10 +240,10 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
         width_against_none=marginal.sd / none.marginals[model.headline].sd if none else None,
         scales=scales,
         shifts={
-            SCALE_FACTORS[name]: float((solution_rescaled.marginals[model.headline].mean - marginal.mean) / marginal.sd)
+            SCALE_FACTORS[name]: float((solution_rescaled.marginals[model.headline].mean - expected) / marginal.sd)
             for name, solution_rescaled in rescaled_solutions.items()
         },
-        evidence_changes=known_evidence_changes(solution) | _evidence_changes(solution, rescaled_solutions),
+        evidence_changes=known_evidence_changes(solution) | _evidence_changes(reference, rescaled_solutions),
         has_energy=has_energy(model),
         stable={mode: stable_range.probability for mode, stable_range in ranges.items()},
         factors=factors_of_tests(solution),

@@ -54,7 +54,8 @@ def factors_of_tests(solution: Solution) -> dict[str, float]:
     """
     model = solution.model
     whitening, tests = model.whitening, model.experiment.tests
-    if whitening is None or not model.tolerances.stress or not len(whitening.spread) or model.fitted_errors.lag:
+    has_spread = len(tests) > 1 and bool(model.tolerances.stress or model.tolerances.test)
+    if whitening is None or not has_spread or not len(whitening.spread) or model.fitted_errors.lag:
         return {}
     curve = mean_curve(solution)
     residual = model.experiment.measured - curve

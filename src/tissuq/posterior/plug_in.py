@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.inference.enumerators.noise_grid import with_known_noise
+from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
 from tissuq.inference.solution import Solution
 from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel
@@ -76,10 +76,8 @@ class ErrorEstimates:
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
         candidates = [replace(sketch, tolerances=stated.with_factor(float(factor))) for factor in FACTORS]
         if self._sums_noise(model):
-            level = self._solution(sketch).model.fitted_errors.level or 1.0
-            of_tests = model.noise.of_tests(model.experiment)
-            noise_sd = np.asarray(level * of_tests / np.exp(np.log(of_tests).mean()))
-            candidates = [with_known_noise(candidate, noise_sd) for candidate in candidates]
+            level = self._solution(sketch).model.fitted_errors.level
+            candidates = [at_level(candidate.with_errors(level=level)) for candidate in candidates]
         evidences = [self._solution(candidate).log_evidence for candidate in candidates]
         if any(evidence is None for evidence in evidences):
             return model.with_errors(fits=self._fits)

@@ -18,6 +18,8 @@ from tissuq.posterior.plug_in import ErrorEstimates
 __all__ = ["METHODS", "Method", "Solver"]
 
 Method = Literal["auto", "exact", "nuts", "smc", "joint"]
+MAX_COMPONENTS_OF_VALUE = 1000
+"""Components that represent the posterior at one value of the noise, where it is summed over several."""
 FACTORISED = 3
 """Parameters of the structure from which `auto` samples."""
 METHODS: tuple[Method, ...] = ("auto", "exact", "nuts", "smc", "joint")
@@ -75,6 +77,12 @@ class Solver:
                 return [solution for model in models for solution in self._solve([model])]
             return _sampler("nuts", str(error)).solve(models, self.seed)
 
+    def _solve_known(self, model: StatisticalModel) -> Solution:
+        """Return the posterior of a model with known noise, one of a sum over values of it."""
+        if model.energy_symbols:
+            return AmplitudeLattice(MAX_COMPONENTS_OF_VALUE).solve([model], self.seed)[0]
+        return self._solve([model])[0]
+
     def _enumerator(self, model: StatisticalModel) -> Enumerator:
         """Return what enumerates the nonlinear parameters of a model by the method that was chosen.
 
@@ -84,7 +92,7 @@ class Solver:
             When it does not serve this model.
         """
         if self._sums_noise(model):
-            return NoiseGrid(lambda known: self._solve([known])[0])
+            return NoiseGrid(self._solve_known)
         if model.energy_symbols and self.method in ("auto", "exact"):
             return AmplitudeLattice()
         if self.method == "auto":

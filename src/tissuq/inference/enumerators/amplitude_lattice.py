@@ -9,6 +9,7 @@ exponents, take the values of weighted quasi-random points (`tissuq.inference.en
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -54,8 +55,17 @@ TAILS_POWER = 0.25
 """Power of the weights by which components are taken that must represent the tails, too."""
 
 
+@dataclass(frozen=True)
 class AmplitudeLattice:
-    """Lattices of the amplitudes of an energy discrepancy, at importance points of parameters beside them."""
+    """Lattices of the amplitudes of an energy discrepancy, at importance points of parameters beside them.
+
+    Parameters
+    ----------
+    components : int
+        Components, at most, that represent a posterior in draws and predictions.
+    """
+
+    components: int = MAX_COMPONENTS
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why an energy discrepancy cannot be integrated with the rest of a model; nothing where it can."""
@@ -93,10 +103,11 @@ class AmplitudeLattice:
             )
         with one_thread():
             if Outer(models[0]).symbols:
-                return [_EnergySums(model, *weighted_nodes(model)).solution(seed) for model in models]
+                sums = (_EnergySums(model, *weighted_nodes(model)) for model in models)
+                return [energy_sums.solution(self.components, seed) for energy_sums in sums]
             nodes = single_nodes(models)
             sums = (_EnergySums(model, [node], np.zeros(1), 0.0) for model, node in zip(models, nodes, strict=True))
-            return [energy_sums.solution(seed) for energy_sums in sums]
+            return [energy_sums.solution(self.components, seed) for energy_sums in sums]
 
 
 def _lattice_error(prior: Prior) -> float:
@@ -152,16 +163,16 @@ class _EnergySums:
             of_sums = float(np.mean([node.error for node in nodes])) / np.sqrt(len(nodes))
             self._evidence = evidence, float(error + of_sums + self._weights @ error_of_mass + NEGLIGIBLE_SHARE)
 
-    def solution(self, seed: int) -> Solution:
+    def solution(self, components: int, seed: int) -> Solution:
         """Return the posterior; in its mixture the weights of the discrepancy follow the material's parameters."""
         log_evidence, error = self._evidence
         return Solution(
             self.model,
             "exact",
             self._reason(),
-            partial(self._represented, 1.0),
+            partial(self._represented, 1.0, components),
             Marginals.of(self.model, self._marginal),
-            partial(self._represented, TAILS_POWER),
+            partial(self._represented, TAILS_POWER, components),
             seed,
             log_evidence=log_evidence,
             log_evidence_error=error,
@@ -182,13 +193,13 @@ class _EnergySums:
             f", and over {len(shares)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
         )
 
-    def _represented(self, power: float) -> GaussianMixture:
-        """Return components that stand for all points, taken as often as a power of their weights says."""
+    def _represented(self, power: float, count: int) -> GaussianMixture:
+        """Return so many components that stand for all points, taken as often as a power of their weights says."""
         points, node, weights = self._points, self._node, self._weights
-        if len(weights) > MAX_COMPONENTS:
+        if len(weights) > count:
             order = np.lexsort((points.noise_sd, points.first_index, points.second_index, points.lattice, node))
             # In this order neighbours are alike.
-            representatives = order[systematic((weights**power)[order][None], MAX_COMPONENTS)[0]]
+            representatives = order[systematic((weights**power)[order][None], count)[0]]
             points, node, weights = (
                 points[representatives],
                 node[representatives],

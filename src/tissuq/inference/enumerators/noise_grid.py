@@ -22,7 +22,7 @@ from tissuq.model.noise import NOISE_SD, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["NoiseGrid", "with_known_noise"]
+__all__ = ["NoiseGrid", "at_level", "with_known_noise"]
 
 FloatArray = NDArray[np.float64]
 
@@ -118,6 +118,14 @@ def with_known_noise(model: StatisticalModel, noise_sd: FloatArray) -> Statistic
     priors = {symbol: prior for symbol, prior in model.chosen_priors.items() if symbol != SYMBOL}
     errors = replace(model.fitted_errors, level=None)
     return replace(model, noise=noise_named(sds), chosen_priors=priors, fitted_errors=errors)
+
+
+def at_level(model: StatisticalModel) -> StatisticalModel:
+    """Return a model that is summed over its noise with this known, at the level that was estimated; others as are."""
+    if NoiseGrid.why_not(model) or not model.fitted_errors.level:
+        return model
+    of_tests = model.noise.of_tests(model.experiment)
+    return with_known_noise(model, np.asarray(model.fitted_errors.level * of_tests / np.exp(np.log(of_tests).mean())))
 
 
 def _ends(prior: Prior) -> tuple[float, float]:
