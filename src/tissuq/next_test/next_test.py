@@ -303,7 +303,7 @@ def _check_model(model: StatisticalModel, specimen: Specimen) -> None:
     if specimen == "same" and model.tolerances:
         raise InputError(
             "the tests of this posterior have errors of area or length that a test of the same specimen would share: "
-            "choose one of another specimen, or fit without tolerances."
+            "choose one of another specimen, or fit as tested (--estimand as-tested)."
         )
 
 

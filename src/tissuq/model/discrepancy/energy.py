@@ -131,7 +131,7 @@ class EnergyDiscrepancy(Discrepancy):
     is_energy = True
     caution = (
         "The initial shear modulus is the material's own; its other parameters (such as C20) share their meaning with "
-        "the discrepancy. It covers an error of the material, not of the test: a wrong area or gauge length scales all."
+        "the discrepancy."
     )
     sums: ClassVar[tuple[Sum, ...]]
 
