@@ -24,13 +24,13 @@ demo: $(VENV)/.installed  ## Carry out the paper's study and fit measured brain 
 	@echo "  the paper's study:  $(abspath $(RUNS))/paper/report.html"
 	@echo "  human brain cortex: $(abspath $(RUNS))/brain/report.html"
 
-test: $(VENV)/.installed-dev  ## Run the quick tests (under six minutes on two cores, eight the first time)
+test: $(VENV)/.installed-dev  ## Run the quick tests (six minutes on two cores, eight the first time)
 	$(PYTEST) -m 'not ($(LONG))'
 
 test-rest: $(VENV)/.installed-dev  ## Run the tests that `make test` leaves out
 	$(PYTEST) -m '$(LONG)'
 
-test-all: $(VENV)/.installed-dev  ## Run every test, with coverage (25 minutes on two cores)
+test-all: $(VENV)/.installed-dev  ## Run every test, with coverage (half an hour on two cores)
 	$(PYTEST) --cov=src/tissuq --cov-report=term:skip-covered
 
 mutants: $(VENV)/.installed-dev  ## Plant faults in copies of the source and see that tests catch each (ten minutes)
