@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import norm
 
 import tissuq as tq
+from tissuq.prediction.bands import predictive_mixtures
 
 STRETCH = np.linspace(0.7, 1.9, 14)
 DATA = tq.simulate("yeoh", {"C10": 0.5, "C20": 0.01, "C30": 0.0}, STRETCH, noise_sd=0.1, seed=1)
@@ -78,13 +79,23 @@ def test_the_average_is_what_draws_pooled_by_weight_are(fits):
     assert np.mean((low < pooled) & (pooled < high)) == pytest.approx(0.95, abs=5 * 0.22 / np.sqrt(4000))
 
 
+def probability_below(values, posterior, points):
+    """Return the probabilities of measurements below some values, by a fit."""
+    options = {"discrepancy": True, "noises": (True,)}
+    ((mixture,),) = predictive_mixtures([(1.0, posterior.solution)], np.array(points), DATA.mode, 0, **options)
+    return mixture.weights @ norm.cdf(values, mixture.means, np.sqrt(mixture.variances))
+
+
 def test_predictions_are_mixtures_of_the_fits(fits):
     at = [0.8, 1.0, 1.5, 2.2]
     found = tq.average(fits)
     band = found.predict(at)
     apart = {name: posterior.predict(at) for name, posterior in fits.items()}
-    mean = sum(found.weights[name] * each["mean"] for name, each in apart.items())
-    np.testing.assert_allclose(band["mean"], mean, rtol=1e-6, atol=1e-8)
+    below = [
+        found.weights[name] * probability_below(band["median"].to_numpy(), posterior, at)
+        for name, posterior in fits.items()
+    ]
+    np.testing.assert_allclose(np.sum(below, axis=0), 0.5, atol=1e-6)
     assert (band["low"] >= np.min([each["low"] for each in apart.values()], axis=0) - 1e-9).all()
     assert (band["high"] <= np.max([each["high"] for each in apart.values()], axis=0) + 1e-9).all()
     same = tq.average({"one": fits["yeoh"], "other": fits["yeoh"]}).predict(at, discrepancy=False)

@@ -168,7 +168,7 @@ def of_band(name: str, band: Any) -> Iterator[tuple[str, Number]]:
     for row in range(len(band)):
         values = band.iloc[row]
         scale = 0.5 * float(values["high"] - values["low"])
-        for column in ("mean", "low", "high"):
+        for column in ("mean" if "mean" in band else "median", "low", "high"):
             yield f"{name} {row + 1} {column}", Number(float(values[column]), scale)
 
 

@@ -181,7 +181,7 @@ def test_a_band_is_that_of_a_new_test():
     mean, sd, _ = given(np.diag(SIZE**2) + between(posterior.model), X[:, None])
     unit = 2 * (1.3 - 1.3**-3)
     variance = (sd * unit) ** 2 + (mean * unit * 0.18) ** 2 * 1.5 + NOISE_SD[1] ** 2
-    assert band["mean"] == pytest.approx(mean * unit, rel=1e-8)
+    assert band["median"] == pytest.approx(mean * unit, rel=1e-8)
     assert band["high"] - band["low"] == pytest.approx(2 * 1.959964 * np.sqrt(variance), rel=1e-5)
 
 
@@ -279,7 +279,7 @@ def test_a_process_and_correlated_noise_do_not_go_together():
 def test_cauchy_stress_is_the_engineering_stress_times_the_stretch_along_it():
     posterior = fit("none")
     engineering, cauchy = (posterior.predict([0.9, 1.3], mode="planar", stress_type=kind) for kind in STRESS_TYPES)
-    for name in ("mean", "low", "high"):
+    for name in ("median", "low", "high"):
         assert np.allclose(cauchy[name], engineering[name] * [0.9, 1.3], rtol=1e-12)
     shear = [posterior.predict([0.2], mode="simple-shear", stress_type=kind) for kind in STRESS_TYPES]
     assert shear[0].equals(shear[1])
@@ -316,7 +316,7 @@ def test_modes_of_two_controls_are_predicted_with_the_errors_of_whole_tests():
     posterior = tq.fit([experiments()[0], sheet], discrepancy="none", noise_sd=0.02)
     found = posterior.predict(points, mode="biaxial", channel=1, noise=False)
     unit = 2 * (points[:, 1] - 1 / (points[:, 0] ** 2 * points[:, 1] ** 3))
-    assert np.allclose(found["mean"], posterior.marginals["C10"].mean * unit, rtol=1e-6)
+    assert np.allclose(found["median"], posterior.marginals["C10"].mean * unit, rtol=1e-6)
     assert 0 <= posterior.predictive_coverage() <= 1
     assert len(posterior.stability()) > 10
 

@@ -87,7 +87,7 @@ def test_what_is_simulated_is_identified(mode, expected, discrepancy):
 def test_it_is_predicted_as_measured_and_as_textbooks_have_other_modes(mode, expected, discrepancy):
     posterior = tq.fit(measured(mode), discrepancy=discrepancy, noise_sd=NOISE_SD)
     stretch = np.array([0.9, 1.2, 1.5])
-    np.testing.assert_allclose(posterior.predict(stretch)["mean"], expected(stretch), atol=3 * NOISE_SD)
+    np.testing.assert_allclose(posterior.predict(stretch)["median"], expected(stretch), atol=3 * NOISE_SD)
     uniaxial = posterior.predict(stretch, mode="uniaxial")
     assert np.all((uniaxial["low"] < stretch - stretch**-2) & (stretch - stretch**-2 < uniaxial["high"]))
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import Deformation, LoadingMode, Path, States, loading_mode, loading_modes
+from tissuq.experiments.modes import LoadingMode, States, loading_mode, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
+from tissuq.mechanics.rays import through
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import drawn_curves
@@ -251,25 +252,16 @@ def _curves(model: StatisticalModel, mixture: GaussianMixture) -> Curves:
         curves = [drawn_curves(model, mixture[block], states, seed) for seed, block in enumerate(blocks)]
         return np.concatenate([material + discrepancy for material, discrepancy in curves])
 
-    def explained(states: States) -> FloatArray:
-        try:
-            return stresses(states)
-        except TypeError as error:
-            raise ModelError(
-                f"the stability of material '{model.material.name}' is unknown, because its energy is not plain "
-                "arithmetic of arrays: write it without jax.numpy and branches."
-            ) from error
-
-    return explained
+    return stresses
 
 
 def _criteria(curves: Curves, mode: LoadingMode, stretch: FloatArray) -> tuple[Flags, Flags, Flags]:
     """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each."""
     base = np.array([np.broadcast_to(values, len(stretch)) for values in mode.principal_stretches(stretch)])
     nudges = [np.zeros(3), *(sign * LOG_STRAIN_STEP * direction for direction in DIRECTIONS for sign in (1, -1))]
-    paths = [_Path(base * np.exp(nudge)[:, None], direction) for nudge in nudges for direction in DIRECTIONS]
-    joined = _Path(np.hstack([path.base for path in paths]), np.hstack([path.rates(len(stretch)) for path in paths]))
-    stress_values = curves(joined.at(np.ones(joined.base.shape[1])))
+    logs = np.concatenate([np.log(base.T) + nudge for nudge in nudges for _ in DIRECTIONS])
+    rates = np.repeat(np.tile(DIRECTIONS, (len(nudges), 1)), len(stretch), axis=0)
+    stress_values = curves(through(logs, rates))
     stress = stress_values.reshape(len(stress_values), 5, 2, len(stretch))
     base_stress, tangent = stress[:, 0], (stress[:, 1::2] - stress[:, 2::2]) / (2 * LOG_STRAIN_STEP)
     change = stretch - mode.reference
@@ -339,18 +331,3 @@ def _loss(stretch: FloatArray, stable: Flags, side: int) -> Loss:
     path = stretch[outward]
     loss_stretches = 0.5 * (path[first_unstable] + path[np.maximum(first_unstable - 1, 0)])
     return Loss(len(first_unstable) / len(stable), *map(float, np.quantile(loss_stretches, [0.5, 0.025, 0.975])))
-
-
-class _Path(Path):
-    """Deformations through given states: base * l^direction, state by state; its stress is the work per log strain."""
-
-    def __init__(self, base: FloatArray, direction: FloatArray) -> None:
-        self.base, self.direction = base, direction
-
-    def rates(self, count: int) -> FloatArray:
-        """Return the direction (3, count) at every state."""
-        return np.repeat(self.direction[:, None], count, axis=1)
-
-    def moved(self, point: Any, step: Any) -> Deformation:
-        l1, l2, l3 = self.base * (point + step) ** self.direction
-        return Deformation.along_axes((l1, l2, l3))

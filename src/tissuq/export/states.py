@@ -98,8 +98,8 @@ def mode_stretches(low: float, high: float) -> FloatArray:
 
 def moduli(ensemble: Ensemble) -> FloatArray:
     """Return the initial shear moduli (N,) of draws, MPa, to which a discrepancy that is an energy adds nothing."""
-    without_discrepancy = replace(ensemble, draws=tuple(replace(draw, discrepancy=None) for draw in ensemble))
-    return initial_slope(without_discrepancy.stress(SimpleShear(), SHEARS).T)
+    without_discrepancy = tuple(replace(draw, discrepancy=None, continuation=None) for draw in ensemble)
+    return initial_slope(replace(ensemble, draws=without_discrepancy).stress(SimpleShear(), SHEARS).T)
 
 
 def initial_slope(stress: FloatArray) -> FloatArray:

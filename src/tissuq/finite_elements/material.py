@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.mechanics import Material
+from tissuq.mechanics.continuation import Continuation, sum_of_energies
 from tissuq.mechanics.pieces import PiecewiseEnergy
 from tissuq.mechanics.stress import differentiator
 from tissuq.posterior.ensemble import EnergyDraw
@@ -106,6 +107,8 @@ def _points(F: Any) -> tuple[FloatArray, tuple[int, ...]]:
     return gradients.reshape(3, 3, -1), gradients.shape[2:]
 
 
+Numbers = tuple[Sequence[Sequence[Any]], PiecewiseEnergy | None, Continuation | None]
+"""Everything about a sum of energies on which its derivatives are not compiled."""
 Slopes = Callable[[FloatArray], FloatArray]
 Derivatives = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
@@ -201,27 +204,32 @@ class DistortionalEnergy:
         The parameters of each material.
     discrepancy : PiecewiseEnergy or None
         Energy of the discrepancy.
+    continuation : Continuation or None
+        Energy beyond the range of the data.
     """
 
     materials: tuple[Material, ...]
     values: tuple[tuple[float, ...], ...]
     discrepancy: PiecewiseEnergy | None = None
+    continuation: Continuation | None = None
+
+    @property
+    def _numbers(self) -> Numbers:
+        return self.values, self.discrepancy, self.continuation
 
     def slopes(self, stretches: FloatArray) -> FloatArray:
         """Return the gradient (3, n), MPa, at principal stretches (3, n)."""
-        return np.asarray(_compiled(self.materials)[0](self.values, self.discrepancy, stretches))
+        return np.asarray(_compiled(self.materials)[0](self._numbers, stretches))
 
     def derivatives(self, stretches: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the gradient (3, n) and the Hessian (3, 3, n), MPa, at principal stretches (3, n)."""
-        gradient, hessian = _compiled(self.materials)[1](self.values, self.discrepancy, stretches)
+        gradient, hessian = _compiled(self.materials)[1](self._numbers, stretches)
         return np.asarray(gradient), np.asarray(hessian)
 
     def __call__(self, stretches: FloatArray) -> FloatArray:
         """Return the energy (n,), MPa, at principal stretches (3, n)."""
         isochoric = tuple(np.asarray(stretches) / np.prod(stretches, axis=0) ** (1 / 3))
-        terms = zip(self.materials, self.values, strict=True)
-        energy = sum(material.energy(isochoric, numbers) for material, numbers in terms)
-        return np.asarray(energy if self.discrepancy is None else energy + self.discrepancy(isochoric))
+        return np.asarray(sum_of_energies(self.materials, self.values, isochoric, self.discrepancy, self.continuation))
 
     @property
     def initial_shear_modulus(self) -> float:
@@ -240,7 +248,7 @@ def distortional_energy(material: Material, values: ArrayLike | None = None) -> 
     """
     if isinstance(material, EnergyDraw):
         kinds, numbers = zip(*material.parts, strict=True)
-        return DistortionalEnergy(kinds, numbers, material.discrepancy)
+        return DistortionalEnergy(kinds, numbers, material.discrepancy, material.continuation)
     if not material.is_isotropic:
         raise ModelError(
             f"material '{material.name}' has fibres; finite elements are available for isotropic materials only, which "
@@ -260,15 +268,15 @@ def _compiled(materials: tuple[Material, ...]) -> tuple[Any, Any]:
     """Return two compiled functions of numbers and stretches (3, n): the gradients, and these with the Hessians."""
     jax = differentiator()
 
-    def energy(point: Any, values: Sequence[Sequence[Any]], discrepancy: PiecewiseEnergy | None) -> Any:
+    def energy(point: Any, numbers: Numbers) -> Any:
+        values, discrepancy, continuation = numbers
         isochoric = tuple(point / (point[0] * point[1] * point[2]) ** (1 / 3))
-        total = sum(material.energy(isochoric, numbers) for material, numbers in zip(materials, values, strict=True))
-        return total if discrepancy is None else total + discrepancy(isochoric)
+        return sum_of_energies(materials, values, isochoric, discrepancy, continuation)
 
     slopes, curvature = jax.grad(energy), jax.hessian(energy)
-    gradients = jax.vmap(slopes, (1, None, None), -1)
-    joint = jax.vmap(lambda *arguments: (slopes(*arguments), curvature(*arguments)), (1, None, None), (-1, -1))
+    gradients = jax.vmap(slopes, (1, None), -1)
+    joint = jax.vmap(lambda *arguments: (slopes(*arguments), curvature(*arguments)), (1, None), (-1, -1))
     return tuple(
-        jax.jit(lambda values, discrepancy, stretches, batched=batched: batched(stretches, values, discrepancy))
+        jax.jit(lambda numbers, stretches, batched=batched: batched(stretches, numbers))
         for batched in (gradients, joint)
     )

@@ -322,8 +322,7 @@ def _extrapolated(simulation: Simulation) -> list[str]:
     return [
         f"At {simulation.travel[last]:.3g} mm, {100 * volume:.2g} % of the volume, with {100 * energy:.0f} % of the "
         f"strain energy, is strained beyond what was measured (I1 - 3 up to {max_1:.3g}, I2 - 3 up to {max_2:.3g}). "
-        "There the material's law and the end slopes of the discrepancy are extrapolated, and the band does not cover "
-        "what the tissue may do."
+        "There the energy of every draw goes on as it ends, with an error that grows with the strain."
     ]
 
 

@@ -75,7 +75,7 @@ class FunctionLaw(Material):
     ----------
     function : callable
         Plain arithmetic and the functions of `tissuq.mechanics.arithmetic`, zero at the reference. Those of jax.numpy
-        serve, too, but not where stability is asked for.
+        serve, too, but have to be compiled.
 
     Raises
     ------

@@ -177,11 +177,11 @@ class ErrorModel:
         """What makes the errors of several tests independent and equal; None where they are so already."""
         if len(self.experiment.tests) == 1 and not self.tolerances and not self.fitted_errors.lag:
             return None
-        noise_sd, mean_sd = self._noise_of_tests
+        noise_sd, mean_sd = self.noise_of_tests
         return whitening(self.experiment, noise_sd, mean_sd, self.tolerances, self.fitted_errors)
 
     @cached_property
-    def _noise_of_tests(self) -> tuple[FloatArray, float]:
+    def noise_of_tests(self) -> tuple[FloatArray, float]:
         """The noise (tests,) of every test as known or about, MPa, and its geometric mean."""
         noise_sd = self.noise.of_tests(self.experiment)
         mean_sd = float(np.exp(np.log(noise_sd).mean()))
@@ -203,7 +203,7 @@ class ErrorModel:
         """Return the noise over noise_sd at states (g,): that of the test; one where there is none."""
         if self.whitening is None or len(self.experiment.tests) == 1:
             return 1.0
-        noise_sd, mean_sd = self._noise_of_tests
+        noise_sd, mean_sd = self.noise_of_tests
         of_curves = np.repeat(noise_sd / mean_sd, [len(test.curves) for test in self.experiment.tests])
         return np.append(of_curves, 1.0)[states.curve]  # the last one is of what no test has measured
 

@@ -42,7 +42,7 @@ CORRELATION_SHARE = 1 / 3
 PROCESS_NODES = 12
 """Number of places along a test from which a smooth error is interpolated; its variance is right to 1e-6."""
 MIN_NODE_EIGENVALUE = 1e-6
-"""Eigenvalue, relative to the largest, below which a direction of the errors there is rounding."""
+"""Eigenvalue, relative to the largest, below which a direction of the errors there is left out."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
+from tissuq.mechanics.rays import Range
 from tissuq.model.compatibility import check_linearity, check_parts, check_separable
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
 from tissuq.model.discrepancy.blocks import EnergyBlock
@@ -231,6 +232,17 @@ class StatisticalModel(ErrorModel):
     def design_at(self, bent: ArrayLike) -> FloatArray:
         """Return `basis` as `rows` (r, k), at values (s,) of `bent_symbols`."""
         return np.asarray(self.rows(self.basis(self.states, bent)))
+
+    def by_limits(self, member: NDArray[np.intp]) -> Iterator[tuple[Range, NDArray[np.intp]]]:
+        """Yield the different ranges of the data of energy members (M,), and which of these have each.
+
+        Nothing for a material with fibres, whose energy does not follow from the principal stretches.
+        """
+        numbers = np.unique(member[: len(member) * self.material.is_isotropic])
+        limits = [self.energy_members[number].limits for number in numbers]
+        for distinct in dict.fromkeys(limits):
+            alike = [number for number, other in zip(numbers, limits, strict=True) if other == distinct]
+            yield distinct, np.flatnonzero(np.isin(member, alike))
 
     def energy_features(self, member: int) -> list[FloatArray]:
         """Return the stresses of each block's terms of a member as `rows`."""

@@ -13,15 +13,16 @@ from typing import Any, Literal, get_args, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.assessment.stability import LOG_STRAIN_STEP, calibrated_range, stable_draws
+from tissuq.assessment.stability import calibrated_range, stable_draws
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import Solution
 from tissuq.mechanics import Material, StretchMaterial, stress_basis
+from tissuq.mechanics.continuation import Continuation, continuations, rays_to_ends, sum_of_energies
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
 from tissuq.mechanics.pieces import PiecewiseEnergy, pieces
+from tissuq.mechanics.rays import MAX_CORNER_EXCESS, Range, scores, through, with_errors
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy.blocks import Coordinates
 from tissuq.model.statistical_model import StatisticalModel
@@ -44,7 +45,7 @@ MOST_TRIES = 64
 class EnergyDraw(StretchMaterial):
     """One draw of a posterior as a material without free parameters.
 
-    Beyond the range of the data its discrepancy keeps the slopes dW/dI1, dW/dI2 and l dw/dl that it has at the end.
+    Beyond the range of the data of its discrepancy, its energy goes on along rays (`tissuq.mechanics.rays`).
 
     Attributes
     ----------
@@ -54,11 +55,14 @@ class EnergyDraw(StretchMaterial):
         The material, and further terms of the discrepancy where it has some, with their parameters.
     discrepancy : PiecewiseEnergy or None
         The energy of a discrepancy that is one.
+    continuation : Continuation or None
+        The energy of all beyond the range of the data of such a discrepancy.
     """
 
     number: int
     parts: tuple[tuple[Material, tuple[float, ...]], ...]
     discrepancy: PiecewiseEnergy | None
+    continuation: Continuation | None = None
 
     parameters = ()
     source = "tissuq"
@@ -83,8 +87,8 @@ class EnergyDraw(StretchMaterial):
         return {parameter.symbol: value for parameter, value in zip(material.parameters, values, strict=True)}
 
     def energy(self, stretches: tuple[Any, Any, Any], values: Any = ()) -> Any:
-        energy = sum(material.energy(stretches, parameters) for material, parameters in self.parts)
-        return energy if self.discrepancy is None else energy + self.discrepancy(stretches)
+        materials, parameters = zip(*self.parts, strict=True)
+        return sum_of_energies(materials, parameters, stretches, self.discrepancy, self.continuation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +136,12 @@ class Ensemble(Sequence[EnergyDraw]):
     @property
     def alone(self) -> Ensemble:
         """The same draws of the material's parameters, without any discrepancy."""
-        return replace(self, draws=tuple(replace(draw, parts=draw.parts[:1], discrepancy=None) for draw in self.draws))
+        return replace(
+            self,
+            draws=tuple(
+                replace(draw, parts=draw.parts[:1], discrepancy=None, continuation=None) for draw in self.draws
+            ),
+        )
 
     def stress(self, mode: LoadingMode | Path, stretch: FloatArray) -> FloatArray:
         """Return the engineering stresses (N, n), MPa, of all draws at points (n,) of a mode of one stress."""
@@ -193,6 +202,16 @@ def drawn_ensemble(
 
 def _stress(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
     """Return the stresses (N, n) of draws at states (n,)."""
+    stresses = _stress_within(draws, states)
+    for row, draw in zip(stresses, draws, strict=True):
+        if draw.continuation is not None:
+            beyond, continued = draw.continuation.stress(*states.log_stretches)
+            row[beyond] = continued
+    return stresses
+
+
+def _stress_within(draws: Sequence[EnergyDraw], states: States) -> FloatArray:
+    """Return the stresses (N, n) of draws at states (n,) in the range of their data."""
     stresses = np.zeros((len(draws), len(states)))
     for term, (material, _) in enumerate(draws[0].parts):
         stresses += _of_material(material, np.array([draw.parts[term][1] for draw in draws]), states)
@@ -219,19 +238,7 @@ def _of_material(material: Material, values: FloatArray, states: States) -> Floa
 
 def _curves(draws: Sequence[EnergyDraw], indices: NDArray[np.intp]) -> Callable[[States], FloatArray]:
     """Return the function that gives the stresses of some of the draws."""
-    selected = [draws[index] for index in indices]
-
-    def stresses(states: States) -> FloatArray:
-        try:
-            return _stress(selected, states)
-        except TypeError as error:
-            raise ModelError(
-                f"the stability of material '{selected[0].parts[0][0].name}' is not known, because its energy is not "
-                "plain arithmetic of arrays: take exp, log and the like from tissuq.mechanics.arithmetic instead of "
-                "jax.numpy, write no branches, or take all draws (tissuq export --all-draws)."
-            ) from error
-
-    return stresses
+    return partial(_stress, [draws[index] for index in indices])
 
 
 def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> None:
@@ -249,13 +256,18 @@ def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> Non
         )
 
 
-def _points(solution: Solution, count: int, seed: list[int], sampling: Sampling) -> tuple[GaussianMixture, FloatArray]:
-    """Return draws as mixture without width, and the factor (count,) of the error that all tests have in common."""
+def _points(
+    solution: Solution, count: int, seed: list[int], sampling: Sampling
+) -> tuple[GaussianMixture, FloatArray, FloatArray]:
+    """Return draws as mixture without width, the factor of the error that all tests have in common, and probabilities.
+
+    The latter, (count,) both, are those at which exponents are beyond the data.
+    """
     from scipy.special import ndtri
     from scipy.stats import qmc
 
     mixture, generator = solution.mixture, np.random.default_rng(seed)
-    size = mixture.mean.shape[1] + 2
+    size = mixture.mean.shape[1] + 3
     if sampling == "random":
         uniform = generator.random((count, size))
     else:
@@ -266,59 +278,72 @@ def _points(solution: Solution, count: int, seed: list[int], sampling: Sampling)
     order = np.argsort(headline[:, 0], kind="stable")  # neighbours are alike, so that an even spread is one over them
     cumulative = np.cumsum(mixture.weights[order])
     selected = mixture[order[np.searchsorted(cumulative, uniform[:, 0] * mixture.weights.sum())]]
-    mean = selected.mean + np.einsum("mpq,mq->mp", selected.root, ndtri(uniform[:, 2:]))
+    mean = selected.mean + np.einsum("mpq,mq->mp", selected.root, ndtri(uniform[:, 3:]))
     points = replace(selected, mean=mean, root=np.zeros_like(selected.root), weights=np.full(count, 1 / count))
-    return points, np.asarray(1 + solution.model.common_error * ndtri(uniform[:, 1]))
+    return points, np.asarray(1 + solution.model.common_error * ndtri(uniform[:, 1])), uniform[:, 2]
 
 
 def _materials(solution: Solution, count: int, seed: list[int], sampling: Sampling) -> list[EnergyDraw]:
     """Return so many draws of a posterior as materials."""
     model = solution.model
-    points, factor = _points(solution, count, seed, sampling)
+    points, factor, probability = _points(solution, count, seed, sampling)
     values, _ = values_of(model, points, model.symbols)
     values = values * np.where(np.isin(model.symbols, model.column_symbols), factor[:, None], 1.0)
-    energies = _energies(model, points, factor, seed) if model.energy_symbols else [None] * count
+    energies = _energies(model, points, factor) if model.energy_symbols else [None] * count
     draws = []
     for number, (row, energy) in enumerate(zip(values, energies, strict=True)):
         parameters = dict(zip(model.symbols, map(float, row), strict=True))
         extra_term = model.discrepancy.material_part(parameters)
         base_term = model.material, tuple(parameters[symbol] for symbol in model.material_symbols)
         draws.append(EnergyDraw(number, (base_term, extra_term) if extra_term else (base_term,), energy))
-    return draws
+    return _continued(model, draws, points.member, scores(probability)) if points.member is not None else draws
 
 
-def _energies(
-    model: StatisticalModel, points: GaussianMixture, factor: FloatArray, seed: list[int]
-) -> list[PiecewiseEnergy]:
-    """Return the discrepancies of draws, over the states whose invariants were measured."""
-    generator, start = np.random.default_rng([*seed, 1]), len(model.linear)
-    grid = Coordinates(*(np.linspace(*ends, KNOTS) for ends in _ends(model.experiment)))
+def _energies(model: StatisticalModel, points: GaussianMixture, factor: FloatArray) -> list[PiecewiseEnergy]:
+    """Return the discrepancies of draws, over the range of the data."""
+    start = len(model.linear)
+    grid = Coordinates(*(np.linspace(*ends, KNOTS) for ends in _ends(model.experiment.states)))
     slopes = [np.zeros((KNOTS, len(factor))) for _ in grid]
     assert points.member is not None  # noqa: S101 (an energy discrepancy has members)
     for number in np.unique(points.member):
         rows, member, column = np.flatnonzero(points.member == number), model.energy_members[number], start
-        for block, (terms, count) in zip(member.amplitude_indices, member.slopes(grid), strict=True):
-            amplitude = points.settings[rows, model.nonlinear.index(model.energy_symbols[block])]
-            drawn = generator.standard_normal((len(rows), terms.invariant_1.shape[1] - count)) * amplitude[:, None]
-            weights = np.hstack([points.mean[rows, column : column + count], drawn]) * factor[rows, None]
+        for terms, count in member.slopes(grid):
+            weights = points.mean[rows, column : column + count] * factor[rows, None]
             column += count
             for slope, features in zip(slopes, terms, strict=True):
-                slope[:, rows] += features @ weights.T
+                slope[:, rows] += features[:, :count] @ weights.T
     functions = (pieces(knots, values) for knots, values in zip(grid, slopes, strict=True))
     return [PiecewiseEnergy(*terms) for terms in zip(*functions, strict=True)]
 
 
-def _ends(data: Experiment) -> Iterator[tuple[float, float]]:
-    """Return the ranges of I1 - 3, I2 - 3 and the logarithms of stretches in states whose invariants were measured.
+def _continued(
+    model: StatisticalModel, draws: Sequence[EnergyDraw], member: NDArray[np.intp], score: FloatArray
+) -> list[EnergyDraw]:
+    """Return draws with their continuations, of exponents whose errors have a score (N,)."""
+    continued = list(draws)
+    for limits, rows in model.by_limits(member):
+        if limits == Range():
+            continue
+        rays, of_rows = rays_to_ends(limits), [draws[row] for row in rows]
+        at_end, farther_in = np.split(_stress_within(of_rows, rays.last_states), 2, axis=1)
+        stretches = tuple(np.exp(rays.ends).T)
+        with np.errstate(invalid="ignore"):
+            energies = np.array([draw.energy(stretches) for draw in of_rows])
+        exponents = with_errors(rays.last_exponents(at_end, farther_in), score[rows, None])
+        is_known = np.isfinite([energies, at_end, *exponents]).all(axis=(0, 2))  # not where the material has locked
+        known = (values[is_known] for values in (energies, at_end, *exponents))
+        for row, continuation in zip(rows[is_known], continuations(rays, *known), strict=True):
+            continued[row] = replace(draws[row], continuation=continuation)
+    return continued
 
-    They reach a little farther, so that a slope at their ends is that of the draw and not of its continuation.
-    """
-    margin = 2 * LOG_STRAIN_STEP * np.array([-1, 1])
-    ranges = [data.states, *(mode.at(calibrated_range(data, mode) + margin) for mode in _curve_modes())]
-    logs = [states.log_stretches[0] for states in ranges]
-    for values in zip(*map(largest_invariants, ranges), strict=True):
-        yield 0.0, max(values)
-    yield min(float(values.min()) for values in logs), max(float(values.max()) for values in logs)
+
+def _ends(states: States) -> Iterator[tuple[float, float]]:
+    """Return the ranges of I1 - 3, I2 - 3 and the logarithms of stretches in states, with rounded corners."""
+    logs, rates = states.log_stretches
+    wider = np.exp(MAX_CORNER_EXCESS) * logs
+    for largest in largest_invariants(through(wider, rates)):
+        yield 0.0, largest
+    yield float(wider.min()), float(wider.max())
 
 
 def _curve_modes() -> list[LoadingMode]:

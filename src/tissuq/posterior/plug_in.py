@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
+from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
 from tissuq.inference.solution import Solution
 from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
@@ -20,8 +21,10 @@ __all__ = ["ErrorEstimates", "default_tolerances"]
 
 FloatArray = NDArray[np.float64]
 
-FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0])
+FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Factors of the spreads between specimens and tests that are tried."""
+MIN_PATH_COSINE = 0.999
+"""Of the angle between the Hencky strains of tests that follow one path, tension or compression."""
 CURVE_ITERATIONS = 3
 """Fits from which the mean curve and the level of the errors are found in turn."""
 PILOT_NOISE_SHARE = 0.03
@@ -64,13 +67,14 @@ class ErrorEstimates:
     def with_estimated_factor(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose spreads of the stress, between specimens and tests, are as large as several tests tell.
 
-        Tests in different modes do not tell it: an energy reconciles them whatever they differ by. They are the stated
-        ones times a factor, the root of its posterior mean square over a grid, under a prior of
-        mean square one, half Student's t with three degrees of freedom; at the noise that is likely without it.
+        Tests along different paths do not tell it: an energy reconciles them whatever they differ by, and what it
+        cannot (a direction of the tissue) is no spread. They are the stated ones times a factor, the root of its
+        posterior mean square over a grid, under a prior of mean square one, half Student's t with three degrees of
+        freedom; at the noise that is likely without it.
         """
-        stated = model.tolerances
-        is_told = len(model.experiment.tests) > 1 and len(model.experiment.modes) == 1
-        if not is_told or not (stated.stress or stated.test) or not self._has_evidence(model):
+        stated, has_several = model.tolerances, len(model.experiment.tests) > 1
+        has_spread = bool(stated.stress or stated.test)
+        if not (has_several and has_spread and self._has_evidence(model) and _are_alike(model.experiment)):
             return model
         model = self._with_curve(model)
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
@@ -164,3 +168,13 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
         return BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)
     is_told = len(model.experiment.tests) == 1 and (not model.noise.parameters or model.experiment.size > CHUNK)
     return Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
+
+
+def _are_alike(experiment: Experiment) -> bool:
+    """Return whether all tests follow one path from the reference, or its opposite."""
+    farthest = []
+    for test in experiment.tests:
+        logs = np.concatenate([path.at(test.stretch).log_stretches[0] for path in test.mode.paths])
+        sizes = np.linalg.norm(logs, axis=1)
+        farthest.append(logs[sizes.argmax()] / sizes.max())
+    return bool((np.abs(np.array(farthest) @ farthest[0]) > MIN_PATH_COSINE).all())

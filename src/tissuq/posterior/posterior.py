@@ -298,7 +298,7 @@ class Posterior:
         Returns
         -------
         pandas.DataFrame
-            Columns stretch, mean, low, high; MPa.
+            Columns stretch, median, low, high; MPa.
         """
         import pandas as pd
 
@@ -306,7 +306,7 @@ class Posterior:
         ratio = stress_ratio(stress_type, mode or self.model.experiment.modes[0], channel)
         table = pd.DataFrame(vars(predict_band(self.solution, stretch, **options, channel=channel)))
         factor = ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
-        table[["mean", "low", "high"]] *= np.asarray(factor)[:, None]
+        table[["median", "low", "high"]] *= np.asarray(factor)[:, None]
         return table
 
     def scores(
@@ -344,10 +344,9 @@ class Posterior:
     def ensemble(self, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True) -> Ensemble:
         """Return equally probable draws as complete materials, with the discrepancy in their energy.
 
-        They are for other programs and other loading modes: finite elements, material cards. Over all states whose
-        invariants were measured they carry the posterior's whole uncertainty; beyond, a discrepancy that is an energy
-        keeps the slopes dW/dI1, dW/dI2 and l dw/dl that it has at the end. Scatter of the stress (S, noise) is no
-        energy, and left out.
+        They are for other programs and other loading modes: finite elements, material cards. They carry the
+        posterior's whole uncertainty, within the measured range and beyond, where the energy goes on as in `predict`.
+        Scatter of the stress (S, noise) is no energy, and left out.
 
         Parameters
         ----------

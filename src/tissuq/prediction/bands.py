@@ -19,12 +19,14 @@ from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import stress_moments, stress_slopes, variance_of_noise
+from tissuq.prediction.moments import variance_of_noise
+from tissuq.prediction.stress import Stress
 
 __all__ = [
     "Band",
     "Mixtures",
     "asked_for",
+    "centre_and_ends",
     "inside_band",
     "predict_average",
     "predict_band",
@@ -38,6 +40,8 @@ FloatArray = NDArray[np.float64]
 
 MAX_PAIRS, MIN_COMPONENTS = 5_000_000, 200
 """Number of pairs of Gaussians, over all points, of a score; number to which a mixture is thinned at the most."""
+SMOOTHING = 0.01
+"""Standard deviation of a Gaussian in a quantile, at the least, over its mean or the spread of all."""
 MAX_STANDARD_SCORE = 30.0
 """Standard scores beyond which the tail of a Gaussian is nothing."""
 
@@ -69,7 +73,8 @@ class Mixtures:
 
         mean, centre = self.means, self.mean
         spread = np.sqrt(self.weights @ (self.variances + (mean - centre) ** 2))
-        sd = np.sqrt(np.maximum(self.variances, (0.01 * spread) ** 2))
+        smoothing = SMOOTHING * np.minimum(spread, np.abs(mean))
+        sd = np.sqrt(np.maximum(self.variances, smoothing**2))
         sd = np.maximum(sd, 1e-300)
         low, high = (mean - 10 * sd).min(axis=0), (mean + 10 * sd).max(axis=0)
         value = np.clip(centre + ndtri(probability) * spread, low, high)
@@ -79,7 +84,8 @@ class Mixtures:
             if np.abs(excess).max() < 1e-9:
                 break
             low, high = np.where(excess < 0, value, low), np.where(excess < 0, high, value)
-            density = self.weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
+            with np.errstate(over="ignore"):
+                density = self.weights @ (np.exp(-0.5 * scores**2) / sd) / np.sqrt(2 * np.pi)
             step = value - excess / np.maximum(density, 1e-300)
             value = np.where(
                 (step >= low) & (step <= high), step, 0.5 * (low + high)
@@ -132,10 +138,10 @@ COMPONENTS_OF_BLOCK, COMPONENTS_OF_MANY_BLOCKS = 1500, 200
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Mean and central interval of the stress (MPa) at stretches, all of shape (g,)."""
+    """Median and central interval of the stress (MPa) at stretches, all of shape (g,)."""
 
     stretch: FloatArray
-    mean: FloatArray
+    median: FloatArray
     low: FloatArray
     high: FloatArray
 
@@ -150,7 +156,7 @@ def predict_band(
     mode: str | LoadingMode | None = None,
     channel: int = 0,
 ) -> Band:
-    """Return the mean stress and the interval that holds ``prob`` of it, at each stretch.
+    """Return the median of the stress and the interval that holds ``prob`` of it, at each stretch.
 
     Parameters
     ----------
@@ -209,14 +215,19 @@ def predict_bands(
     """Return the bands of `predict_average` for new measurements, for the stress itself, or for both at once."""
     solutions = [solution for _, solution in weighted_solutions]
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
-    tails = (0.5 * (1 - prob), 0.5 * (1 + prob))
+    probabilities = centre_and_ends(prob)
     with one_thread():
         blocks = predictive_mixtures(
             weighted_solutions, points, loading, channel, discrepancy=discrepancy, noises=noises
         )
-        curves = [[(mixture.mean, *map(mixture.quantile, tails)) for mixture in mixtures] for mixtures in blocks]
+        curves = [[(*map(mixture.quantile, probabilities),) for mixture in mixtures] for mixtures in blocks]
     abscissa = loading.paths[channel].abscissa(points)
     return [Band(abscissa, *np.concatenate(of_noise, axis=1)) for of_noise in zip(*curves, strict=True)]
+
+
+def centre_and_ends(prob: float) -> tuple[float, float, float]:
+    """Return the probabilities below the median and the ends of a central interval."""
+    return 0.5, 0.5 * (1 - prob), 0.5 * (1 + prob)
 
 
 def predictive_mixtures(
@@ -231,15 +242,15 @@ def predictive_mixtures(
     """Yield the predictive distributions of a stress, with noise or without, at points of a mode, some at a time."""
     count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
     mixture = [
-        (weight, solution.model, solution.mixture.thinned(count).merged()) for weight, solution in weighted_solutions
+        (solution.model, (thinned := solution.mixture.thinned(count).merged()).weighted(weight * thinned.weights))
+        for weight, solution in weighted_solutions
     ]
-    weights = np.concatenate([weight * components.weights for weight, _, components in mixture])
     for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
         moments = [
             _moments(model, components, block, mode, channel, discrepancy=discrepancy, noises=noises)
-            for _, model, components in mixture
+            for model, components in mixture
         ]
-        mean, *variances = (np.concatenate(arrays) for arrays in zip(*moments, strict=True))
+        weights, mean, *variances = (np.concatenate(arrays) for arrays in zip(*moments, strict=True))
         yield [Mixtures(weights, mean, variance) for variance in variances]
 
 
@@ -315,24 +326,23 @@ def _moments(
     discrepancy: bool,
     noises: Sequence[bool],
 ) -> tuple[FloatArray, ...]:
-    """Return mean (M, g) of a stress at points of a mode and its variances (M, g), with noise or without.
+    """Return weights (M,) and means (M, g) of a stress at points of a mode and its variances, with noise or without.
 
     With noise they are those of a new test with its own errors.
     """
     states = model.experiment.states_at(points, mode, channel)
-    mean, of_stress = stress_moments(model, components, states, discrepancy=discrepancy, noise=False)
+    stress = Stress(model, components, discrepancy)
+    components, mean, of_stress = stress.at(states)
     of_stress = of_stress + (model.common_error * mean) ** 2
     if not any(noises):
-        return mean, *(of_stress for _ in noises)
+        return components.weights, mean, *(of_stress for _ in noises)
     of_measurements = of_stress + variance_of_noise(model, components, states, mean)
     if model.tolerances:
-        slope: FloatArray | float = 0.0
-        if model.tolerances.need_slope:
-            slope = stress_slopes(model, components, states, mean, discrepancy=discrepancy)
+        slope = stress.slopes(states, mean) if model.tolerances.need_slope else 0.0
         largest = float(np.abs(model.experiment.measured).max())  # as the band is one at each point by itself
         error_points = ErrorPoints(mode, points, mean, slope, largest)
         of_measurements = of_measurements + model.tolerances.variance(error_points)
-    return mean, *(of_measurements if noise else of_stress for noise in noises)
+    return components.weights, mean, *(of_measurements if noise else of_stress for noise in noises)
 
 
 def _only_mode(experiment: Experiment) -> LoadingMode:

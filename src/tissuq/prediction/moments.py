@@ -15,6 +15,7 @@ from tissuq.inference.linear import SpectralCovariance
 from tissuq.inference.reduction import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
+from tissuq.mechanics.rays import Rays, scores, share_to_end, through, with_errors
 from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -27,12 +28,14 @@ __all__ = [
     "conditioned_jointly",
     "correlated_groups",
     "drawn_curves",
+    "drawn_stress",
     "level_of_errors",
     "mean_curve",
     "mean_curve_and_slopes",
     "mean_stress",
     "stress_moments",
     "stress_slopes",
+    "stresses_beyond",
     "values_of",
     "variance_of_noise",
 ]
@@ -243,25 +246,72 @@ def drawn_curves(
     Scatter that is independent from point to point is no curve, and left out. At states of no measured curve, so is a
     discrepancy that is no energy.
     """
-    generator, settings = np.random.default_rng([seed, 11]), components.settings
+    generator = np.random.default_rng([seed, 11])
     score = generator.standard_normal(components.mean.shape)
     linear = components.mean + np.einsum("mpq,mq->mp", components.root, score)
-    drawn, _ = coefficients(model, replace(components, mean=linear))
-    terms = basis_of(model, states, settings) * drawn[:, None, :]
-    is_material = np.isin(model.column_symbols, model.material_symbols)
-    material_stress, discrepancy_stress = terms[..., is_material].sum(axis=2), terms[..., ~is_material].sum(axis=2)
+    drawn = replace(components, mean=linear)
+    material_stress, discrepancy_stress = _drawn_within(model, drawn, states)
     if components.member is not None:
-        with one_thread():
-            for shift, rows in _drawn_energies(model, linear, components, states):
-                discrepancy_stress[rows] += shift
+        for at, stress in stresses_beyond(model, drawn, states, generator.random(len(linear))):
+            discrepancy_stress[at] = stress - material_stress[at]
     if model.is_correlated and states.is_measured:
-        for group in correlated_groups(model, settings):
-            shift, covariance = conditioned_jointly(model, group, states, drawn[group.components])
+        coefficients_drawn, _ = coefficients(model, drawn)
+        for group in correlated_groups(model, components.settings):
+            shift, covariance = conditioned_jointly(model, group, states, coefficients_drawn[group.components])
             values, vectors = np.linalg.eigh(covariance)
             score = generator.standard_normal(shift.shape)
             discrepancy_stress[group.components] += shift + np.einsum(
                 "ngk,nk->ng", vectors * np.sqrt(np.maximum(values, 0))[:, None], score
             )
+    return material_stress, discrepancy_stress
+
+
+def drawn_stress(
+    model: StatisticalModel, drawn: GaussianMixture, states: States, probability: FloatArray
+) -> FloatArray:
+    """Return the stress (M, g) of draws, within the range of the data and beyond (`stresses_beyond`)."""
+    with np.errstate(over="ignore", invalid="ignore"):  # of what is replaced
+        total = np.sum(_drawn_within(model, drawn, states), axis=0)
+    for at, stress in stresses_beyond(model, drawn, states, probability):
+        total[at] = stress
+    return np.asarray(total)
+
+
+def stresses_beyond(
+    model: StatisticalModel, drawn: GaussianMixture, states: States, probability: FloatArray
+) -> Iterator[tuple[tuple[NDArray[np.intp], ...], FloatArray]]:
+    """Yield indices of draws and states (g,) beyond the range of the data, and the stresses there.
+
+    They go on along rays (`tissuq.mechanics.rays`), their exponents with errors at probabilities (M,). The draws of
+    the linear parameters are the means of the components, which have members.
+    """
+    assert drawn.member is not None  # noqa: S101 (the caller has looked)
+    (logs, rates), score = states.log_stretches, scores(probability)
+    for limits, rows in model.by_limits(drawn.member):
+        share = share_to_end(logs, limits)[:, None]
+        (beyond,) = np.nonzero(share[:, 0] < 1)
+        if len(beyond):
+            rays = Rays((share * logs)[beyond], logs[beyond])
+            last = States.joined([through(rays.ends, rates[beyond]), rays.last_states])
+            material_stress, discrepancy_stress = _drawn_within(model, drawn[rows], last)
+            stress, at_end, farther_in = np.split(material_stress + discrepancy_stress, 3, axis=1)
+            exponents = with_errors(rays.last_exponents(at_end, farther_in), score[rows, None])
+            yield np.ix_(rows, beyond), stress * rays.growth(*exponents)
+
+
+def _drawn_within(model: StatisticalModel, drawn: GaussianMixture, states: States) -> tuple[FloatArray, FloatArray]:
+    """Return stresses (M, g) of the material and of discrepancies that are means or energies, in the range of the data.
+
+    The linear parameters are the means of the components.
+    """
+    values, _ = coefficients(model, drawn)
+    terms = basis_of(model, states, drawn.settings) * values[:, None, :]
+    is_material = np.isin(model.column_symbols, model.material_symbols)
+    material_stress, discrepancy_stress = terms[..., is_material].sum(axis=2), terms[..., ~is_material].sum(axis=2)
+    if drawn.member is not None:
+        with one_thread():
+            for _, rows, features, weights in _energy_terms(model, drawn, states):
+                discrepancy_stress[rows] += drawn.mean[rows, weights] @ side_by_side(features, len(states)).T
     return material_stress, discrepancy_stress
 
 
@@ -296,14 +346,6 @@ def _energies(
         root = components.root[rows, weights]
         width = int(np.flatnonzero(root.any(axis=(0, 1))).max(initial=-1)) + 1
         yield components.mean[rows, weights] @ all_terms.T, all_terms @ root[:, :, :width], variance, rows
-
-
-def _drawn_energies(
-    model: StatisticalModel, linear: FloatArray, components: GaussianMixture, states: States
-) -> Iterator[tuple[FloatArray, NDArray[np.intp]]]:
-    """Yield the stresses (N, g) of energy discrepancies with drawn weights in `linear`, and whose they are."""
-    for _, rows, features, weights in _energy_terms(model, components, states):
-        yield linear[rows, weights] @ side_by_side(features, len(states)).T, rows
 
 
 def _energy_terms(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Curve
 from tissuq.inference.solution import Solution
-from tissuq.prediction.bands import asked_for, predictive_mixtures
+from tissuq.prediction.bands import asked_for, centre_and_ends, predictive_mixtures
 
 __all__ = ["Judged", "interval_score", "judged", "root_mean_square"]
 
@@ -38,15 +38,15 @@ class Judged:
     ----------
     points : (n,) or (n, c) array
         Of the loading mode.
-    measured, mean, low, high, crps : (n,) array
-        The measurement; mean and ends of the predictive interval; the score of the distribution (`Mixtures.crps`).
+    measured, median, low, high, crps : (n,) array
+        The measurement; median and ends of the predictive interval; the score of the distribution (`Mixtures.crps`).
     prob : float
         Probability of the interval.
     """
 
     points: FloatArray
     measured: FloatArray
-    mean: FloatArray
+    median: FloatArray
     low: FloatArray
     high: FloatArray
     crps: FloatArray
@@ -59,7 +59,7 @@ class Judged:
 
     def times(self, ratio: FloatArray) -> Judged:
         """Return the same of stresses that are so many times (n,) those here."""
-        names = ("measured", "mean", "low", "high", "crps")
+        names = ("measured", "median", "low", "high", "crps")
         return replace(self, **{name: getattr(self, name) * ratio for name in names})
 
     def where(self, selected: NDArray[np.bool_]) -> Judged:
@@ -71,7 +71,7 @@ class Judged:
         """Return the scores of all together; nan where there are no measurements.
 
         ``inside``, the share of measurements in the interval; root mean squares of the interval's half width
-        (``half_width``) and of the mean's error (``error``), over that of the measurements; and the means of ``crps``
+        (``half_width``) and of the median's error (``error``), over that of the measurements; and the means of ``crps``
         and ``interval_score``, MPa.
         """
         if not len(self.measured):
@@ -80,7 +80,7 @@ class Judged:
         return {
             "inside": float(self.is_inside.mean()),
             "half_width": root_mean_square(0.5 * (self.high - self.low)) / size,
-            "error": root_mean_square(self.mean - self.measured) / size,
+            "error": root_mean_square(self.median - self.measured) / size,
             "crps": float(self.crps.mean()),
             "interval_score": float(interval_score(self.low, self.high, self.measured, self.prob).mean()),
         }
@@ -106,10 +106,9 @@ def judged(solution: Solution, curve: Curve, *, discrepancy: bool = True, prob: 
     for (mixture,) in blocks:
         block = measured[start : start + mixture.means.shape[1]]
         start += len(block)
-        ends = (mixture.quantile(0.5 * (1 - prob)), mixture.quantile(0.5 * (1 + prob)))
-        rows.append([mixture.mean, *ends, mixture.crps(block)])
-    mean, low, high, crps = np.concatenate(rows, axis=1)
-    return Judged(points, measured, mean, low, high, crps, prob)
+        rows.append([*map(mixture.quantile, centre_and_ends(prob)), mixture.crps(block)])
+    median, low, high, crps = np.concatenate(rows, axis=1)
+    return Judged(points, measured, median, low, high, crps, prob)
 
 
 def root_mean_square(values: FloatArray) -> float:

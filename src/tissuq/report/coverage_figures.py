@@ -177,7 +177,7 @@ def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
         row[0].set_title(_labels(table)[0])
     axes[-1][1].set_xlim(left=0)
     axes[-1][0].set_xlabel(f"true stress in the {100 * prob:g} % band [%]")
-    axes[-1][1].set_xlabel("median error of the predicted mean [%]")
+    axes[-1][1].set_xlabel("median error of the predicted median [%]")
     legend_above(figure, axes[0][:1], font_size=10)
     return figure
 

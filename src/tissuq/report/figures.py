@@ -98,8 +98,8 @@ def predictive_figure(
                 _shade_instability(axis, posterior, curve.mode.name, band.stretch)
             if name != "none" and base:
                 none = base[index % len(curves)]
-                mean = none.mean / unit.to_mpa
-                axis.plot(none.stretch, mean, ":", color=BASE, lw=1.4, label="mean of the fit 'none'")
+                median = none.median / unit.to_mpa
+                axis.plot(none.stretch, median, ":", color=BASE, lw=1.4, label="median of the fit 'none'")
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
             _draw_measured(axis, curve.abscissa, curve.stress / unit.to_mpa)
@@ -210,9 +210,9 @@ def _columns(count: int) -> int:
 
 
 def _draw_band(axis: Axes, band: Band, unit: StressUnit) -> None:
-    low, high, mean = band.low / unit.to_mpa, band.high / unit.to_mpa, band.mean / unit.to_mpa
+    low, high, median = (values / unit.to_mpa for values in (band.low, band.high, band.median))
     axis.fill_between(band.stretch, low, high, color=BAND, alpha=0.22, lw=0, label="95 % predictive band")
-    axis.plot(band.stretch, mean, color=BAND, lw=1.6, label="predicted mean")
+    axis.plot(band.stretch, median, color=BAND, lw=1.6, label="predicted median")
 
 
 def _shade_instability(axis: Axes, posterior: Posterior, mode: str, stretch: FloatArray) -> None:

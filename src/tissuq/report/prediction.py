@@ -73,7 +73,7 @@ def _draw(axis: Axes, prediction: Prediction, channel: int, kind: bool) -> None:
         else:
             axis.vlines(abscissa[order], low, high, color=BAND, alpha=strength, lw=5, label=label)
     style: dict[str, Any] = {"ls": "-", "lw": 1.6} if is_path else {"ls": "", "marker": "_", "ms": 7}
-    axis.plot(abscissa[order], stress.mean[order], color=BAND, label="predicted mean", **style)
+    axis.plot(abscissa[order], stress.median[order], color=BAND, label="predicted median", **style)
     axis.set_xlim(*_padded(abscissa.min(), abscissa.max()))
     axis.locator_params(axis="x", nbins=6)
     _shade(axis, prediction)
@@ -93,7 +93,7 @@ def _drawn(prediction: Prediction, channel: int, kind: bool, noise: bool) -> Ban
     low, high = _limits(prediction, channel)
     band = prediction.curves[channel, kind, noise]
     ends = low - 5 * (high - low), high + 5 * (high - low)
-    drawn = (np.clip(stress / prediction.unit.to_mpa, *ends) for stress in (band.mean, band.low, band.high))
+    drawn = (np.clip(stress / prediction.unit.to_mpa, *ends) for stress in (band.median, band.low, band.high))
     return Band(band.stretch, *drawn)
 
 
@@ -228,8 +228,8 @@ def band_headers(prediction: Prediction) -> list[str]:
     stress_column = ["measured"] * (len(prediction.stresses) > 1)
     names = [control.name for control in prediction.mode.controls]
     share = f"{100 * prediction.prob:.4g} %"
-    bands = ["mean", f"{share} of the stress", f"{share} of measurements"]
-    bands_alone = ["alone: mean", "alone: stress", "alone: measurements"] if prediction.kinds[0] else []
+    bands = ["median", f"{share} of the stress", f"{share} of measurements"]
+    bands_alone = ["alone: median", "alone: stress", "alone: measurements"] if prediction.kinds[0] else []
     return [*names, *stress_column, *bands, *bands_alone, "calibrated"]
 
 
@@ -244,7 +244,7 @@ def readable_bands(prediction: Prediction) -> list[list[str]]:
             cells += [name] * (len(prediction.stresses) > 1)
             for kind in prediction.kinds:
                 stress, noisy = (prediction.curves[channel, kind, noise] for noise in (False, True))
-                cells += [_mean(stress, index, scale), _ends(stress, index, scale), _ends(noisy, index, scale)]
+                cells += [_median(stress, index, scale), _ends(stress, index, scale), _ends(noisy, index, scale)]
             rows.append([*cells, "yes" if prediction.is_calibrated[index] else "no"])
     return rows
 
@@ -296,11 +296,11 @@ def _stress(value: float) -> str:
     return significant(value) if abs(value) < MAX_STRESS else f"{value:.0e}"
 
 
-def _mean(band: Band, index: int, scale: float) -> str:
-    mean, width = (float(stress[index]) / scale for stress in (band.mean, band.high - band.low))
-    if max(abs(mean), width) < MIN_STRESS:
+def _median(band: Band, index: int, scale: float) -> str:
+    median, width = (float(stress[index]) / scale for stress in (band.median, band.high - band.low))
+    if max(abs(median), width) < MIN_STRESS:
         return "0"
-    return interval(mean, mean, width / 4)[0] if abs(mean) < MAX_STRESS else f"{mean:.0e}"
+    return interval(median, median, width / 4)[0] if abs(median) < MAX_STRESS else f"{median:.0e}"
 
 
 def _ends(band: Band, index: int, scale: float) -> str:
@@ -374,8 +374,8 @@ def _lead_of_bands(prediction: Prediction) -> str:
     texts = []
     for channel, name in enumerate(prediction.stresses):
         band, scale = prediction.curves[channel, prediction.kinds[0], False], prediction.unit.to_mpa
-        mean, ends = (words(band, index, scale) for words in (_mean, _ends))
-        texts.append(f"the {name} is {mean} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
+        median, ends = (words(band, index, scale) for words in (_median, _ends))
+        texts.append(f"the {name} is {median} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
     extrapolated = "" if len(calibrated) else ", which is outside the measured range"
     kind = _kind(prediction, prediction.kinds[0])
     return f"At {point_words} in mode {prediction.mode.name}{extrapolated}, {' and '.join(texts)}: {kind}."

@@ -54,7 +54,7 @@ class Prediction:
     kinds : tuple of bool
         With the discrepancy and without, as far as they differ and the discrepancy says something about the mode.
     curves : mapping of (int, bool, bool) to Band
-        Mean, low and high (MPa) by number of the stress, with the discrepancy or not, and with noise or not.
+        Median, low and high (MPa) by number of the stress, with the discrepancy or not, and with noise or not.
     data : Experiment, optional
         The measurements that it is compared with.
     scores : pandas.DataFrame, optional
@@ -81,7 +81,7 @@ class Prediction:
 
     @cached_property
     def bands(self) -> Mapping[tuple[int, bool, bool], pd.DataFrame]:
-        """The `curves` as tables with the columns stretch, mean, low and high."""
+        """The `curves` as tables with the columns stretch, median, low and high."""
         import pandas as pd
 
         return {key: pd.DataFrame(vars(band)) for key, band in self.curves.items()}
@@ -124,9 +124,9 @@ class Prediction:
     def table(self) -> pd.DataFrame:
         """All bands, MPa: a row for every stress and point.
 
-        Columns measured (of several stresses), stretch (and stretch2), is_calibrated; mean, low, high of the stress
+        Columns measured (of several stresses), stretch (and stretch2), is_calibrated; median, low, high of the stress
         with the discrepancy and predictive_low, predictive_high of a measurement of it; and the same of the material
-        alone, from alone_mean on.
+        alone, from alone_median on.
         """
         import pandas as pd
 
@@ -141,7 +141,7 @@ class Prediction:
             for kind in self.kinds:
                 prefix = "" if kind else "alone_"
                 stress, noisy = (self.curves[channel, kind, noise] for noise in (False, True))
-                columns |= {f"{prefix}{end}": getattr(stress, end) for end in ("mean", "low", "high")}
+                columns |= {f"{prefix}{end}": getattr(stress, end) for end in ("median", "low", "high")}
                 columns |= {f"{prefix}predictive_{end}": getattr(noisy, end) for end in ("low", "high")}
             label = {"measured": name} if len(self.stresses) > 1 else {}
             values = (column.tolist() for column in columns.values())
@@ -165,11 +165,11 @@ class Prediction:
         shape = len(self.kinds), 2, len(self.stresses), len(self.points)
         arrays = {
             end: np.reshape([getattr(self.curves[channel, kind, noise], end) for kind, noise, channel in order], shape)
-            for end in ("mean", "low", "high")
+            for end in ("median", "low", "high")
         }
         mpa, dims = {"units": "MPa"}, ("discrepancy", "noise", "stress", along)
         by_name: dict[str, Any] = {
-            "mean": ((dims[0], *dims[2:]), arrays["mean"][:, 0], mpa | {"long_name": "mean stress"}),
+            "median": (dims, arrays["median"], mpa | {"long_name": "median stress"}),
             "low": (dims, arrays["low"], mpa | {"long_name": f"lower end of the {self.prob:.12g} interval"}),
             "high": (dims, arrays["high"], mpa | {"long_name": f"upper end of the {self.prob:.12g} interval"}),
             "is_calibrated": (along, self.is_calibrated.astype(np.int8), {"units": "1"}),
@@ -272,16 +272,16 @@ def _bands(
     prob: float,
     stress_type: str,
 ) -> dict[bool, Band]:
-    """Return mean, low and high of a stress at points, without noise and with it; refuse what is no number."""
+    """Return median, low and high of a stress at points, without noise and with it; refuse what is no number."""
     options: dict[str, Any] = {"discrepancy": kind, "prob": prob, "mode": mode, "channel": channel}
     ratio, noises = stress_ratio(stress_type, mode, channel)(grid), (False, True)
     with np.errstate(over="ignore", invalid="ignore"):
         bands = [
-            replace(band, mean=ratio * band.mean, low=ratio * band.low, high=ratio * band.high)
+            replace(band, median=ratio * band.median, low=ratio * band.low, high=ratio * band.high)
             for band in predict_bands([(1.0, posterior.solution)], grid, noises, **options)
         ]
     for band in bands:
-        is_finite = np.isfinite([band.mean, band.low, band.high]).all(axis=0)
+        is_finite = np.isfinite([band.median, band.low, band.high]).all(axis=0)
         if not is_finite.all():
             value = grid.reshape(len(grid), -1)[~is_finite, 0][0]
             raise ModelError(

@@ -88,14 +88,12 @@ class NoiseGrid:
     def _sum(self, model: StatisticalModel, seed: int) -> Solution:
         known: dict[float, Solution] = {}
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
-        of_tests = model.noise.of_tests(model.experiment)
-        scatter = float(np.exp(np.log(of_tests).mean()))
-        ratios = of_tests / scatter
+        _, mean_sd = model.noise_of_tests
 
         def log_weight(of: StatisticalModel, log_noise: float) -> float:
             """Return the logarithm of the posterior density of the logarithm of the noise, up to a constant."""
             noise_sd = np.exp(log_noise)
-            known[log_noise] = self.solve_known(with_known_noise(of, noise_sd * ratios))
+            known[log_noise] = self.solve_known(at_noise(of, noise_sd))
             log_evidence = known[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
@@ -103,7 +101,7 @@ class NoiseGrid:
 
         largest = float(np.abs(model.experiment.measured).max())
         ends = _ends(model.priors[SYMBOL])
-        high = np.log(END_FACTOR * (model.fitted_errors.level or scatter))
+        high = np.log(END_FACTOR * (model.fitted_errors.level or mean_sd))
         low = min(np.log((model.tolerances.resolution or MIN_NOISE_SHARE) * largest / END_FACTOR), high - MAX_STEP)
         low, high = (low, high) if ends[0] < high and low < ends[1] else ends
         first = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
@@ -120,12 +118,17 @@ def with_known_noise(model: StatisticalModel, noise_sd: FloatArray) -> Statistic
     return replace(model, noise=noise_named(sds), chosen_priors=priors, fitted_errors=errors)
 
 
+def at_noise(model: StatisticalModel, noise_sd: float) -> StatisticalModel:
+    """Return a model with its noise known, that of every test in proportion to a common noise_sd."""
+    of_tests, mean_sd = model.noise_of_tests
+    return with_known_noise(model, noise_sd / mean_sd * of_tests)
+
+
 def at_level(model: StatisticalModel) -> StatisticalModel:
     """Return a model that is summed over its noise with this known, at the level that was estimated; others as are."""
     if NoiseGrid.why_not(model) or not model.fitted_errors.level:
         return model
-    of_tests = model.noise.of_tests(model.experiment)
-    return with_known_noise(model, np.asarray(model.fitted_errors.level * of_tests / np.exp(np.log(of_tests).mean())))
+    return at_noise(model, model.fitted_errors.level)
 
 
 def _ends(prior: Prior) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import States
 from tissuq.mechanics.invariants import invariant_rates, invariants
+from tissuq.mechanics.rays import Range
 from tissuq.model.discrepancy.processes import pinned_squared_exponential
 
 __all__ = [
@@ -64,6 +65,10 @@ class EnergyBlock(ABC):
         """Return the range of the block's coordinate over states (n,); the reference, zero, is in it."""
 
     @abstractmethod
+    def limits(self, reach: tuple[float, float]) -> Range:
+        """Return between which states the coordinate is within the reach."""
+
+    @abstractmethod
     def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
         """Return the engineering stresses (n, r) of the terms dW_k (c = 1) at states (n,).
 
@@ -95,6 +100,9 @@ class ZeroModulusBlock(EnergyBlock):
 
     def reach(self, states: States) -> tuple[float, float]:
         return 0.0, 1.0
+
+    def limits(self, reach: tuple[float, float]) -> Range:
+        return Range()
 
     def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
         rate_1, rate_2 = invariant_rates(states)
@@ -192,6 +200,9 @@ class InvariantBlock(ProcessBlock):
         values = self.terms(z, reach, length, _joined(reach, z))
         return coordinates.nothing(values.shape[1])._replace(invariant_1=values)
 
+    def limits(self, reach: tuple[float, float]) -> Range:
+        return Range(invariant_1=reach[1])
+
     def coordinate(self, x: FloatArray) -> FloatArray:
         """Return the coordinate of x = I1 - 3; here itself."""
         return x
@@ -214,6 +225,9 @@ class LogBlock(InvariantBlock):
     name = "log"
     formula = "W1 = c g(log(1 + x)), cov g squared exponential given g(0) = 0, x = I1 - 3"
     lengths = (0.15, 0.36, 0.83, 2.0)
+
+    def limits(self, reach: tuple[float, float]) -> Range:
+        return Range(invariant_1=float(np.expm1(reach[1])))
 
     def coordinate(self, x: FloatArray) -> FloatArray:
         return np.log1p(x)
@@ -249,6 +263,9 @@ class SecondInvariantBlock(ProcessBlock):
         (_, y), (rate_1, rate_2) = invariants(states), invariant_rates(states)
         return np.stack([np.maximum(y, 0.0), np.zeros_like(y)], axis=1), np.stack([rate_2, -rate_1], axis=1)
 
+    def limits(self, reach: tuple[float, float]) -> Range:
+        return Range(invariant_2=reach[1])
+
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
         wider = _joined(reach, coordinates.invariant_2)
         values, start = (self.terms(y, reach, length, wider) for y in (coordinates.invariant_2, np.zeros(1)))
@@ -264,6 +281,9 @@ class SeparableBlock(ProcessBlock):
 
     def coordinates(self, states: States) -> tuple[FloatArray, FloatArray]:
         return states.log_stretches
+
+    def limits(self, reach: tuple[float, float]) -> Range:
+        return Range(logarithms=reach)
 
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
         values = self.terms(coordinates.logarithm, reach, length, _joined(reach, coordinates.logarithm))

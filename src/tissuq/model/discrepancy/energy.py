@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import product
 from typing import ClassVar, NamedTuple
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
 from tissuq.mechanics.invariants import invariant_rates, invariants
+from tissuq.mechanics.rays import Range
 from tissuq.model.discrepancy.blocks import (
     Coordinates,
     EnergyBlock,
@@ -80,6 +82,11 @@ class Member:
     def scaled_blocks(self) -> list[tuple[EnergyBlock, tuple[float, float], float]]:
         """Each block with its reach and its length scale."""
         return list(zip(self.blocks, self.reaches, self.lengths, strict=True))
+
+    @property
+    def limits(self) -> Range:
+        """Between which states the data speak of its blocks."""
+        return reduce(Range.within, (block.limits(reach) for block, reach, _ in self.scaled_blocks), Range())
 
     def stress_features(self, states: States) -> list[FloatArray]:
         """Return the engineering stresses (n, r) of each block's terms."""

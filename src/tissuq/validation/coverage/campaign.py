@@ -66,7 +66,7 @@ def stress_unseen(
     band = fit.predict(stretch, discrepancy=is_energy, noise=False, prob=prob, mode=mode)
     stress = truth.stress(mode, stretch)
     share = np.mean((band["low"] <= stress) & (stress <= band["high"]))
-    return float(share), float(np.linalg.norm(band["mean"] - stress) / np.linalg.norm(stress))
+    return float(share), float(np.linalg.norm(band["median"] - stress) / np.linalg.norm(stress))
 
 
 def unseen_stretches(measured: LoadingMode, stretch: FloatArray, mode: LoadingMode) -> FloatArray:

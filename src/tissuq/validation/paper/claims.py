@@ -25,7 +25,7 @@ class Finding:
     inside_model_only: float
     band_width: float
     mean_shift: float
-    """Largest distance of the predicted mean from that of no discrepancy, relative to the largest stress."""
+    """Largest distance of the predicted median from that of no discrepancy, relative to the largest stress."""
     log_evidence: float | None
 
     @property
@@ -48,7 +48,7 @@ def find(posterior: Posterior, truth: float, base: Band | None = None) -> Findin
     data = posterior.model.experiment
     low, high = posterior.solution.marginals["C10"].hdi()
     band = predict_band(posterior.solution, data.stretch)
-    shift = np.abs(band.mean - base.mean).max() / np.abs(data.stress).max() if base else 0.0
+    shift = np.abs(band.median - base.median).max() / np.abs(data.stress).max() if base else 0.0
     return Finding(
         low=low,
         high=high,

@@ -1,0 +1,120 @@
+"""The energy of a draw beyond the range of its data, where it goes on along rays (`tissuq.mechanics.rays`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes.path import STEP
+from tissuq.mechanics.arithmetic import exp, library, log
+from tissuq.mechanics.material import Material
+from tissuq.mechanics.pieces import PiecewiseEnergy
+from tissuq.mechanics.rays import DIRECTIONS, Range, Rays, direction_of_angle, ends_of, log_growth
+
+__all__ = ["Continuation", "continuations", "rays_to_ends", "sum_of_energies"]
+
+FloatArray = NDArray[np.float64]
+
+TINY = 1e-30
+"""Keeps the direction of no strain a number."""
+SHARES, WEIGHTS = 0.5 * (np.polynomial.legendre.leggauss(8) + np.array([[1.0], [0.0]]))
+"""Nodes and weights of the integral over s, from 0 to 1."""
+ANY_STRETCHES = (1.25, 1.0, 0.8)
+"""Of which an energy is computed in place of those that are not asked for."""
+
+
+class Continuation(NamedTuple):
+    """W = W_c + the integral over x = I1 - 3 from x_c of V_c exp(a s + b s^2 / (s + d)), s = ln(x / x_c), for x > x_c.
+
+    ln x_c, W_c, V_c, a and b are functions of the direction c of the Hencky strain (`rays.DIRECTIONS`). Arrays of
+    NumPy (also complex ones) and of JAX pass through, which may trace the fields.
+
+    Attributes
+    ----------
+    coefficients : (5, 4, g) array
+        Of the five functions on equal pieces of c from -1 to 1, the highest power of the distance first.
+    """
+
+    coefficients: Any
+
+    def __call__(self, energy: Callable[[tuple[Any, ...]], Any], stretches: tuple[Any, ...]) -> Any:
+        """Return an energy (MPa) at principal stretches whose product is one, continued where they lie beyond."""
+        arrays = library(stretches[0])
+        invariant, direction = _invariant_and_direction(stretches)
+        is_beyond = invariant.real > exp(self._functions(direction)[0]).real
+        within = tuple(arrays.where(is_beyond, 1.0, stretch) for stretch in stretches)
+        pairs = zip(stretches, ANY_STRETCHES, strict=True)
+        beyond = tuple(arrays.where(is_beyond, stretch, any_stretch) for stretch, any_stretch in pairs)
+        return arrays.where(is_beyond, self._beyond(*_invariant_and_direction(beyond)), energy(within))
+
+    def stress(self, logs: FloatArray, rates: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+        """Return which states (n, 3) lie beyond, and their stresses, which are the work on the rates (n, 3)."""
+        invariant, direction = _invariant_and_direction(np.exp(logs).T)
+        (beyond,) = np.nonzero(invariant > np.exp(self._functions(direction)[0]))
+        stretches = np.exp(logs[beyond] + 1j * STEP * rates[beyond]).T
+        return beyond, np.asarray(self._beyond(*_invariant_and_direction(stretches)).imag / STEP)
+
+    def _beyond(self, invariant: Any, direction: Any) -> Any:
+        log_end, energy, slope, exponent, error = self._functions(direction)
+        distance = log(invariant) - log_end
+        nodes = SHARES * distance[..., None]
+        mean = (WEIGHTS * exp(nodes + log_growth(nodes, exponent[..., None], error[..., None]))).sum(-1)
+        return energy + slope * exp(log_end) * distance * mean
+
+    def _functions(self, direction: Any) -> tuple[Any, ...]:
+        arrays, count = library(direction), self.coefficients.shape[-1]
+        position = 0.5 * (direction.real + 1) * count
+        piece = arrays.clip(arrays.floor(position), 0, count - 1).astype(int)
+        u = direction - (-1 + piece * (2 / count))
+        return tuple(
+            ((a * u + b) * u + c) * u + d
+            for a, b, c, d in ((arrays.asarray(power)[piece] for power in powers) for powers in self.coefficients)
+        )
+
+
+def _invariant_and_direction(stretches: Any) -> tuple[Any, Any]:
+    """Return I1 - 3 and the c of the direction of the Hencky strain."""
+    l1, l2, l3 = stretches
+    e1, e2, e3 = (log(stretch) for stretch in stretches)
+    size = (e1 * e1 + e2 * e2 + e3 * e3 + TINY) ** 1.5
+    return l1 * l1 + l2 * l2 + l3 * l3 - 3, 3 * 6**0.5 * e1 * e2 * e3 / size
+
+
+def sum_of_energies(
+    materials: Sequence[Material],
+    values: Sequence[Any],
+    stretches: tuple[Any, ...],
+    discrepancy: PiecewiseEnergy | None,
+    continuation: Continuation | None,
+) -> Any:
+    """Return the energy (MPa) of materials and a discrepancy at principal stretches whose product is one."""
+
+    def energy(within: tuple[Any, ...]) -> Any:
+        total = sum(material.energy(within, numbers) for material, numbers in zip(materials, values, strict=True))
+        return total if discrepancy is None else total + discrepancy(within)
+
+    return energy(stretches) if continuation is None else continuation(energy, stretches)
+
+
+def rays_to_ends(limits: Range) -> Rays:
+    """Return rays in all directions, by c from -1 to 1, to the ends of a range."""
+    ends = ends_of(limits)[:, None] * direction_of_angle(np.arccos(DIRECTIONS) / 3)
+    return Rays(ends, ends)
+
+
+def continuations(
+    rays: Rays, energies: FloatArray, stresses: FloatArray, exponents: FloatArray, errors: FloatArray
+) -> list[Continuation]:
+    """Return the continuations of draws from what they have at the ends of `rays_to_ends`: (N, g) each.
+
+    Energies, stresses along the rays, and the exponents with their errors.
+    """
+    from scipy.interpolate import Akima1DInterpolator
+
+    log_invariant = np.broadcast_to(np.log(np.expm1(2 * rays.ends).sum(axis=1)), energies.shape)
+    values = np.stack([log_invariant, energies, stresses / rays.end_rate, exponents, errors], axis=-1)
+    functions = Akima1DInterpolator(DIRECTIONS, values, axis=1)
+    return [Continuation(np.ascontiguousarray(np.moveaxis(draw, -1, 0))) for draw in np.moveaxis(functions.c, 2, 0)]

@@ -1,0 +1,221 @@
+"""Rays of deformation, whose logarithmic (Hencky) strains differ by a factor, and how an energy goes on along them.
+
+Uniaxial, equibiaxial and planar tension and simple shear each follow one ray. With x = I1 - 3 along a ray and
+V = dW/dx, which of a neo-Hookean material is constant, an energy that is known up to x_c goes on with
+V = V_c exp(a s + b s^2 / (s + d)), s = ln(x / x_c). That is a power of x whose exponent is at first a, that of the last
+part of the ray, and beyond a distance d becomes a + b, with an error b that the data do not tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import Deformation, Path, States
+from tissuq.mechanics.arithmetic import exp
+
+__all__ = [
+    "DIRECTIONS",
+    "MAX_CORNER_EXCESS",
+    "Range",
+    "Rays",
+    "direction_of_angle",
+    "ends_of",
+    "log_growth",
+    "scores",
+    "share_to_end",
+    "share_within",
+    "through",
+    "with_errors",
+]
+
+FloatArray = NDArray[np.float64]
+
+DIRECTIONS = np.linspace(-1, 1, 801)
+"""Of rays: c = 3 sqrt(6) e1 e2 e3 / |e|^3; 1 in uniaxial tension, 0 in planar, -1 in equibiaxial tension."""
+ANGLES = 1920
+"""Lode angles between uniaxial and equibiaxial tension at which the end of a range is sought."""
+MAX_CORNER_WIDTH, MAX_CORNER_EXCESS = 0.2, 0.075
+"""Of a rounded corner of a range: the radius of curvature of the logarithm of the Hencky strain over the angle in
+radians, and by how much that logarithm is too large beside the corner, at the most."""
+FAR = 3.0
+"""Hencky strain at which rays end that never leave the range."""
+TINY = 1e-100
+"""The smallest Hencky strain by which another one is divided."""
+NEWTON_STEPS = 60
+"""Most steps to the end of a range along rays; few are needed."""
+ROUNDING = 1e-9
+"""Relative excess over a range that still counts as within it."""
+INNER_SHARE = 0.9
+"""Hencky strain over that at the end of the range, from which on the exponent is found."""
+MEDIAN_ERROR, ERROR_SCALE = 0.2, 0.25
+"""Of b over 1 + |a|, which has Student's t distribution with two degrees of freedom; most materials stiffen."""
+TRANSITION = 0.5
+"""The distance d in the logarithm of I1 - 3."""
+TAIL_PROBABILITY = 1e-3
+"""On either side, that is left out of that distribution."""
+MIN_EXPONENT, MAX_EXPONENT = -0.5, 3.0
+"""At the least one, the stress at small strains does not fall along a ray; no tissue here needs the largest one."""
+
+
+class Range(NamedTuple):
+    """Limits of I1 - 3, of I2 - 3 and of the logarithms of the principal stretches."""
+
+    invariant_1: float = np.inf
+    invariant_2: float = np.inf
+    logarithms: tuple[float, float] = (-np.inf, np.inf)
+
+    def within(self, other: Range) -> Range:
+        """Return what lies in both."""
+        (low, high), (other_low, other_high) = self.logarithms, other.logarithms
+        return Range(
+            min(self.invariant_1, other.invariant_1),
+            min(self.invariant_2, other.invariant_2),
+            (max(low, other_low), min(high, other_high)),
+        )
+
+
+def share_within(logs: FloatArray, limits: Range) -> FloatArray:
+    """Return by which factor (n,), one at most, the logarithmic stretches (n, 3) of states stay within limits."""
+    low, high = limits.logarithms
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.where(logs > 0, high / logs, np.where(logs < 0, low / logs, np.inf))
+    shares = np.minimum(1.0, ratios.min(axis=1))
+    for sign, limit in ((2.0, limits.invariant_1), (-2.0, limits.invariant_2)):
+        for _ in range(NEWTON_STEPS):  # the invariant is convex along the ray: from outside, steps end on its limit
+            excess = np.expm1(sign * shares[:, None] * logs).sum(axis=1) - limit
+            is_beyond = excess > ROUNDING * limit
+            if not is_beyond.any():
+                break
+            rate = (sign * logs * np.exp(sign * shares[:, None] * logs)).sum(axis=1)
+            shares = np.where(is_beyond, shares - excess / np.where(is_beyond, rate, 1.0), shares)
+    return np.where(shares > 1 - ROUNDING, 1.0, shares)
+
+
+@lru_cache(maxsize=64)
+def ends_of(limits: Range) -> FloatArray:
+    """Return the Hencky strains (g,) at which rays of directions `DIRECTIONS` leave a range, its corners rounded.
+
+    Corners, where two limits meet, are usual: a test in one mode ends in one. Parabolas of the angle round them from
+    outside, so that an energy that goes on from there has no ridge along the ray of the test.
+    """
+    angles = np.pi / 3 * np.linspace(-1, 2, 1 + 3 * ANGLES)
+    logs = np.log(FAR * share_within(FAR * direction_of_angle(angles), limits))
+    steepest = np.abs(np.gradient(logs, angles)).max()
+    width = min(MAX_CORNER_WIDTH, 2 * MAX_CORNER_EXCESS / max(steepest, TINY) ** 2)
+    distances = np.arccos(DIRECTIONS)[:, None] / 3 - angles
+    return np.asarray(np.exp((logs - distances**2 / (2 * width)).max(axis=1)))
+
+
+def share_to_end(logs: FloatArray, limits: Range) -> FloatArray:
+    """Return by which factor (n,), one at most, logarithmic stretches (n, 3) stay within `ends_of` limits."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    if limits == Range():
+        return np.ones(len(logs))
+    size = np.linalg.norm(logs, axis=1)
+    direction = np.clip(3 * 6**0.5 * logs.prod(axis=1) / np.maximum(size, TINY) ** 3, -1, 1)
+    shares = Akima1DInterpolator(DIRECTIONS, ends_of(limits))(direction) / np.maximum(size, TINY)
+    return np.where(shares > 1 - ROUNDING, 1.0, shares)
+
+
+def direction_of_angle(angle: FloatArray) -> FloatArray:
+    """Return the logarithmic stretches (n, 3) of unit Hencky strain at Lode angles (n,), zero in uniaxial tension."""
+    return np.asarray(np.sqrt(2 / 3) * np.cos(angle[:, None] + 2 * np.pi / 3 * np.array([0, -1, 1])))
+
+
+@dataclass(frozen=True)
+class _Through(Path):
+    """Deformations of given logarithmic stretches that change at given rates: its points are both, (n, 6)."""
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        stretches = exp(point[..., :3] + point[..., 3:] * step)
+        return Deformation.along_axes((stretches[..., 0], stretches[..., 1], stretches[..., 2]))
+
+    def abscissa(self, points: Any) -> Any:
+        return exp(points[..., 0])
+
+
+def through(logs: FloatArray, rates: FloatArray) -> States:
+    """Return states of logarithmic stretches (n, 3), the stress of each being the work on these rates (n, 3)."""
+    return _Through().at(np.hstack([logs, rates]))
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Rays to states beyond a range.
+
+    Attributes
+    ----------
+    ends : (g, 3) array
+        Logarithmic stretches where the rays leave the range.
+    logs : (g, 3) array
+        Those of the states.
+    """
+
+    ends: FloatArray
+    logs: FloatArray
+
+    @property
+    def last_states(self) -> States:
+        """States (2 g,) at the ends and farther in, the stress being the work on the Hencky strain along the rays."""
+        last = np.concatenate([self.ends, INNER_SHARE * self.ends])
+        return through(last, last / np.linalg.norm(last, axis=1, keepdims=True))
+
+    @property
+    def end_rate(self) -> FloatArray:
+        """How I1 (g,) changes at the ends with the Hencky strain along the rays."""
+        return _rate(self.ends)
+
+    @property
+    def distance(self) -> FloatArray:
+        """The logarithms (g,) of I1 - 3 at the ends over that farther in."""
+        return np.asarray(np.log(_invariant(self.ends) / _invariant(INNER_SHARE * self.ends)))
+
+    def last_exponents(self, at_end: FloatArray, farther_in: FloatArray) -> FloatArray:
+        """Return exponents (..., g) before the ends, from stresses there and farther in; 0 unless they are positive."""
+        is_positive = (at_end > 0) & (farther_in > 0)
+        ratio = np.where(is_positive, at_end, 1.0) / np.where(is_positive, farther_in, 1.0)
+        exponent = np.log(ratio * _rate(INNER_SHARE * self.ends) / self.end_rate) / self.distance
+        return np.where(is_positive, exponent, 0.0)
+
+    @property
+    def log_distance(self) -> FloatArray:
+        """The logarithms (g,) of I1 - 3 at the states over that at the ends."""
+        return np.asarray(np.log(_invariant(self.logs) / _invariant(self.ends)))
+
+    def growth(self, exponent: FloatArray, error: FloatArray) -> FloatArray:
+        """Return the stress at the states over that at the ends (..., g), for exponents and their errors (..., g)."""
+        return np.asarray(np.exp(log_growth(self.log_distance, exponent, error)) * _rate(self.logs) / self.end_rate)
+
+
+def log_growth(log_distance: Any, exponent: Any, error: Any) -> Any:
+    """Return ln(V / V_c), at distances s."""
+    return log_distance * (exponent + error * log_distance / (log_distance + TRANSITION))
+
+
+def with_errors(last: FloatArray, score: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return exponents and their errors beyond a range, from the last exponents within and the scores of the errors."""
+    exponent = np.clip(last, MIN_EXPONENT, MAX_EXPONENT)
+    erroneous = exponent + (MEDIAN_ERROR + ERROR_SCALE * score) * (1 + np.abs(exponent))
+    return exponent, np.clip(erroneous, MIN_EXPONENT, MAX_EXPONENT) - exponent
+
+
+def scores(probability: FloatArray) -> FloatArray:
+    """Return quantiles of Student's t with two degrees of freedom, without its outermost tails."""
+    p = TAIL_PROBABILITY + (1 - 2 * TAIL_PROBABILITY) * probability
+    return np.asarray((2 * p - 1) / np.sqrt(2 * p * (1 - p)))
+
+
+def _invariant(logs: FloatArray) -> FloatArray:
+    """Return I1 - 3 (g,) of logarithmic stretches (g, 3)."""
+    return np.asarray(np.expm1(2 * logs).sum(axis=1))
+
+
+def _rate(logs: FloatArray) -> FloatArray:
+    """Return how I1 (g,) changes with the Hencky strain along rays through logarithmic stretches (g, 3)."""
+    return np.asarray((2 * logs * np.exp(2 * logs)).sum(axis=1) / np.linalg.norm(logs, axis=1))

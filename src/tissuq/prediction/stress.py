@@ -1,0 +1,91 @@
+"""The predicted stress of a posterior's components at any states, within the range of the data and beyond."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import States
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.mechanics.rays import Range, share_to_end, through
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.prediction.moments import STRETCH_STEP, drawn_stress, stress_moments, stress_slopes, stresses_beyond
+
+__all__ = ["Stress"]
+
+FloatArray = NDArray[np.float64]
+
+MIN_DRAWS = 6000
+"""Draws, at the least, that stand for a posterior beyond the range of its data."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stress:
+    """The predicted stress of a posterior's components, without noise.
+
+    Beyond the range in which a discrepancy's blocks were measured, the energy of material and discrepancy goes on along
+    rays (`tissuq.mechanics.rays`): there the stress has draws, several for each component.
+
+    Attributes
+    ----------
+    model : StatisticalModel
+    components : GaussianMixture
+    with_discrepancy : bool
+        Whether the discrepancy's share is in it.
+    """
+
+    model: StatisticalModel
+    components: GaussianMixture
+    with_discrepancy: bool
+
+    def at(self, states: States) -> tuple[GaussianMixture, FloatArray, FloatArray]:
+        """Return components (M,) with means and variances (M, g) of the stress at states (g,).
+
+        They are more than those of the posterior where some of the states lie beyond its range.
+        """
+        logs, rates = states.log_stretches
+        shares = np.array([share_to_end(logs, limits) for limits in self._limits or [Range()]])
+        farthest = shares.max(axis=0)[:, None]
+        within = through(farthest * logs, rates) if (farthest < 1).any() else states
+        mean, variance = stress_moments(
+            self.model, self.components, within, discrepancy=self.with_discrepancy, noise=False
+        )
+        if (shares == 1).all():
+            return self.components, mean, variance
+        drawn, probability = self._drawn
+        mean, variance = (np.repeat(moment, len(drawn) // len(mean), axis=0) for moment in (mean, variance))
+        for at, stress in stresses_beyond(self.model, drawn, states, probability):
+            mean[at], variance[at] = stress, 0.0
+        return drawn, mean, variance
+
+    def slopes(self, states: States, mean: FloatArray) -> FloatArray:
+        """Return the slopes (M, g, c) of the means (M, g) along the controls of their paths, MPa; zero beyond these."""
+        if len(mean) == len(self.components):
+            return stress_slopes(self.model, self.components, states, mean, discrepancy=self.with_discrepancy)
+        displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
+        here, *there = (drawn_stress(self.model, self._drawn[0], at, self._drawn[1]) for at in (states, *displaced))
+        return (np.stack(there, axis=-1) - here[:, :, None]) / STRETCH_STEP
+
+    @cached_property
+    def _limits(self) -> list[Range]:
+        """The ranges of the components' blocks."""
+        member = self.components.member
+        if member is None or not self.with_discrepancy:
+            return []
+        return [limits for limits, _ in self.model.by_limits(member)]
+
+    @cached_property
+    def _drawn(self) -> tuple[GaussianMixture, FloatArray]:
+        """Several draws of every component, and probabilities of the errors of their exponents."""
+        from scipy.special import ndtri
+        from scipy.stats import qmc
+
+        count, scores = len(self.components), self.components.root.shape[2]
+        copies = -(-MIN_DRAWS // count)
+        uniform = qmc.Sobol(scores + 1, rng=0).random_base2((count * copies - 1).bit_length())[: count * copies]
+        many = self.components[np.repeat(np.arange(count), copies)]
+        mean = many.mean + np.einsum("mpq,mq->mp", many.root, ndtri(uniform[:, 1:]))
+        return replace(many, mean=mean, weights=many.weights / copies), uniform[:, 0]
