@@ -134,8 +134,9 @@ def febio(text: str) -> Read:
     if not solids:
         return febio_solid(material)
     assert material.get("type") == "uncoupled solid mixture"
-    both = Read(material.get("type"), lambda stretches: sum(each.energy(stretches) for each in solids), 0.0)
-    return both._replace(bulk=sum(each.bulk for each in solids))
+    # FEUncoupledMaterial::Init sets the bulk moduli of solids within a mixture to zero; the mixture has its own.
+    bulk = float(material.find("k").text)
+    return Read(material.get("type"), lambda stretches: sum(each.energy(stretches) for each in solids), bulk)
 
 
 def febio_solid(material) -> Read:
@@ -152,7 +153,7 @@ def febio_solid(material) -> Read:
         "Gent": lambda: gent(known["G"], known["Jm"]),
         "Veronda-Westmann": lambda: veronda_westmann(known["c1"], known["c2"]),
     }
-    return Read(law, reads[law](), known["k"])
+    return Read(law, reads[law](), known.get("k", 0.0))
 
 
 def veronda_westmann(c1, c2):

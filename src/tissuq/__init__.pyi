@@ -25,11 +25,7 @@ from tissuq.mechanics.material import Material as Material, StretchMaterial as S
 from tissuq.mechanics.user_law import FunctionLaw as FunctionLaw
 from tissuq.model.discrepancy import discrepancies as discrepancies
 from tissuq.model.discrepancy.discrepancy import Discrepancy as Discrepancy
-from tissuq.model.measurement_errors import (
-    MeasurementError as MeasurementError,
-    Tolerances as Tolerances,
-    estimands as estimands,
-)
+from tissuq.model.measurement_errors import MeasurementError as MeasurementError
 from tissuq.model.noise import (
     KnownNoise as KnownNoise,
     Noise as Noise,
@@ -37,6 +33,7 @@ from tissuq.model.noise import (
     RepeatNoise as RepeatNoise,
     UnknownNoise as UnknownNoise,
 )
+from tissuq.model.tolerances import Tolerances as Tolerances, estimands as estimands
 from tissuq.next_test import Candidate as Candidate
 from tissuq.parameters.parameter import Parameter as Parameter
 from tissuq.parameters.priors import (

@@ -87,7 +87,7 @@ def test_a_law_that_the_code_has_is_written_exactly(given, code, parts, keyword)
     assert all(row["error_states_max"] < 1e-8 for row in cards.index)
 
 
-def test_the_bulk_modulus_of_a_mixture_is_the_sum_of_its_solids(given):
+def test_the_bulk_modulus_of_a_mixture_is_its_own_and_not_of_its_solids(given):
     ensemble = given([("rivlin:C10,C20+ogden-2", [0.4, 0.05, 0.1, 1.3, 0.05, 5.0])])
     cards = card_format("febio").cards(ensemble, CardSettings(law="mixture", bulk_modulus=700.0))
     (read,) = map(READERS["febio"], cards.files.values())

@@ -6,7 +6,8 @@ import pytest
 import tissuq as tq
 from tissuq.experiments.modes import SimpleShear, Uniaxial
 from tissuq.model.error_model import whitening
-from tissuq.model.measurement_errors import ErrorPoints, FittedErrors, MeasurementError, Tolerances
+from tissuq.model.measurement_errors import ErrorPoints, MeasurementError
+from tissuq.model.tolerances import FittedErrors, Tolerances
 from tissuq.registry import variants
 
 STRETCH = np.linspace(1.02, 1.3, 15)

@@ -8,7 +8,8 @@ import pytest
 from tissuq import Experiment, InputError, Tolerances
 from tissuq.experiments.modes import Uniaxial
 from tissuq.model.error_model import whitening
-from tissuq.model.measurement_errors import ErrorPoints, FittedErrors
+from tissuq.model.measurement_errors import ErrorPoints
+from tissuq.model.tolerances import FittedErrors
 
 STRETCH = [np.array([0.8, 0.9, 1.1]), np.array([1.1, 1.3, 1.5, 1.7])]
 CURVE = np.concatenate([2 * (each - each**-2) for each in STRETCH])

@@ -28,8 +28,8 @@ from tissuq.inference.marginal import Marginal
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import discrepancy_named
-from tissuq.model.measurement_errors import FittedErrors
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.tolerances import FittedErrors
 from tissuq.prediction.moments import drawn_curves
 
 __all__ = ["Assessment", "assess", "has_energy"]

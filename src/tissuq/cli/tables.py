@@ -59,7 +59,7 @@ def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
     InputError
         When the folder is not that of a complete run.
     """
-    from tissuq.model.measurement_errors import ESTIMANDS
+    from tissuq.model.tolerances import ESTIMANDS
 
     try:
         rows, readable, unit, title = _read_run(folder, experiment)

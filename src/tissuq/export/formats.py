@@ -203,7 +203,8 @@ FEBIO_MIXTURE = Mixture(
 class FEBio(FECode):
     """``<material>`` of FEBio, always uncoupled: "neo-Hookean" of FEBio is another, coupled law, so it is not used.
 
-    It adds materials in an "uncoupled solid mixture", whose bulk modulus is the sum of those of its solids.
+    It adds materials in an "uncoupled solid mixture", which has a bulk modulus of its own: since 2020 FEBio sets those
+    of its solids to zero (FEUncoupledElasticMixture::Init).
     """
 
     name = "febio"
@@ -231,11 +232,11 @@ class FEBio(FECode):
         head = f'    <material id="1" name={quoteattr(card.name)} type="{card.form.keyword}">'
         lines = [head, _element("density", card.water_density)]
         if isinstance(card.form, Mixture):
+            lines.append(_element("k", card.bulk))
             for solid_form in card.form.summands:
                 prefix = f"{solid_form.keyword}_"
                 names = [name for name in card.constants if name.startswith(prefix)]
                 numbers = {name.removeprefix(prefix): card.constants[name] for name in names}
-                numbers["k"] = card.bulk / len(card.form.summands)  # the mixture's is their sum
                 solid = (f"  {_element(name, number)}" for name, number in numbers.items())
                 lines += [f'      <solid type="{solid_form.keyword}">', *solid, "      </solid>"]
         else:

@@ -13,8 +13,8 @@ from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.stress import stresses_at
 from tissuq.model.discrepancy import Discrepancy
-from tissuq.model.measurement_errors import Tolerances
 from tissuq.model.noise import Noise
+from tissuq.model.tolerances import Tolerances
 
 __all__ = ["check_linearity", "check_parts", "check_separable"]
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.model.discrepancy import Discrepancy
-from tissuq.model.measurement_errors import ErrorPoints, FittedErrors, Shared, Tolerances, specimens_of
+from tissuq.model.measurement_errors import ErrorPoints, Shared
 from tissuq.model.noise import Noise, stress_level
+from tissuq.model.tolerances import FittedErrors, Tolerances, specimens_of
 
 __all__ = ["ErrorModel", "Whitening", "whitening"]
 

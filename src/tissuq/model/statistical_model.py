@@ -19,10 +19,10 @@ from tissuq.model.compatibility import check_linearity, check_parts, check_separ
 from tissuq.model.discrepancy import Discrepancy, EnergyDiscrepancy, Member
 from tissuq.model.discrepancy.blocks import EnergyBlock
 from tissuq.model.error_model import ErrorModel
-from tissuq.model.measurement_errors import FittedErrors, Tolerances
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.scales import default_boxes, default_prior, off_zero, support
 from tissuq.model.statistics import CHUNK, Condensed, Statistics, condensed, is_condensed, upper_triangle
+from tissuq.model.tolerances import FittedErrors, Tolerances
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, Prior
 

@@ -15,9 +15,19 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.mechanics.rays import Range, Rays, log_growth, share_to_end, through, with_errors
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
+from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import basis_of, borne, coefficients, conditioned, conditioned_jointly, correlated_groups
+from tissuq.prediction.moments import (
+    basis_of,
+    borne,
+    coefficients,
+    conditioned,
+    conditioned_jointly,
+    correlated_groups,
+    energy_terms,
+)
 
 __all__ = ["Variances", "expected_variances", "joint_stresses", "states_of"]
 
@@ -42,25 +52,78 @@ def joint_stresses(
 
     The first p columns of the roots are those of the components' own linear parameters (`GaussianMixture.root`), so
     that covariances of stresses, with each other and with parameters, are products of roots. The further columns are
-    what the data leave of a discrepancy beside its terms: of a process, and of an energy beyond the range of the data.
-    Scatter that is independent from point to point (S, noise) is left out.
+    what the data leave of a process, and of an energy beyond the range of the data, where it goes on along rays: to
+    first order, with one error of the exponent in all directions. Scatter that is independent from point to point
+    (S, noise) is left out.
     """
+    if components.member is None:
+        return _within(model, components, states)
+    logs, rates = states.log_stretches
+    ranges = list(model.by_limits(components.member)) or [(Range(), np.arange(len(components)))]
+    p = components.root.shape[2]
+    mean, root = np.empty((len(components), len(states))), np.zeros((len(components), len(states), p + 1))
+    for limits, rows in ranges:
+        share = share_to_end(logs, limits)[:, None]
+        (beyond,) = np.nonzero(share[:, 0] < 1)
+        rays = Rays((share * logs)[beyond], logs[beyond])
+        wanted = States.joined([through(share * logs, rates), rays.last_states]) if len(beyond) else states
+        means, roots = _within(model, components[rows], wanted)
+        mean[rows], root[rows, :, :p] = means[:, : len(logs)], roots[:, : len(logs)]
+        if len(beyond):
+            at, last = np.ix_(rows, beyond), (means[:, len(logs) :], roots[:, len(logs) :])
+            mean[at], root[at] = _beyond(rays, (mean[at], root[at]), last)
+    return mean, root
+
+
+def _beyond(
+    rays: Rays, ends: tuple[FloatArray, FloatArray], last: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return means (M, g) and roots (M, g, p + 1) of stresses beyond the range of the data, to first order.
+
+    From those at its end (`ends`) and at the `Rays.last_states` (M, 2 g). The last column is the error of the exponent.
+    """
+    (mean, root), count = ends, len(rays.logs)
+    stresses, roots = ((part[:, :count], part[:, count:]) for part in last)
+    exponent = rays.last_exponents(*stresses)
+
+    def log_of_growth(change: float, score: float) -> FloatArray:
+        exponents = with_errors(exponent + change, np.asarray(score))
+        return np.asarray(log_growth(rays.log_distance, *exponents))
+
+    is_positive = (stresses[0] > 0) & (stresses[1] > 0)
+    at_end, farther_in = (
+        part[..., : root.shape[2] - 1] / np.where(is_positive, stress, np.inf)[..., None]
+        for part, stress in zip(roots, stresses, strict=True)
+    )
+    slope = (log_of_growth(STEP, 0.0) - log_of_growth(-STEP, 0.0)) / (2 * STEP * rays.distance)
+    relative = np.zeros_like(root)
+    relative[..., :-1] = slope[..., None] * (at_end - farther_in)
+    relative[..., -1] = log_of_growth(0.0, SCORE_SD) - log_of_growth(0.0, 0.0)
+    growth = rays.growth(*with_errors(exponent, np.zeros(())))
+    return mean * growth, growth[..., None] * (root + mean[..., None] * relative)
+
+
+def _within(model: StatisticalModel, components: GaussianMixture, states: States) -> tuple[FloatArray, FloatArray]:
+    """Return `joint_stresses` in the range of the data."""
     mean_b, root_b = coefficients(model, components)
     basis = borne(model, states.abscissa, _basis(model, components, states), components.weights)
     mean, root = (basis @ mean_b[:, :, None])[:, :, 0], basis @ root_b
-    unexplained_root = np.zeros((*mean.shape, 0))
-    if model.is_correlated:
-        unexplained_root = np.zeros((*mean.shape, len(states)))
-        for group in correlated_groups(model, components.settings):
-            rows = group.components
-            _, pull, _ = conditioned(model, group, states, mean_b[rows])
-            shift, covariance = conditioned_jointly(model, group, states, mean_b[rows])
-            mean[rows] += shift
-            root[rows] -= pull @ root_b[rows]
-            values, vectors = np.linalg.eigh(covariance)
-            unexplained_root[rows] = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
     if components.member is not None:
-        unexplained_root = _add_energies(model, components, states, mean, root)
+        for _, rows, features, weights in energy_terms(model, components, states):
+            terms = side_by_side(features, len(states))
+            mean[rows] += components.mean[rows, weights] @ terms.T
+            root[rows] += terms @ components.root[rows, weights]
+    if not model.is_correlated:
+        return mean, root
+    unexplained_root = np.zeros((*mean.shape, len(states)))
+    for group in correlated_groups(model, components.settings):
+        rows = group.components
+        _, pull, _ = conditioned(model, group, states, mean_b[rows])
+        shift, covariance = conditioned_jointly(model, group, states, mean_b[rows])
+        mean[rows] += shift
+        root[rows] -= pull @ root_b[rows]
+        values, vectors = np.linalg.eigh(covariance)
+        unexplained_root[rows] = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
     return mean, np.concatenate([root, unexplained_root], axis=2)
 
 
@@ -73,29 +136,10 @@ def _basis(model: StatisticalModel, components: GaussianMixture, states: States)
     return np.concatenate([basis_of(model, states, components.settings[start : start + count]) for start in starts])
 
 
-def _add_energies(
-    model: StatisticalModel, components: GaussianMixture, states: States, mean: FloatArray, root: FloatArray
-) -> FloatArray:
-    """Add energy discrepancies to means and roots, and return the roots (M, g, q) of what the data know nothing of."""
-    assert components.member is not None  # noqa: S101 (the caller has looked)
-    unexplained, start = [], len(model.linear)
-    for index in np.unique(components.member):
-        member, rows, column = model.energy_members[index], np.flatnonzero(components.member == index), start
-        unexplained_terms = []
-        for amplitude_index, (terms, count) in zip(member.amplitude_indices, member.wide_features(states), strict=True):
-            weights = slice(column, column + count)
-            mean[rows] += components.mean[rows, weights] @ terms[:, :count].T
-            root[rows] += terms[:, :count] @ components.root[rows, weights]
-            amplitude = components.settings[rows, model.nonlinear.index(model.energy_symbols[amplitude_index])]
-            unexplained_terms.append(amplitude[:, None, None] * terms[:, count:])
-            column += count
-        unexplained.append((rows, np.concatenate([np.zeros((len(rows), len(states), 0)), *unexplained_terms], axis=2)))
-    unexplained_root = np.zeros((*mean.shape, max(terms_root.shape[2] for _, terms_root in unexplained)))
-    for rows, terms_root in unexplained:
-        unexplained_root[rows, :, : terms_root.shape[2]] = terms_root
-    return unexplained_root
-
-
+STEP = 1e-6
+"""Step of an exponent for a derivative."""
+SCORE_SD = 2.2
+"""Standard deviation of a Gaussian error of an exponent with the 95 % interval of Student's t."""
 MAX_ARRAY_VALUES = 4_000_000
 """Largest number of values in an array over components, outcomes and measurements, which bounds the memory."""
 

@@ -14,8 +14,9 @@ from tissuq.errors import InputError, ModelError
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
-from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, ErrorPoints, Tolerances, specimens_of
+from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.tolerances import BETWEEN_SPECIMENS, Tolerances, specimens_of
 from tissuq.next_test.candidates import Candidate, Target, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
 from tissuq.prediction.moments import stress_moments, stress_slopes
@@ -276,7 +277,7 @@ class NextTest:
             low, high = farthest_range(data, candidate.mode, MAX_REACH)
             raise InputError(
                 f"{label} reaches {reach:.2g} times as far as the data in I1 - 3 or I2 - 3; beyond {MAX_REACH:g} times "
-                f"the size of the discrepancy is unknown: choose a range within {low:g} to {high:g}."
+                f"too little is known to plan with: choose a range within {low:g} to {high:g}."
             )
 
 

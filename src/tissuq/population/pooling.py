@@ -13,8 +13,8 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy
-from tissuq.model.measurement_errors import AS_TESTED
 from tissuq.model.noise import Noise
+from tissuq.model.tolerances import AS_TESTED
 from tissuq.parameters.priors import Prior
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population

@@ -17,10 +17,10 @@ from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
-from tissuq.model.measurement_errors import FittedErrors, Tolerances
 from tissuq.model.noise import KnownNoise, KnownNoises, Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import Statistics
+from tissuq.model.tolerances import FittedErrors, Tolerances
 from tissuq.parameters.priors import prior_from
 from tissuq.posterior.netcdf import Group, LabelledGroup, opened, read_groups
 from tissuq.posterior.solver import Solver

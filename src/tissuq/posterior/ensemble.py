@@ -307,11 +307,12 @@ def _energies(model: StatisticalModel, points: GaussianMixture, factor: FloatArr
     assert points.member is not None  # noqa: S101 (an energy discrepancy has members)
     for number in np.unique(points.member):
         rows, member, column = np.flatnonzero(points.member == number), model.energy_members[number], start
-        for terms, count in member.slopes(grid):
+        for terms in member.slopes(grid):
+            count = terms.invariant_1.shape[1]
             weights = points.mean[rows, column : column + count] * factor[rows, None]
             column += count
             for slope, features in zip(slopes, terms, strict=True):
-                slope[:, rows] += features[:, :count] @ weights.T
+                slope[:, rows] += features @ weights.T
     functions = (pieces(knots, values) for knots, values in zip(grid, slopes, strict=True))
     return [PiecewiseEnergy(*terms) for terms in zip(*functions, strict=True)]
 

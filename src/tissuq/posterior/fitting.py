@@ -12,9 +12,9 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
-from tissuq.model.measurement_errors import ESTIMANDS, Tolerances
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.tolerances import ESTIMANDS, Tolerances
 from tissuq.parameters.priors import Prior
 from tissuq.parameters.seeds import check_seed
 from tissuq.posterior.plug_in import default_tolerances

@@ -12,9 +12,9 @@ from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
 from tissuq.inference.solution import Solution
-from tissuq.model.measurement_errors import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK
+from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
 __all__ = ["ErrorEstimates", "default_tolerances"]

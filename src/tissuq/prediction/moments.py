@@ -29,6 +29,7 @@ __all__ = [
     "correlated_groups",
     "drawn_curves",
     "drawn_stress",
+    "energy_terms",
     "level_of_errors",
     "mean_curve",
     "mean_curve_and_slopes",
@@ -310,7 +311,7 @@ def _drawn_within(model: StatisticalModel, drawn: GaussianMixture, states: State
     material_stress, discrepancy_stress = terms[..., is_material].sum(axis=2), terms[..., ~is_material].sum(axis=2)
     if drawn.member is not None:
         with one_thread():
-            for _, rows, features, weights in _energy_terms(model, drawn, states):
+            for _, rows, features, weights in energy_terms(model, drawn, states):
                 discrepancy_stress[rows] += drawn.mean[rows, weights] @ side_by_side(features, len(states)).T
     return material_stress, discrepancy_stress
 
@@ -335,7 +336,7 @@ def _energies(
     Beyond q the roots are zero. What the terms that serve the data leave of the discrepancy elsewhere is independent of
     the data.
     """
-    for member, rows, features, weights in _energy_terms(model, components, states):
+    for member, rows, features, weights in energy_terms(model, components, states):
         unexplained = [
             np.maximum(total - (terms**2).sum(axis=1), 0.0)
             for total, terms in zip(member.stress_variances(states), features, strict=True)
@@ -348,7 +349,7 @@ def _energies(
         yield components.mean[rows, weights] @ all_terms.T, all_terms @ root[:, :, :width], variance, rows
 
 
-def _energy_terms(
+def energy_terms(
     model: StatisticalModel, components: GaussianMixture, states: States
 ) -> Iterator[tuple[Member, NDArray[np.intp], list[FloatArray], slice]]:
     """Yield energy discrepancies, whose they are, the stresses of their terms, and where the weights of these are."""

@@ -14,7 +14,7 @@ from tissuq.posterior.labelled import summaries
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.units import StressUnit
-    from tissuq.model.measurement_errors import Tolerances
+    from tissuq.model.tolerances import Tolerances
     from tissuq.posterior.posterior import Posterior
 
 __all__ = [

@@ -19,7 +19,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
-from tissuq.model.measurement_errors import AS_TESTED, SPECIMEN
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands, speaks_of, stress_ratio

@@ -25,8 +25,8 @@ from tissuq.model.discrepancy import (
     discrepancies,
     discrepancy_named,
 )
-from tissuq.model.measurement_errors import Tolerances
 from tissuq.model.noise import Noise, noise_named
+from tissuq.model.tolerances import Tolerances
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit

@@ -80,15 +80,10 @@ class EnergyBlock(ABC):
         """Return the variance (n,) of the stress for c = 1."""
 
     @abstractmethod
-    def count(self, reach: tuple[float, float], length: float) -> int:
-        """Return the number r of the terms that serve the data."""
-
-    @abstractmethod
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
-        """Return A'(x) (a, q), B'(y) (b, q) and w'(e) (c, q) of the terms dW_k = A(I1 - 3) + B(I2 - 3) + sum w(ln l_i).
+        """Return A'(x) (a, r), B'(y) (b, r) and w'(e) (c, r) of the terms dW_k = A(I1 - 3) + B(I2 - 3) + sum w(ln l_i).
 
-        For c = 1, at x = I1 - 3 (a,), y = I2 - 3 (b,) and e = ln l (c,). Where these lie beyond the reach, the r terms
-        that serve the data are followed by others, of which the data know nothing.
+        For c = 1, at x = I1 - 3 (a,), y = I2 - 3 (b,) and e = ln l (c,).
         """
 
 
@@ -110,9 +105,6 @@ class ZeroModulusBlock(EnergyBlock):
 
     def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
         return self.stress_features(states, reach, length)[:, 0] ** 2
-
-    def count(self, reach: tuple[float, float], length: float) -> int:
-        return 1
 
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
         ones = [np.ones((len(values), 1)) for values in coordinates]
@@ -145,15 +137,10 @@ class ProcessBlock(EnergyBlock):
         values = self.terms(z.ravel(), reach, length)
         return np.asarray(np.einsum("nmr,nm->nr", values.reshape(*z.shape, -1), v))
 
-    def count(self, reach: tuple[float, float], length: float) -> int:
-        return len(_pivots(self, reach, length * (reach[1] - reach[0]))[0])
-
-    def terms(
-        self, z: FloatArray, reach: tuple[float, float], length: float, wider: tuple[float, float] | None = None
-    ) -> FloatArray:
-        """Return the directions (n, q) of the process at coordinates (n,): those within a wider reach come last."""
+    def terms(self, z: FloatArray, reach: tuple[float, float], length: float) -> FloatArray:
+        """Return the directions (n, r) of the process at coordinates (n,)."""
         scale = length * (reach[1] - reach[0])
-        pivots, triangle = _pivots(self, reach, scale, wider)
+        pivots, triangle = _pivots(self, reach, scale)
         return np.asarray(np.linalg.solve(triangle, self.covariance(pivots[:, None], z[None], scale)).T)
 
     def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
@@ -164,22 +151,16 @@ class ProcessBlock(EnergyBlock):
 
 
 @lru_cache(maxsize=256)
-def _pivots(
-    block: ProcessBlock, reach: tuple[float, float], scale: float, wider: tuple[float, float] | None = None
-) -> tuple[FloatArray, FloatArray]:
-    """Return q pivots and the lower triangle (q, q) of their covariance's Cholesky decomposition.
+def _pivots(block: ProcessBlock, reach: tuple[float, float], scale: float) -> tuple[FloatArray, FloatArray]:
+    """Return r pivots and the lower triangle (r, r) of their covariance's Cholesky decomposition.
 
-    Those of the reach come first, where there is a wider one. Remembered, because every sum of which the block is a
-    part asks for the same.
+    Remembered, because every sum of which the block is a part asks for the same.
     """
-    inner_pivots, triangle = (np.zeros(0), np.zeros((0, 0))) if wider is None else _pivots(block, reach, scale)
-    low, high = wider or reach
-    grid = np.concatenate([inner_pivots, low + (high - low) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID_POINTS)))])
-    columns = np.linalg.solve(triangle, block.covariance(inner_pivots[:, None], grid[None], scale)).T
+    low, high = reach
+    grid = low + (high - low) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID_POINTS)))
     variance = block.covariance(grid, grid, scale)
-    remaining, smallest = variance - (columns**2).sum(axis=1), block.tolerance * variance.max()
-    remaining[: len(inner_pivots)] = 0.0
-    indices = list(range(len(inner_pivots)))
+    remaining, smallest = variance.copy(), block.tolerance * variance.max()
+    columns, indices = np.zeros((len(grid), 0)), list[int]()
     while (pivot := int(remaining.argmax())) not in indices and remaining[pivot] > smallest:
         column = block.covariance(grid, grid[pivot], scale) - columns @ columns[pivot]
         columns = np.column_stack([columns, column / np.sqrt(remaining[pivot])])
@@ -197,7 +178,7 @@ class InvariantBlock(ProcessBlock):
 
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
         z = self.coordinate(coordinates.invariant_1)
-        values = self.terms(z, reach, length, _joined(reach, z))
+        values = self.terms(z, reach, length)
         return coordinates.nothing(values.shape[1])._replace(invariant_1=values)
 
     def limits(self, reach: tuple[float, float]) -> Range:
@@ -267,8 +248,7 @@ class SecondInvariantBlock(ProcessBlock):
         return Range(invariant_2=reach[1])
 
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
-        wider = _joined(reach, coordinates.invariant_2)
-        values, start = (self.terms(y, reach, length, wider) for y in (coordinates.invariant_2, np.zeros(1)))
+        values, start = (self.terms(y, reach, length) for y in (coordinates.invariant_2, np.zeros(1)))
         nothing = coordinates.nothing(values.shape[1])
         return nothing._replace(invariant_1=nothing.invariant_1 - start, invariant_2=values)
 
@@ -286,7 +266,7 @@ class SeparableBlock(ProcessBlock):
         return Range(logarithms=reach)
 
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
-        values = self.terms(coordinates.logarithm, reach, length, _joined(reach, coordinates.logarithm))
+        values = self.terms(coordinates.logarithm, reach, length)
         return coordinates.nothing(values.shape[1])._replace(logarithm=values)
 
 
@@ -312,8 +292,3 @@ class ValanisLandelBlock(SeparableBlock):
 
     def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
         return np.asarray(pinned_squared_exponential(z / length, z_prime / length, 1))
-
-
-def _joined(reach: tuple[float, float], z: FloatArray) -> tuple[float, float]:
-    """Return the range of a reach and of coordinates (n,) together."""
-    return min(reach[0], float(z.min())), max(reach[1], float(z.max()))

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import States
-from tissuq.mechanics.invariants import invariant_rates, invariants
 from tissuq.mechanics.rays import Range
 from tissuq.model.discrepancy.blocks import (
     Coordinates,
@@ -96,29 +95,9 @@ class Member:
         """Return the variance (n,) of the stress of each block at unit amplitude."""
         return [block.stress_variance(states, reach, length) for block, reach, length in self.scaled_blocks]
 
-    def wide_features(self, states: States) -> list[tuple[FloatArray, int]]:
-        """Return of each block the stresses (n, q) of its terms at any states, and how many of them serve the data.
-
-        The latter come first and are the `stress_features`; the others are what beyond the data nothing is known of.
-        """
-        (rate_1, rate_2), (logs, rates) = invariant_rates(states), states.log_stretches
-        coordinates = Coordinates(*invariants(states), logs.ravel())
-        return [
-            (
-                slopes.invariant_1 * rate_1[:, None]
-                + slopes.invariant_2 * rate_2[:, None]
-                + np.einsum("nkq,nk->nq", slopes.logarithm.reshape(*logs.shape, -1), rates),
-                count,
-            )
-            for slopes, count in self.slopes(coordinates)
-        ]
-
-    def slopes(self, coordinates: Coordinates) -> list[tuple[Coordinates, int]]:
-        """Return of each block the slopes of its terms, as `EnergyBlock.slopes`, and how many serve the data."""
-        return [
-            (block.slopes(coordinates, reach, length), block.count(reach, length))
-            for block, reach, length in self.scaled_blocks
-        ]
+    def slopes(self, coordinates: Coordinates) -> list[Coordinates]:
+        """Return of each block the slopes of its terms, as `EnergyBlock.slopes`."""
+        return [block.slopes(coordinates, reach, length) for block, reach, length in self.scaled_blocks]
 
 
 def side_by_side(features: list[FloatArray], count: int) -> FloatArray:

@@ -14,9 +14,9 @@ from tissuq.experiments.modes import loading_mode
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
 from tissuq.mechanics import Material, NeoHookean, engineering_stress
 from tissuq.model.discrepancy import discrepancy_named
-from tissuq.model.measurement_errors import AS_TESTED
 from tissuq.model.noise import noise_named
 from tissuq.model.statistical_model import StatisticalModel
+from tissuq.model.tolerances import AS_TESTED
 from tissuq.parameters.priors import Prior
 from tissuq.posterior.fitting import fit_many
 from tissuq.posterior.posterior import Posterior

@@ -15,7 +15,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.mechanics import NeoHookean, Yeoh, simulate
 from tissuq.model.discrepancy import discrepancy_named
-from tissuq.model.measurement_errors import AS_TESTED
+from tissuq.model.tolerances import AS_TESTED
 from tissuq.parameters.priors import Prior, Uniform, prior_from
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.fitting import fit, fit_many

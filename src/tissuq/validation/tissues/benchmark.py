@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.model.discrepancy import discrepancy_named
-from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predictive_mixtures, speaks_of

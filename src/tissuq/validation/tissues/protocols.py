@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tissuq.experiments.experiment import Experiment
-from tissuq.model.measurement_errors import AS_TESTED, SPECIMEN, TISSUE
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE
 
 __all__ = ["END_SHARE", "ESTIMAND_OF_PROTOCOL", "PROTOCOLS", "Split"]
 

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
-from tissuq.model.measurement_errors import Tolerances
+from tissuq.model.tolerances import Tolerances
 from tissuq.studies.settings import looked_up
 from tissuq.validation.tissues.protocols import PROTOCOLS
 

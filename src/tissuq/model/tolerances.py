@@ -1,0 +1,305 @@
+"""By how much tests may be off, and so what an interval is of; and what of it was estimated by further fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import inf
+from numbers import Real
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.model.measurement_errors import (
+    ErrorPoints,
+    MeasurementError,
+    ResolutionError,
+    ScaleError,
+    Shared,
+    TestError,
+    measurement_errors,
+)
+from tissuq.registry import find, variants
+
+__all__ = [
+    "AS_TESTED",
+    "BETWEEN_SPECIMENS",
+    "ESTIMANDS",
+    "SPECIMEN",
+    "TISSUE",
+    "FittedErrors",
+    "Tolerances",
+    "estimands",
+    "specimens_of",
+]
+
+FloatArray = NDArray[np.float64]
+
+AS_TESTED, SPECIMEN, TISSUE = "as-tested", "specimen", "tissue"
+LABORATORY: Mapping[str, float] = MappingProxyType(
+    {"length": 0.01, "slack": 0.005, "smooth": 0.02, "resolution": 0.002}
+)
+"""Errors of a test in a careful laboratory: standard deviations."""
+
+
+class Estimand(NamedTuple):
+    """What an interval is to hold, in words, and the errors of the tests that it then includes."""
+
+    description: str
+    sizes: Mapping[str, float]
+
+
+ESTIMANDS: Mapping[str, Estimand] = MappingProxyType(
+    {
+        AS_TESTED: Estimand("this specimen as tested, errors of the test not included", MappingProxyType({})),
+        SPECIMEN: Estimand(
+            "this specimen, errors of the test included",
+            MappingProxyType({"stress": 0.05, "test": 0.05, **LABORATORY}),
+        ),
+        TISSUE: Estimand(
+            "the tissue: another specimen, errors of the test included",
+            MappingProxyType({"stress": 0.18, "test": 0.1, **LABORATORY}),
+        ),
+    }
+)
+"""What intervals may be of, by name."""
+
+
+def estimands() -> Mapping[str, Estimand]:
+    """Return what intervals may be of, by name: in words, and with the errors of the tests that they include.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> list(tq.estimands())
+    ['as-tested', 'specimen', 'tissue']
+    """
+    return ESTIMANDS
+
+
+class Tolerances:
+    """By how much a whole test may be off: standard deviations of errors of the test, by their names.
+
+    They say what an interval is of: without any it is of the specimen *as tested*, with those of the test of the
+    *specimen*, with the spread between specimens, too, of the *tissue*.
+
+    Tests of one specimen share their errors, but for those of each test. To first order these move the measured
+    stresses along fixed curves, the stress and its slopes, so that they are integrated in closed form, as everything
+    that is linear. Of the errors ``stress`` and ``test`` only the differences of specimens and tests from their mean
+    count there: what all have in common is not in the data, and multiplies the answer.
+
+    Parameters
+    ----------
+    estimand : str, optional
+        ``"as-tested"``, ``"specimen"`` or ``"tissue"`` (`estimands`): sizes of a careful laboratory, which ``sizes``
+        replace one by one; without it all others are zero.
+    stress : float
+        Relative, of the stress: area, thickness, load cell, and how much one specimen is stiffer than another.
+    test : float
+        Relative, of the stress of one test as a whole: how much tests of one specimen differ, in other modes, too.
+    length : float
+        Relative, of strain: gauge length.
+    slack : float
+        Of the stretch at which the specimen is free of stress: slack, preload.
+    zero : float, MPa
+        Of the stress at rest: zero of the load cell.
+    smooth : float
+        Relative, of the stress, another one all along the curve of each test: digitising, averaging, drift, hysteresis.
+    stretch : float
+        Of every single stretch: independent errors of the displacement, which count as noise where the curve is steep.
+    resolution : float
+        Relative to the largest stress of a test, of every single stress: resolution of the load cell, digits of a file.
+    **sizes : float
+        Of further errors, such as a `MeasurementError` of your own, by their names.
+
+    Raises
+    ------
+    InputError
+        When one of them is negative or not a number, or there is no such error, or no such estimand.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> tq.Tolerances(stress=0.1, slack=0.01)
+    Tolerances(stress=0.1, slack=0.01)
+    >>> tq.Tolerances("specimen", slack=0).sizes["length"]
+    0.01
+    """
+
+    def __init__(self, estimand: str = "", /, **sizes: float) -> None:
+        if estimand and estimand not in ESTIMANDS:
+            raise InputError(f"there is no estimand '{estimand}'. Choose one of: {', '.join(ESTIMANDS)}.")
+        errors = {name: find(MeasurementError, "error of a test", name, InputError)() for name in sizes}
+        for name, size in sizes.items():
+            if not isinstance(size, Real) or isinstance(size, bool) or not 0 <= float(size) < inf:
+                raise InputError(f"the tolerance of the {name} must be a number, zero or more, not {size!r}.")
+        all_sizes = {**(ESTIMANDS[estimand].sizes if estimand else {}), **sizes}
+        kinds = {**variants(MeasurementError), **{name: type(error) for name, error in errors.items()}}
+        self.estimand = estimand or ("" if any(all_sizes.values()) else AS_TESTED)
+        self._stated = {name: float(all_sizes[name]) for name in kinds if name in all_sizes}
+        self._sizes = {name: size for name, size in self._stated.items() if size}
+        self._errors = {name: kinds[name]() for name in self._sizes}
+
+    def __repr__(self) -> str:
+        standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
+        names = [name for name in measurement_errors() if self._sizes.get(name, 0.0) != standard.get(name, 0.0)]
+        sizes = [f"{name}={self._sizes.get(name, 0.0)!r}" for name in names]
+        return f"Tolerances({', '.join([repr(self.estimand)] * bool(standard) + sizes)})"
+
+    def __eq__(self, value: object) -> bool:
+        return isinstance(value, Tolerances) and (self.estimand, self._sizes) == (value.estimand, value._sizes)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._sizes.items()))
+
+    def __bool__(self) -> bool:
+        return bool(self._sizes)
+
+    def __iter__(self) -> Iterator[tuple[MeasurementError, float]]:
+        """Iterate over the errors whose size is not zero, with their sizes."""
+        return ((self._errors[name], size) for name, size in self._sizes.items())
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """The sizes that are not zero, by the errors' names."""
+        return dict(self._sizes)
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """The sizes with those of the estimand that are set to zero."""
+        return dict(self._stated)
+
+    @property
+    def meaning(self) -> str:
+        """What an interval with these errors is of, in words."""
+        return ESTIMANDS[self.estimand].description if self.estimand else "the specimens, with the stated errors"
+
+    @property
+    def stress(self) -> float:
+        """The relative standard deviation of the stress between specimens."""
+        return self._sizes.get(ScaleError.name, 0.0)
+
+    @property
+    def test(self) -> float:
+        """The relative standard deviation of the stress between tests of a specimen."""
+        return self._sizes.get(TestError.name, 0.0)
+
+    @property
+    def resolution(self) -> float:
+        """The standard deviation of every single stress, over the largest one of its test."""
+        return self._sizes.get(ResolutionError.name, 0.0)
+
+    def with_sizes(self, **sizes: float) -> Tolerances:
+        """Return the same tolerances but for these sizes."""
+        return Tolerances(self.estimand, **(self._stated | sizes))
+
+    def with_factor(self, factor: float) -> Tolerances:
+        """Return the same tolerances with the spreads between specimens and tests times a factor."""
+        names = [name for name in (ScaleError.name, TestError.name) if name in self._sizes]
+        return self.with_sizes(**{name: factor * self._sizes[name] for name in names})
+
+    @property
+    def has_standard_spreads(self) -> bool:
+        """Whether the spreads between specimens and tests are those of the estimand, not stated by themselves."""
+        standard = ESTIMANDS[self.estimand].sizes if self.estimand else {}
+        names = ScaleError.name, TestError.name
+        return bool(standard) and all(self._sizes.get(name, 0.0) == standard.get(name, 0.0) for name in names)
+
+    def in_common(self, experiment: Experiment) -> float:
+        """Return the standard deviation of the relative error of stress that all specimens and tests have in common."""
+        tests, specimens = specimens_of(experiment).shape
+        return float(np.hypot(self.stress / np.sqrt(specimens), self.test / np.sqrt(tests)))
+
+    @property
+    def need_slope(self) -> bool:
+        """Whether any of them moves the curve along the stretch."""
+        return any(error.needs_slope for error, _ in self)
+
+    def variance(self, points: ErrorPoints) -> FloatArray:
+        """Return the variance (..., n) of the stress of a new test at points."""
+        return np.asarray(sum(size**2 * error.variance(points) for error, size in self))
+
+    def noise(self, points: ErrorPoints) -> FloatArray:
+        """Return what errors that every measurement has by itself are as noise of the stress: sd (n,), MPa."""
+        variances = [size**2 * error.variance(points) for error, size in self if error.is_independent]
+        return np.asarray(np.sqrt(sum(variances, start=np.zeros(len(points.stress)))))
+
+    def columns(self, points: ErrorPoints, shared: Shared) -> FloatArray:
+        """Return what one standard deviation of each error of a test as a whole does to its stresses (n, q), MPa.
+
+        Parameters
+        ----------
+        points : ErrorPoints
+            All points of the test, with about what stresses (n,) it has there without errors.
+        shared : str
+            Which errors: those with this value of `MeasurementError.shared`.
+        """
+        columns = [
+            size * error.effect(points) for error, size in self if not error.is_independent and error.shared == shared
+        ]
+        return np.column_stack([np.zeros((len(points.stress), 0)), *columns])
+
+
+BETWEEN_SPECIMENS = Tolerances(stress=ESTIMANDS[TISSUE].sizes["stress"])
+"""For tests of different specimens, where the discrepancy takes up other errors: their stresses agree to 18 %."""
+
+
+def specimens_of(experiment: Experiment) -> NDArray[np.bool_]:
+    """Return which tests (tests, specimens) are of which specimen; a test without a name is of one of its own."""
+    labels = [test.specimen or number for number, test in enumerate(experiment.tests)]
+    return np.array([[label == specimen for specimen in dict.fromkeys(labels)] for label in labels])
+
+
+@dataclass(frozen=True, eq=False)
+class FittedErrors:
+    """Estimates of the errors of the tests that are plugged in, not integrated; `tissuq.fit` makes them.
+
+    Attributes
+    ----------
+    curve : (n,) array, MPa, optional
+        About what stress the measurements have without errors: errors of whole tests act along it.
+    slopes : (n, c) array, MPa, optional
+        Of that stress along each control of its test; of tests with fewer than c controls the last ones are zero.
+    level : float, MPa, optional
+        The standard deviation of all independent errors (noise and S), to which errors of whole tests are relative.
+    lag : float, optional
+        Correlation of the noise of consecutive measurements.
+    factor : float, optional
+        Of the spreads of the stress between specimens and tests, over the stated ones, where several tests tell it.
+    fits : int
+        How many fits of the same data the estimates took.
+    """
+
+    curve: FloatArray | None = None
+    slopes: FloatArray | None = None
+    level: float | None = None
+    lag: float | None = None
+    factor: float | None = None
+    fits: int = 0
+
+    def points_of(self, experiment: Experiment) -> list[ErrorPoints]:
+        """Return the points of every test at which its errors act; none where no curve was estimated."""
+        if self.curve is None:
+            return []
+        points, start = [], 0
+        for test in experiment.tests:
+            part = slice(start, start + test.size)
+            slope = 0.0 if self.slopes is None else self.slopes[part, : len(test.mode.controls)]
+            points.append(ErrorPoints(test.mode, test.stretch, self.curve[part], slope))
+            start += test.size
+        return points
+
+    @property
+    def account(self) -> str:
+        """What was estimated and what it cost, in words; empty where nothing was."""
+        estimates = [
+            "the mean curve along which whole tests err" * (self.curve is not None),
+            f"the spread between tests ({self.factor:.3g} times the stated one)" if self.factor is not None else "",
+            f"the lag-1 correlation of {self.lag:.3g}" if self.lag is not None else "",
+        ]
+        named = " and ".join(filter(None, estimates))
+        return f"{named} estimated by {self.fits} further fits and then taken as known" if named else ""
