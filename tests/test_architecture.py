@@ -72,7 +72,8 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
         ),
     ],
 )
-def test_the_python_in_the_documents_runs(document):
+def test_the_python_in_the_documents_runs(document, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # for the files that it writes
     text = (ROOT.parents[1] / document).read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     assert blocks
