@@ -12,14 +12,12 @@ from tissuq.experiments.modes.path import STEP
 from tissuq.mechanics.arithmetic import exp, library, log
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.pieces import PiecewiseEnergy
-from tissuq.mechanics.rays import DIRECTIONS, Range, Rays, direction_of_angle, ends_of, log_growth
+from tissuq.mechanics.rays import DIRECTIONS, Range, Rays, direction_of, direction_of_angle, ends_of, log_growth
 
 __all__ = ["Continuation", "continuations", "rays_to_ends", "sum_of_energies"]
 
 FloatArray = NDArray[np.float64]
 
-TINY = 1e-30
-"""Keeps the direction of no strain a number."""
 SHARES, WEIGHTS = 0.5 * (np.polynomial.legendre.leggauss(8) + np.array([[1.0], [0.0]]))
 """Nodes and weights of the integral over s, from 0 to 1."""
 ANY_STRETCHES = (1.25, 1.0, 0.8)
@@ -78,9 +76,7 @@ class Continuation(NamedTuple):
 def _invariant_and_direction(stretches: Any) -> tuple[Any, Any]:
     """Return I1 - 3 and the c of the direction of the Hencky strain."""
     l1, l2, l3 = stretches
-    e1, e2, e3 = (log(stretch) for stretch in stretches)
-    size = (e1 * e1 + e2 * e2 + e3 * e3 + TINY) ** 1.5
-    return l1 * l1 + l2 * l2 + l3 * l3 - 3, 3 * 6**0.5 * e1 * e2 * e3 / size
+    return l1 * l1 + l2 * l2 + l3 * l3 - 3, direction_of(log(l1), log(l2), log(l3))
 
 
 def sum_of_energies(
@@ -114,7 +110,7 @@ def continuations(
     """
     from scipy.interpolate import Akima1DInterpolator
 
-    log_invariant = np.broadcast_to(np.log(np.expm1(2 * rays.ends).sum(axis=1)), energies.shape)
+    log_invariant = np.broadcast_to(np.log(rays.end_invariant), energies.shape)
     values = np.stack([log_invariant, energies, stresses / rays.end_rate, exponents, errors], axis=-1)
     functions = Akima1DInterpolator(DIRECTIONS, values, axis=1)
     return [Continuation(np.ascontiguousarray(np.moveaxis(draw, -1, 0))) for draw in np.moveaxis(functions.c, 2, 0)]

@@ -23,6 +23,7 @@ __all__ = [
     "MAX_CORNER_EXCESS",
     "Range",
     "Rays",
+    "direction_of",
     "direction_of_angle",
     "ends_of",
     "log_growth",
@@ -44,8 +45,8 @@ MAX_CORNER_WIDTH, MAX_CORNER_EXCESS = 0.2, 0.075
 radians, and by how much that logarithm is too large beside the corner, at the most."""
 FAR = 3.0
 """Hencky strain at which rays end that never leave the range."""
-TINY = 1e-100
-"""The smallest Hencky strain by which another one is divided."""
+TINY = 1e-30
+"""Keeps the direction of no strain a number."""
 NEWTON_STEPS = 60
 """Most steps to the end of a range along rays; few are needed."""
 ROUNDING = 1e-9
@@ -113,14 +114,24 @@ def ends_of(limits: Range) -> FloatArray:
 
 def share_to_end(logs: FloatArray, limits: Range) -> FloatArray:
     """Return by which factor (n,), one at most, logarithmic stretches (n, 3) stay within `ends_of` limits."""
-    from scipy.interpolate import Akima1DInterpolator
-
     if limits == Range():
         return np.ones(len(logs))
-    size = np.linalg.norm(logs, axis=1)
-    direction = np.clip(3 * 6**0.5 * logs.prod(axis=1) / np.maximum(size, TINY) ** 3, -1, 1)
-    shares = Akima1DInterpolator(DIRECTIONS, ends_of(limits))(direction) / np.maximum(size, TINY)
+    direction = np.clip(direction_of(*logs.T), -1, 1)
+    shares = _interpolated_ends(limits)(direction) / np.maximum(np.linalg.norm(logs, axis=1), TINY)
     return np.where(shares > 1 - ROUNDING, 1.0, shares)
+
+
+@lru_cache(maxsize=64)
+def _interpolated_ends(limits: Range) -> Any:
+    """Return the function of directions that interpolates `ends_of`."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    return Akima1DInterpolator(DIRECTIONS, ends_of(limits))
+
+
+def direction_of(e1: Any, e2: Any, e3: Any) -> Any:
+    """Return the direction c of logarithmic stretches (see `DIRECTIONS`), arrays of NumPy (also complex) or of JAX."""
+    return 3 * 6**0.5 * e1 * e2 * e3 / (e1 * e1 + e2 * e2 + e3 * e3 + TINY) ** 1.5
 
 
 def direction_of_angle(angle: FloatArray) -> FloatArray:
@@ -160,6 +171,13 @@ class Rays:
     ends: FloatArray
     logs: FloatArray
 
+    @classmethod
+    def leaving(cls, logs: FloatArray, limits: Range) -> tuple[FloatArray, NDArray[np.intp], Rays]:
+        """Return all states (n, 3) drawn back to the range, which of them (g,) lie beyond, and the rays to these."""
+        share = share_to_end(logs, limits)[:, None]
+        (beyond,) = np.nonzero(share[:, 0] < 1)
+        return share * logs, beyond, cls((share * logs)[beyond], logs[beyond])
+
     @property
     def last_states(self) -> States:
         """States (2 g,) at the ends and farther in, the stress being the work on the Hencky strain along the rays."""
@@ -172,9 +190,14 @@ class Rays:
         return _rate(self.ends)
 
     @property
+    def end_invariant(self) -> FloatArray:
+        """I1 - 3 (g,) at the ends."""
+        return _invariant(self.ends)
+
+    @property
     def distance(self) -> FloatArray:
         """The logarithms (g,) of I1 - 3 at the ends over that farther in."""
-        return np.asarray(np.log(_invariant(self.ends) / _invariant(INNER_SHARE * self.ends)))
+        return np.asarray(np.log(self.end_invariant / _invariant(INNER_SHARE * self.ends)))
 
     def last_exponents(self, at_end: FloatArray, farther_in: FloatArray) -> FloatArray:
         """Return exponents (..., g) before the ends, from stresses there and farther in; 0 unless they are positive."""
@@ -186,7 +209,7 @@ class Rays:
     @property
     def log_distance(self) -> FloatArray:
         """The logarithms (g,) of I1 - 3 at the states over that at the ends."""
-        return np.asarray(np.log(_invariant(self.logs) / _invariant(self.ends)))
+        return np.asarray(np.log(_invariant(self.logs) / self.end_invariant))
 
     def growth(self, exponent: FloatArray, error: FloatArray) -> FloatArray:
         """Return the stress at the states over that at the ends (..., g), for exponents and their errors (..., g)."""

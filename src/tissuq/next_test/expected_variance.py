@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.mechanics.rays import Range, Rays, log_growth, share_to_end, through, with_errors
+from tissuq.mechanics.rays import Range, Rays, log_growth, through, with_errors
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
@@ -63,10 +63,8 @@ def joint_stresses(
     p = components.root.shape[2]
     mean, root = np.empty((len(components), len(states))), np.zeros((len(components), len(states), p + 1))
     for limits, rows in ranges:
-        share = share_to_end(logs, limits)[:, None]
-        (beyond,) = np.nonzero(share[:, 0] < 1)
-        rays = Rays((share * logs)[beyond], logs[beyond])
-        wanted = States.joined([through(share * logs, rates), rays.last_states]) if len(beyond) else states
+        ends, beyond, rays = Rays.leaving(logs, limits)
+        wanted = States.joined([through(ends, rates), rays.last_states]) if len(beyond) else states
         means, roots = _within(model, components[rows], wanted)
         mean[rows], root[rows, :, :p] = means[:, : len(logs)], roots[:, : len(logs)]
         if len(beyond):

@@ -15,7 +15,7 @@ from tissuq.inference.linear import SpectralCovariance
 from tissuq.inference.reduction import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
-from tissuq.mechanics.rays import Rays, scores, share_to_end, through, with_errors
+from tissuq.mechanics.rays import Rays, scores, through, with_errors
 from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -289,10 +289,8 @@ def stresses_beyond(
     assert drawn.member is not None  # noqa: S101 (the caller has looked)
     (logs, rates), score = states.log_stretches, scores(probability)
     for limits, rows in model.by_limits(drawn.member):
-        share = share_to_end(logs, limits)[:, None]
-        (beyond,) = np.nonzero(share[:, 0] < 1)
+        _, beyond, rays = Rays.leaving(logs, limits)
         if len(beyond):
-            rays = Rays((share * logs)[beyond], logs[beyond])
             last = States.joined([through(rays.ends, rates[beyond]), rays.last_states])
             material_stress, discrepancy_stress = _drawn_within(model, drawn[rows], last)
             stress, at_end, farther_in = np.split(material_stress + discrepancy_stress, 3, axis=1)
