@@ -93,8 +93,11 @@ def test_points_of_a_mode_are_states_of_its_first_test_or_of_none():
 def test_single_states_and_thinned_ones_are_those_of_their_paths():
     states = tq.Experiment.of([SHEET, *TESTS]).states
     for number in range(len(states)):
-        assert states.one(number).abscissa == states.abscissa[number : number + 1]
-        assert states.one(number).curve == states.curve[number]
+        assert states.among([number]).abscissa == states.abscissa[number : number + 1]
+        assert states.among([number]).curve == states.curve[number]
+    for numbers in ([0, 1], [1, 3, 4], list(range(len(states)))):
+        assert states.among(numbers).abscissa.tolist() == states.abscissa[numbers].tolist()
+        assert states.among(numbers).curve.tolist() == states.curve[numbers].tolist()
     assert states.thinned(2).abscissa.tolist() == [1.1, 1.0, 0.8, 1.3, 1.05, 1.1]
 
 

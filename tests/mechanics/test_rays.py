@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import fractional_matrix_power
 from scipy.optimize import brentq
 from scipy.stats import t as student_t
 
+from loading import MEASURED
 from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics import material_named
 from tissuq.mechanics.rays import (
@@ -19,6 +21,7 @@ from tissuq.mechanics.rays import (
     Range,
     Rays,
     direction_of_angle,
+    drawn_back,
     ends_of,
     log_growth,
     scores,
@@ -286,3 +289,46 @@ def test_corners_of_a_range_are_rounded_from_outside(limits, corner):
 def test_a_range_without_limits_has_no_end():
     assert share_to_end(direction_of_angle(np.array([0.0, 0.5])) * 2.9, Range()).tolist() == [1.0, 1.0]
     assert share_to_end(np.zeros((1, 3)), Range(invariant_1=0.1)).tolist() == [1.0]
+
+
+@pytest.mark.parametrize("measured", MEASURED, ids=str)
+def test_states_drawn_back_are_powers_of_their_deformation(measured):
+    states = measured.path.at(measured.points)
+    for share in (0.3, 1.0):
+        drawn = drawn_back(states, np.full(len(states), share))
+        strains, _ = drawn.axis_strains
+        for point, along_axes, logs in zip(measured.points, strains, drawn.log_stretches[0], strict=True):
+            F = measured.gradient(point)
+            power = fractional_matrix_power(F.T @ F, share)
+            assert np.allclose(1 + along_axes, np.diag(power)[:2], atol=1e-12)
+            assert np.allclose(np.sort(2 * logs), np.log(np.linalg.eigvalsh(power)), atol=1e-12)
+    # Where nothing is drawn back, every strain changes at the rate that it has on the path.
+    for name in ("axis_strains", "log_stretches"):
+        assert np.allclose(getattr(drawn, name)[1], getattr(states, name)[1], atol=1e-9), name
+
+
+@pytest.mark.parametrize("dispersion", [0.0, 0.2])
+def test_rays_end_where_a_strain_along_an_axis_does(dispersion):
+    limits = Range(along_axes=((dispersion, 0.15),))
+
+    def strain(F, share):
+        C = fractional_matrix_power(F.T @ F, share).real
+        sizes = [
+            np.trace((dispersion * np.eye(3) + (1 - 3 * dispersion) * np.diag(axis)) @ C) - 1 for axis in np.eye(3)[:2]
+        ]
+        return np.abs(sizes).max()
+
+    count = 0
+    for measured in MEASURED:
+        points = measured.points
+        states = measured.path.at(points)
+        shares = share_to_end(states.log_stretches[0], limits, states.tilt[0])
+        for point, share in zip(points, shares, strict=True):
+            F = measured.gradient(point)
+            if share == 1:
+                assert strain(F, 1.0) <= 0.15 * (1 + 1e-9)
+            else:
+                count += 1
+                assert strain(F, share) == pytest.approx(0.15, rel=1e-6)
+                assert strain(F, 1.0) > 0.15 or dispersion  # with a dispersion, a strain may turn back
+    assert count > 50

@@ -75,6 +75,8 @@ class Assessment:
         Posterior probabilities of the sums of energies in an average.
     between : float
         Share of the parameter's variance that is between these.
+    direction : float or None
+        Probability of a preferred direction of the material; None where no energy has one.
     probability_of_none : float or None
         Posterior probability of no discrepancy, if it is as probable as this one before the data. For information:
         intervals that drop the discrepancy for that reason miss the parameter where the noise hides a small one.
@@ -111,6 +113,7 @@ class Assessment:
     amplitudes: Mapping[str, float]
     members: Mapping[str, float]
     between: float
+    direction: float | None
     probability_of_none: float | None
     width_against_none: float | None
     scales: tuple[str, ...]
@@ -138,6 +141,11 @@ class Assessment:
         if len(self.members) > 1:
             named = ", ".join(f"{name} {weight:.0%}" for name, weight in self.members.items() if weight >= 0.005)
             clauses.append(f"the energies have the weights {named}; {self.between:.0%} of the variance is between them")
+        if self.direction is not None:
+            clauses.append(
+                f"the stresses of the two axes tell of a preferred direction with a probability of "
+                f"{_percent(self.direction)}; the initial shear modulus is the mean over all directions"
+            )
         if self.shifts:
             worst = max(self.shifts, key=lambda factor: abs(self.shifts[factor]))
             clauses.append(
@@ -236,6 +244,7 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
         },
         members=dict(solution.members),
         between=_between(solution, marginal),
+        direction=_direction(solution),
         probability_of_none=_probability_of_none(solution, none),
         width_against_none=marginal.sd / none.marginals[model.headline].sd if none else None,
         scales=scales,
@@ -326,6 +335,14 @@ def _even(states: States) -> States:
 def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
     low, high = np.quantile(values, [0.025, 0.975])
     return float(values.mean()), float(low), float(high)
+
+
+def _direction(solution: Solution) -> float | None:
+    """Return the probability of members with a preferred direction, where there are some."""
+    model, mixture = solution.model, solution.mixture
+    if mixture.member is None or all(member.is_isotropic for member in model.energy_members):
+        return None
+    return float(mixture.weights[~model.are_isotropic(mixture.member)].sum() / mixture.weights.sum())
 
 
 def _between(solution: Solution, marginal: Marginal) -> float:

@@ -62,7 +62,7 @@ class Stability:
     mode : str
     stretch : (g,) array
     baker_ericksen : (g,) array
-        The greater principal stress along the greater stretch.
+        The greater principal stress along the greater stretch, where there is no preferred direction.
     drucker : (g,) array
         Work of every small change of stress is positive: the tangent of Cauchy stress by logarithmic strain, in the
         plane of the first two axes with the third free of stress, is positive definite (as Abaqus checks).
@@ -131,7 +131,10 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
     ModelError
         When the material has directions, or its energy cannot be differentiated at many states at once.
     """
-    criteria = _criteria(_curves(solution.model, _sampled_components(solution)), mode, stretch)
+    components = _sampled_components(solution)
+    criteria = _criteria(
+        _curves(solution.model, components), mode, stretch, solution.model.are_isotropic(components.member)
+    )
     stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(criteria))
     shares = (flags.mean(axis=0) for flags in (*criteria, stable))
     return Stability(mode.name, stretch, *shares)
@@ -165,13 +168,14 @@ def stable_ranges(solution: Solution) -> dict[str, StableRange]:
     Empty where stability cannot be computed from the material's energy. In the other modes the material passes through
     the same states, or through states between theirs.
     """
-    ranges = {}
+    ranges, components = {}, _sampled_components(solution)
+    is_isotropic = solution.model.are_isotropic(components.member)
     for mode in (kind() for kind in loading_modes().values()):
         if not mode.is_curve:
             continue
         stretch = _measured(solution.model.experiment, mode)
         try:
-            criteria = _criteria(_curves(solution.model, _sampled_components(solution)), mode, stretch)
+            criteria = _criteria(_curves(solution.model, components), mode, stretch, is_isotropic)
         except ModelError:
             return {}
         stable = _from_reference(stretch - 1, np.logical_and.reduce(criteria))
@@ -197,11 +201,16 @@ def are_stable(model: StatisticalModel, points: GaussianMixture, modes: Sequence
     ModelError
         As `stability` does.
     """
-    return stable_draws(lambda rows: _curves(model, points[rows]), len(points.weights), model.experiment, modes)
+    count, is_isotropic = len(points.weights), model.are_isotropic(points.member)
+    return stable_draws(lambda rows: _curves(model, points[rows]), count, model.experiment, modes, is_isotropic)
 
 
 def stable_draws(
-    curves_of: Callable[[NDArray[np.intp]], Curves], count: int, data: Experiment, modes: Sequence[LoadingMode]
+    curves_of: Callable[[NDArray[np.intp]], Curves],
+    count: int,
+    data: Experiment,
+    modes: Sequence[LoadingMode],
+    is_isotropic: Flags | None = None,
 ) -> Flags:
     """Return whether draws (count,) are stable over the range that data measured, of all of some loading modes.
 
@@ -212,8 +221,11 @@ def stable_draws(
     count : int
     data : Experiment
     modes : sequence of LoadingMode
+    is_isotropic : (count,) or (1,) array of bool, optional
+        Which draws have no preferred direction; without it, all.
     """
     stable = np.ones(count, dtype=bool)
+    is_isotropic = np.broadcast_to(True if is_isotropic is None else is_isotropic, count)
     paths = [(mode, _measured(data, mode)) for mode in modes]
     first_mode, first_stretch = paths[0]
     # The ends first, at little cost: most draws that are not stable fail there.
@@ -221,7 +233,8 @@ def stable_draws(
     for mode, stretch in (at_ends, *paths):
         remaining = np.flatnonzero(stable)
         if len(remaining):
-            stable[remaining] = np.logical_and.reduce(_criteria(curves_of(remaining), mode, stretch)).all(axis=1)
+            criteria = _criteria(curves_of(remaining), mode, stretch, is_isotropic[remaining])
+            stable[remaining] = np.logical_and.reduce(criteria).all(axis=1)
     return stable
 
 
@@ -255,8 +268,13 @@ def _curves(model: StatisticalModel, mixture: GaussianMixture) -> Curves:
     return stresses
 
 
-def _criteria(curves: Curves, mode: LoadingMode, stretch: FloatArray) -> tuple[Flags, Flags, Flags]:
-    """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each."""
+def _criteria(
+    curves: Curves, mode: LoadingMode, stretch: FloatArray, is_isotropic: Flags
+) -> tuple[Flags, Flags, Flags]:
+    """Return whether Baker-Ericksen, Drucker and rising stress hold at stretches (g,) of a mode: (M, g) each.
+
+    The first is no condition of a draw (M,) that has a preferred direction.
+    """
     base = np.array([np.broadcast_to(values, len(stretch)) for values in mode.principal_stretches(stretch)])
     nudges = [np.zeros(3), *(sign * LOG_STRAIN_STEP * direction for direction in DIRECTIONS for sign in (1, -1))]
     logs = np.concatenate([np.log(base.T) + nudge for nudge in nudges for _ in DIRECTIONS])
@@ -270,7 +288,7 @@ def _criteria(curves: Curves, mode: LoadingMode, stretch: FloatArray) -> tuple[F
     gaps = np.stack([base[0] - base[2], base[1] - base[2], base[0] - base[1]])
     baker = (
         (differences * np.sign(gaps)[:, None] > -NEUTRAL_STRESS_RATIO * size) | (np.abs(gaps)[:, None] < 1e-9)
-    ).all(axis=0)
+    ).all(axis=0) | ~is_isotropic[:, None]
     determinant = tangent[:, 0, 0] * tangent[:, 1, 1] - tangent[:, 0, 1] * tangent[:, 1, 0]
     drucker = (tangent[:, 0, 0] > 0) & (determinant > 0)
     nudged = np.concatenate([stretch - LOG_STRAIN_STEP, stretch + LOG_STRAIN_STEP])

@@ -211,6 +211,13 @@ class Experiment:
         return self.curves[0].specimen if len(self.tests) == 1 else ""
 
     @property
+    def shows_direction(self) -> bool:
+        """Whether every test measured the stresses of two axes of a sheet, so that a preferred direction would show."""
+        plane = self.states.moved(0.0).plane
+        is_known = all(component is not None and np.isfinite(component).all() for component in plane)
+        return is_known and not np.any(plane[2]) and all(len(test.curves) > 1 for test in self.tests)
+
+    @property
     def mode(self) -> LoadingMode:
         """How the specimen was loaded in the test."""
         return self._only_test[0].mode

@@ -117,7 +117,7 @@ def _pivoted_root(
             return root[:, :rank]
         if rank == root.shape[1]:
             root = np.hstack([root, np.zeros((n, min(rank, n - rank)))])
-        column = correlation(states, states.one(pivot))[:, 0] - root[:, :rank] @ root[pivot, :rank]
+        column = correlation(states, states.among([pivot]))[:, 0] - root[:, :rank] @ root[pivot, :rank]
         root[:, rank] = column / np.sqrt(remaining[pivot])
         remaining = np.maximum(remaining - root[:, rank] ** 2, 0.0)
         remaining[pivot] = 0.0

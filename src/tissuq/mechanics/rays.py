@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.modes import Deformation, Path, States
-from tissuq.mechanics.arithmetic import exp
+from tissuq.mechanics.arithmetic import cos, exp, sin
 
 __all__ = [
     "DIRECTIONS",
@@ -25,6 +25,8 @@ __all__ = [
     "Rays",
     "direction_of",
     "direction_of_angle",
+    "dispersed",
+    "drawn_back",
     "ends_of",
     "log_growth",
     "scores",
@@ -49,6 +51,8 @@ TINY = 1e-30
 """Keeps the direction of no strain a number."""
 NEWTON_STEPS = 60
 """Most steps to the end of a range along rays; few are needed."""
+BISECTIONS = 40
+"""Of a ray, to its end along the axes."""
 ROUNDING = 1e-9
 """Relative excess over a range that still counts as within it."""
 INNER_SHARE = 0.9
@@ -64,11 +68,15 @@ MIN_EXPONENT, MAX_EXPONENT = -0.5, 3.0
 
 
 class Range(NamedTuple):
-    """Limits of I1 - 3, of I2 - 3 and of the logarithms of the principal stretches."""
+    """Limits of I1 - 3, of I2 - 3, of the logarithms of the principal stretches and of strains along the axes.
+
+    The latter are pairs of a dispersion and the largest size of `dispersed` strains with it.
+    """
 
     invariant_1: float = np.inf
     invariant_2: float = np.inf
     logarithms: tuple[float, float] = (-np.inf, np.inf)
+    along_axes: tuple[tuple[float, float], ...] = ()
 
     def within(self, other: Range) -> Range:
         """Return what lies in both."""
@@ -77,7 +85,13 @@ class Range(NamedTuple):
             min(self.invariant_1, other.invariant_1),
             min(self.invariant_2, other.invariant_2),
             (max(low, other_low), min(high, other_high)),
+            (*self.along_axes, *other.along_axes),
         )
+
+    @property
+    def isotropic(self) -> Range:
+        """The same without limits along the axes."""
+        return self._replace(along_axes=())
 
 
 def share_within(logs: FloatArray, limits: Range) -> FloatArray:
@@ -97,6 +111,29 @@ def share_within(logs: FloatArray, limits: Range) -> FloatArray:
     return np.where(shares > 1 - ROUNDING, 1.0, shares)
 
 
+def dispersed(invariant_1: FloatArray, axis_strains: FloatArray, dispersion: float) -> FloatArray:
+    """Return the strains (n, 2) of structure tensors about the axes of the test (Gasser, Ogden & Holzapfel 2006).
+
+    From I1 - 3 (n,) and C11 - 1 and C22 - 1 (n, 2), or from the rates of these: k (I1 - 3) + (1 - 3 k) (Cii - 1).
+    """
+    return np.asarray(dispersion * invariant_1[:, None] + (1 - 3 * dispersion) * axis_strains)
+
+
+def _share_along_axes(logs: FloatArray, tilt: FloatArray, limits: Range) -> FloatArray:
+    """Return by which factor (n,), one at most, logarithmic stretches (n, 3) stay within limits along the axes."""
+    share, low, high = np.ones(len(logs)), np.zeros(len(logs)), np.ones(len(logs))
+    turned = np.sin(tilt) ** 2
+    for _ in range(BISECTIONS):
+        strains = np.expm1(2 * share[:, None] * logs)
+        change = turned * (strains[:, 1] - strains[:, 0])
+        along = np.stack([strains[:, 0] + change, strains[:, 1] - change], axis=1)
+        sizes = [np.abs(dispersed(strains.sum(axis=1), along, k)).max(axis=1) / limit for k, limit in limits.along_axes]
+        is_within = np.max(sizes, axis=0) <= 1 + ROUNDING
+        low, high = np.where(is_within, share, low), np.where(is_within, high, share)
+        share = 0.5 * (low + high)
+    return low
+
+
 @lru_cache(maxsize=64)
 def ends_of(limits: Range) -> FloatArray:
     """Return the Hencky strains (g,) at which rays of directions `DIRECTIONS` leave a range, its corners rounded.
@@ -112,12 +149,18 @@ def ends_of(limits: Range) -> FloatArray:
     return np.asarray(np.exp((logs - distances**2 / (2 * width)).max(axis=1)))
 
 
-def share_to_end(logs: FloatArray, limits: Range) -> FloatArray:
-    """Return by which factor (n,), one at most, logarithmic stretches (n, 3) stay within `ends_of` limits."""
-    if limits == Range():
-        return np.ones(len(logs))
-    direction = np.clip(direction_of(*logs.T), -1, 1)
-    shares = _interpolated_ends(limits)(direction) / np.maximum(np.linalg.norm(logs, axis=1), TINY)
+def share_to_end(logs: FloatArray, limits: Range, tilt: FloatArray | None = None) -> FloatArray:
+    """Return by which factor (n,), one at most, logarithmic stretches (n, 3) stay within `ends_of` limits.
+
+    The angles (n,) of the first principal axis from axis 1 of the test are zero unless given.
+    """
+    isotropic, shares = limits.isotropic, np.ones(len(logs))
+    if isotropic != Range():
+        direction = np.clip(direction_of(*logs.T), -1, 1)
+        shares = _interpolated_ends(isotropic)(direction) / np.maximum(np.linalg.norm(logs, axis=1), TINY)
+    if limits.along_axes:
+        tilt = np.zeros(len(logs)) if tilt is None else tilt
+        shares = np.minimum(shares, _share_along_axes(logs, tilt, limits))
     return np.where(shares > 1 - ROUNDING, 1.0, shares)
 
 
@@ -144,16 +187,38 @@ class _Through(Path):
     """Deformations of given logarithmic stretches that change at given rates: its points are both, (n, 6)."""
 
     def moved(self, point: Any, step: Any) -> Deformation:
-        stretches = exp(point[..., :3] + point[..., 3:] * step)
+        stretches = exp(point[..., :3] + point[..., 3:6] * step)
         return Deformation.along_axes((stretches[..., 0], stretches[..., 1], stretches[..., 2]))
 
     def abscissa(self, points: Any) -> Any:
         return exp(points[..., 0])
 
 
-def through(logs: FloatArray, rates: FloatArray) -> States:
-    """Return states of logarithmic stretches (n, 3), the stress of each being the work on these rates (n, 3)."""
-    return _Through().at(np.hstack([logs, rates]))
+@dataclass(frozen=True)
+class _Tilted(_Through):
+    """The same with principal axes 1 and 2 at given angles to those of the test, which change, too: points (n, 8)."""
+
+    def moved(self, point: Any, step: Any) -> Deformation:
+        stretches = super().moved(point, step).stretches
+        (x, y), angle = (stretch**2 for stretch in stretches[:2]), 2 * (point[..., 6] + point[..., 7] * step)
+        mean, half = 0.5 * (x + y), 0.5 * (x - y)
+        return Deformation(stretches, (mean + half * cos(angle), mean - half * cos(angle), half * sin(angle)))
+
+
+def through(logs: FloatArray, rates: FloatArray, tilt: tuple[FloatArray, FloatArray] | None = None) -> States:
+    """Return states of logarithmic stretches (n, 3), the stress of each being the work on these rates (n, 3).
+
+    Where principal axes are not those of the test, ``tilt`` is as `States.tilt`.
+    """
+    if tilt is None or not np.any(tilt):
+        return _Through().at(np.hstack([logs, rates]))
+    return _Tilted().at(np.hstack([logs, rates, np.stack(tilt, axis=1)]))
+
+
+def drawn_back(states: States, share: FloatArray) -> States:
+    """Return states at shares (n,) of the Hencky strain, which change at the same rates."""
+    logs, rates = states.log_stretches
+    return through(share[:, None] * logs, rates, states.tilt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,23 +231,29 @@ class Rays:
         Logarithmic stretches where the rays leave the range.
     logs : (g, 3) array
         Those of the states.
+    tilt : (g,) array or float
+        Angle of the first principal axis from axis 1 of the test.
     """
 
     ends: FloatArray
     logs: FloatArray
+    tilt: FloatArray | float = 0.0
 
     @classmethod
-    def leaving(cls, logs: FloatArray, limits: Range) -> tuple[FloatArray, NDArray[np.intp], Rays]:
-        """Return all states (n, 3) drawn back to the range, which of them (g,) lie beyond, and the rays to these."""
-        share = share_to_end(logs, limits)[:, None]
-        (beyond,) = np.nonzero(share[:, 0] < 1)
-        return share * logs, beyond, cls((share * logs)[beyond], logs[beyond])
+    def leaving(cls, states: States, limits: Range) -> tuple[NDArray[np.intp], Rays, States]:
+        """Return which states (g,) lie beyond a range, the rays to these, and all states drawn back to the range."""
+        (logs, _), (tilt, _) = states.log_stretches, states.tilt
+        share = share_to_end(logs, limits, tilt)
+        (beyond,) = np.nonzero(share < 1)
+        rays = cls(share[beyond, None] * logs[beyond], logs[beyond], tilt[beyond])
+        return beyond, rays, drawn_back(states, share) if len(beyond) else states
 
     @property
     def last_states(self) -> States:
         """States (2 g,) at the ends and farther in, the stress being the work on the Hencky strain along the rays."""
-        last = np.concatenate([self.ends, INNER_SHARE * self.ends])
-        return through(last, last / np.linalg.norm(last, axis=1, keepdims=True))
+        last, tilt = np.concatenate([self.ends, INNER_SHARE * self.ends]), np.broadcast_to(self.tilt, len(self.ends))
+        motion = np.tile(tilt, 2), np.zeros(len(last))
+        return through(last, last / np.linalg.norm(last, axis=1, keepdims=True), motion)
 
     @property
     def end_rate(self) -> FloatArray:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import LoadingMode, States
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.mechanics.rays import Range, Rays, log_growth, through, with_errors
+from tissuq.mechanics.rays import Range, Rays, log_growth, with_errors
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
@@ -58,17 +58,17 @@ def joint_stresses(
     """
     if components.member is None:
         return _within(model, components, states)
-    logs, rates = states.log_stretches
+    count = len(states)
     ranges = list(model.by_limits(components.member)) or [(Range(), np.arange(len(components)))]
     p = components.root.shape[2]
     mean, root = np.empty((len(components), len(states))), np.zeros((len(components), len(states), p + 1))
     for limits, rows in ranges:
-        ends, beyond, rays = Rays.leaving(logs, limits)
-        wanted = States.joined([through(ends, rates), rays.last_states]) if len(beyond) else states
+        beyond, rays, within = Rays.leaving(states, limits)
+        wanted = States.joined([within, rays.last_states]) if len(beyond) else states
         means, roots = _within(model, components[rows], wanted)
-        mean[rows], root[rows, :, :p] = means[:, : len(logs)], roots[:, : len(logs)]
+        mean[rows], root[rows, :, :p] = means[:, :count], roots[:, :count]
         if len(beyond):
-            at, last = np.ix_(rows, beyond), (means[:, len(logs) :], roots[:, len(logs) :])
+            at, last = np.ix_(rows, beyond), (means[:, count:], roots[:, count:])
             mean[at], root[at] = _beyond(rays, (mean[at], root[at]), last)
     return mean, root
 

@@ -37,6 +37,8 @@ Sampling = Literal["sobol", "latin", "random"]
 """How draws spread: a scrambled Sobol sequence, Latin hypercubes, or independently."""
 KNOTS = 1001
 """Of a discrepancy's functions: 25 or more in the shortest length scale."""
+MIN_ISOTROPIC_SHARE = 0.5
+"""Probability that a material is the same in all directions, at the least, for draws that are."""
 MOST_TRIES = 64
 """Draws tried for each admissible one that is wanted."""
 
@@ -166,6 +168,7 @@ def drawn_ensemble(
     ----------
     solution : Solution
         Of an isotropic material, and a discrepancy that is an energy, has none, or adds the terms of another material.
+        Of an average, energies with a preferred direction are left out.
     count : int
     seed : int
         From which the draws follow.
@@ -177,10 +180,12 @@ def drawn_ensemble(
     Raises
     ------
     InputError, ModelError
-        When the posterior is not one of energies, or hardly any draw is admissible.
+        When the posterior is not one of energies, has a preferred direction more probably than not, or hardly any draw
+        is admissible.
     """
     model = solution.model
     _check(model, count, seed, sampling)
+    solution = _isotropic(solution)
     modes, draws, tried = _curve_modes(), list[EnergyDraw](), 0
     while len(draws) < count:
         if tried >= MOST_TRIES * count:
@@ -254,6 +259,22 @@ def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> Non
             f"discrepancy '{model.discrepancy.name}' is an error of the measured stress and no material: fit with one "
             "that is an energy, such as 'auto', or with 'none'."
         )
+
+
+def _isotropic(solution: Solution) -> Solution:
+    """Return the posterior given that there is no preferred direction."""
+    is_isotropic = solution.model.are_isotropic(solution.mixture.member)
+    if is_isotropic.all():
+        return solution
+    isotropic = solution.mixture[np.flatnonzero(is_isotropic)]
+    share = float(isotropic.weights.sum() / solution.mixture.weights.sum())
+    if share < MIN_ISOTROPIC_SHARE:
+        raise ModelError(
+            f"the material has a preferred direction with a probability of {1 - share:.3g}, and draws as materials are "
+            "the same in all directions: fit with the discrepancy 'auto-isotropic' if its direction does not matter."
+        )
+    mixture = isotropic.weighted(isotropic.weights / isotropic.weights.sum())
+    return replace(solution, represent=lambda: mixture)
 
 
 def _points(

@@ -15,7 +15,7 @@ from tissuq.inference.linear import SpectralCovariance
 from tissuq.inference.reduction import correlation_spectrum, scaled_spectrum
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
-from tissuq.mechanics.rays import Rays, scores, through, with_errors
+from tissuq.mechanics.rays import Rays, scores, with_errors
 from tissuq.model.discrepancy import Member, side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
@@ -287,11 +287,11 @@ def stresses_beyond(
     the linear parameters are the means of the components, which have members.
     """
     assert drawn.member is not None  # noqa: S101 (the caller has looked)
-    (logs, rates), score = states.log_stretches, scores(probability)
+    score = scores(probability)
     for limits, rows in model.by_limits(drawn.member):
-        _, beyond, rays = Rays.leaving(logs, limits)
+        beyond, rays, within = Rays.leaving(states, limits)
         if len(beyond):
-            last = States.joined([through(rays.ends, rates[beyond]), rays.last_states])
+            last = States.joined([within.among(beyond), rays.last_states])
             material_stress, discrepancy_stress = _drawn_within(model, drawn[rows], last)
             stress, at_end, farther_in = np.split(material_stress + discrepancy_stress, 3, axis=1)
             exponents = with_errors(rays.last_exponents(at_end, farther_in), score[rows, None])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import States
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.mechanics.rays import Range, share_to_end, through
+from tissuq.mechanics.rays import Range, drawn_back, share_to_end
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import STRETCH_STEP, drawn_stress, stress_moments, stress_slopes, stresses_beyond
 
@@ -46,10 +46,10 @@ class Stress:
 
         They are more than those of the posterior where some of the states lie beyond its range.
         """
-        logs, rates = states.log_stretches
-        shares = np.array([share_to_end(logs, limits) for limits in self._limits or [Range()]])
-        farthest = shares.max(axis=0)[:, None]
-        within = through(farthest * logs, rates) if (farthest < 1).any() else states
+        logs, tilt = states.log_stretches[0], states.tilt[0]
+        shares = np.array([share_to_end(logs, limits, tilt) for limits in self._limits or [Range()]])
+        farthest = shares.max(axis=0)
+        within = drawn_back(states, farthest) if (farthest < 1).any() else states
         mean, variance = stress_moments(
             self.model, self.components, within, discrepancy=self.with_discrepancy, noise=False
         )

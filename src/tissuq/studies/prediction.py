@@ -362,6 +362,11 @@ def _prediction_warnings(
             f"the {mode.name} stress, which is predicted by the material alone. To predict with a discrepancy, fit "
             "with one that is an energy, such as 'auto'."
         )
+    if _is_along_one_axis(mode) and not model.are_isotropic(posterior.solution.mixture.member).all():
+        texts.append(
+            f"the fit allows a preferred direction, and {mode.name} loading leaves the lateral stretches to the "
+            "material: predicted is a test along axis 1 where they are equal, as those of an isotropic material."
+        )
     was_fitted = data is not None and _was_fitted(model.experiment, data)
     if was_fitted:
         texts.append(
@@ -381,6 +386,12 @@ def _prediction_warnings(
             "the spread between specimens and tests, fit with --estimand tissue."
         )
     return texts
+
+
+def _is_along_one_axis(mode: LoadingMode) -> bool:
+    """Return whether a mode sets the stretch of axis 1 alone."""
+    along, across, _ = mode.paths[0].at(mode.excursion([0.1])).moved(0.0).plane
+    return along is not None and across is None
 
 
 def _was_fitted(experiment: Experiment, data: Experiment) -> bool:

@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float64]
 
 STEP = 1e-30
 """Imaginary step: the derivative is the imaginary part over it, without subtraction and so without loss of digits."""
+TINY = 1e-300
+"""Keeps the rate of an angle a number where there is none."""
 UNMEASURED = -1
 """Number of the curve of states that belong to no measured one."""
 
@@ -177,6 +179,38 @@ class States:
         logs = np.log(np.stack([np.broadcast_to(stretch, len(self)).astype(complex) for stretch in stretches], axis=-1))
         return np.asarray(logs.real), np.asarray((logs.imag.T / STEP / self.loaded_axes).T)
 
+    @cached_property
+    def axis_strains(self) -> tuple[FloatArray, FloatArray]:
+        """C11 - 1 and C22 - 1 (n, 2) along the axes of the test, and their rates (n, 2) as in `log_stretches`.
+
+        Where a mode leaves them to the material, they are those of an isotropic one.
+        """
+        moved = self.moved(1j * STEP)
+        squares = [_known(*pair, len(self)) for pair in zip(moved.plane[:2], moved.stretches[:2], strict=True)]
+        strains = np.stack(squares, axis=-1) - 1
+        return np.asarray(strains.real), np.asarray((strains.imag.T / STEP / self.loaded_axes).T)
+
+    @cached_property
+    def tilt(self) -> tuple[FloatArray, FloatArray]:
+        """The angle (n,) of the first principal axis from axis 1 of the test, and its rate (n,) as in `log_stretches`.
+
+        Both are zero where principal axes are those of the test.
+        """
+        moved = self.moved(1j * STEP)
+        if moved.plane[2] is None:
+            return np.zeros(len(self)), np.zeros(len(self))
+        c11, c22, c12 = (_known(component, 0.0, len(self)) for component in moved.plane)
+        order = np.sign(np.subtract(*(np.asarray(stretch).real for stretch in moved.stretches[:2])))
+        cosine, sine = c11 - c22, 2 * c12
+        angle = 0.5 * np.arctan2(order * sine.real, order * cosine.real)
+        rate = (
+            0.5
+            * (cosine.real * sine.imag - sine.real * cosine.imag)
+            / np.maximum(np.abs(cosine) ** 2 + np.abs(sine) ** 2, TINY)
+        )
+        is_tilted = c12.real != 0
+        return np.where(is_tilted, angle, 0.0), np.where(is_tilted, rate / STEP / self.loaded_axes, 0.0)
+
     def by_path(self) -> Iterator[tuple[Path, Any, NDArray[np.intp]]]:
         """Yield every different path with all its points, and their numbers among all states."""
         numbers = np.split(np.arange(len(self)), np.cumsum(self._counts)[:-1])
@@ -189,12 +223,22 @@ class States:
         """Return one of so many states of every path, from its first."""
         return States(self.paths, tuple(points[::step] for points in self.points), self.curves)
 
-    def one(self, number: int) -> States:
-        """Return the state of that number by itself."""
-        ends = np.cumsum(self._counts)
-        path = int(np.searchsorted(ends, number, side="right"))
-        position = number - int(ends[path]) + self._counts[path]
-        return States((self.paths[path],), (self.points[path][position : position + 1],), (self.curves[path],))
+    def among(self, numbers: Sequence[int] | NDArray[np.intp]) -> States:
+        """Return the states of increasing numbers."""
+        ends, chosen = np.cumsum(self._counts), np.asarray(numbers)
+        parts = zip(self.paths, self.points, self.curves, ends, self._counts, strict=True)
+        taken = [
+            States((path,), (points[chosen[is_here] - end + count],), (curve,))
+            for path, points, curve, end, count in parts
+            if (is_here := (end - count <= chosen) & (chosen < end)).any()
+        ]
+        return self.joined(taken)
+
+
+def _known(component: Any, stretch: Any, count: int) -> NDArray[np.complex128]:
+    """Return a component (n,) of C, where it is not known the square of a stretch."""
+    values = np.broadcast_to(np.nan if component is None else component, count).astype(complex)
+    return np.where(np.isnan(values), np.square(stretch), values)
 
 
 def _end_to_end(arrays: list[Any]) -> Any:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.modes import States
 from tissuq.mechanics.invariants import invariant_rates, invariants
-from tissuq.mechanics.rays import Range
+from tissuq.mechanics.rays import Range, dispersed
 from tissuq.model.discrepancy.processes import pinned_squared_exponential
 
 __all__ = [
     "Coordinates",
+    "DirectionBlock",
     "EnergyBlock",
     "HenckyBlock",
     "LogBlock",
@@ -31,6 +32,8 @@ FloatArray = NDArray[np.float64]
 
 MAX_EXPONENT = 200.0
 """Largest exponent of a kernel; it is reached only far beyond the data."""
+TINY = 1e-8
+"""Strain at which a process stands for its slope at the reference."""
 GRID_POINTS = 400
 """Number of points over the data's range among which the pivots of a process are chosen."""
 
@@ -59,6 +62,8 @@ class EnergyBlock(ABC):
     name: ClassVar[str]
     formula: ClassVar[str]
     lengths: ClassVar[tuple[float, ...]] = (1.0,)
+    is_isotropic: ClassVar[bool] = True
+    """Whether it is the same in all directions; only then has it `slopes`."""
 
     @abstractmethod
     def reach(self, states: States) -> tuple[float, float]:
@@ -79,12 +84,12 @@ class EnergyBlock(ABC):
     def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
         """Return the variance (n,) of the stress for c = 1."""
 
-    @abstractmethod
     def slopes(self, coordinates: Coordinates, reach: tuple[float, float], length: float) -> Coordinates:
         """Return A'(x) (a, r), B'(y) (b, r) and w'(e) (c, r) of the terms dW_k = A(I1 - 3) + B(I2 - 3) + sum w(ln l_i).
 
         For c = 1, at x = I1 - 3 (a,), y = I2 - 3 (b,) and e = ln l (c,).
         """
+        raise NotImplementedError(f"the energy '{self.name}' is not one of the principal stretches alone")
 
 
 class ZeroModulusBlock(EnergyBlock):
@@ -189,6 +194,11 @@ class InvariantBlock(ProcessBlock):
         return x
 
 
+def _taylor(z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+    """Return the covariance of functions with independent normal Taylor coefficients, zero at zero."""
+    return np.asarray(np.expm1(np.minimum(z * z_prime / length**2, MAX_EXPONENT)))
+
+
 class TaylorBlock(InvariantBlock):
     """W1 = c g(x), cov(g, g') = exp(x x' / L^2) - 1: independent normal Taylor coefficients, an infinite Yeoh."""
 
@@ -197,7 +207,7 @@ class TaylorBlock(InvariantBlock):
     lengths = (0.4, 0.8, 1.6, 3.2)
 
     def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
-        return np.asarray(np.expm1(np.minimum(z * z_prime / length**2, MAX_EXPONENT)))
+        return _taylor(z, z_prime, length)
 
 
 class LogBlock(InvariantBlock):
@@ -292,3 +302,55 @@ class ValanisLandelBlock(SeparableBlock):
 
     def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
         return np.asarray(pinned_squared_exponential(z / length, z_prime / length, 1))
+
+
+@dataclass(frozen=True)
+class DirectionBlock(ProcessBlock):
+    """Another energy of the strain along each axis of the test: a preferred direction, or two, in the plane of a sheet.
+
+    With the strain z_i of a structure tensor about axis i (`tissuq.mechanics.rays.dispersed`), whose fibres have a
+    dispersion between 0 (all along the axis) and 1/3 (in all directions alike), dW = G_1(z_1) + G_2(z_2) less its mean
+    modulus, G_i' = c g_i(z_i) with independent processes g_i, g_i(0) = 0. Energy and stress vanish at the reference;
+    the modulus does not, but its mean over all directions of the body: (4/15) (1 - 3 k)^2 G''(0) |e|^2 is that of
+    G(z_1) over all rotations of a small strain e, and I1 - 3 = 2 |e|^2.
+
+    References
+    ----------
+    Gasser, Ogden & Holzapfel (2006), Journal of the Royal Society Interface 3, 15-35.
+    """
+
+    dispersion: float = 0.0
+
+    name = "direction"
+    formula = "G1(z1) + G2(z2) less their mean modulus, G' = c g(z), cov g = exp(z z' / L^2) - 1"
+    lengths = (0.3, 0.65, 1.4)
+    is_isotropic = False
+
+    def coordinates(self, states: States) -> tuple[FloatArray, FloatArray]:
+        strains, rates = states.axis_strains
+        (x, _), (rate_1, _) = invariants(states), invariant_rates(states)
+        return dispersed(x, strains, self.dispersion), dispersed(rate_1, rates, self.dispersion)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        return _taylor(z, z_prime, length)
+
+    def limits(self, reach: tuple[float, float]) -> Range:
+        return Range(along_axes=((self.dispersion, max(map(abs, reach))),))
+
+    def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        (z, v), (isotropic, _) = self.coordinates(states), invariant_rates(states)
+        initial_slope = self.terms(np.array([TINY]), reach, length)[0] / TINY
+        mean = np.multiply.outer(isotropic, self._mean_modulus * initial_slope)
+        return np.hstack([self.terms(z[:, axis], reach, length) * v[:, axis, None] - mean for axis in range(2)])
+
+    def stress_variance(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+        (z, v), (isotropic, _) = self.coordinates(states), invariant_rates(states)
+        scale, mean = length * (reach[1] - reach[0]), self._mean_modulus * isotropic[:, None]
+        with np.errstate(over="ignore"):
+            variances = v**2 * self.covariance(z, z, scale) + (mean**2 - 2 * mean * v * z) / scale**2
+        return np.asarray(variances.sum(axis=1))
+
+    @property
+    def _mean_modulus(self) -> float:
+        """That of G(z_1) over G''(0), as a multiple of I1 - 3."""
+        return 2 / 15 * (1 - 3 * self.dispersion) ** 2

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
+from tissuq.mechanics.material import Material
 from tissuq.mechanics.rays import Range
 from tissuq.model.discrepancy.blocks import (
     Coordinates,
+    DirectionBlock,
     EnergyBlock,
     HenckyBlock,
     LogBlock,
@@ -32,6 +35,7 @@ from tissuq.registry import find, variants
 __all__ = [
     "Auto",
     "AutoBalanced",
+    "AutoIsotropic",
     "AutoSharp",
     "EnergyDiscrepancy",
     "EnergySum",
@@ -81,6 +85,11 @@ class Member:
     def scaled_blocks(self) -> list[tuple[EnergyBlock, tuple[float, float], float]]:
         """Each block with its reach and its length scale."""
         return list(zip(self.blocks, self.reaches, self.lengths, strict=True))
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether all its blocks are."""
+        return all(block.is_isotropic for block in self.blocks)
 
     @property
     def limits(self) -> Range:
@@ -227,6 +236,9 @@ class Sketch(EnergyDiscrepancy):
 FIRST_BLOCKS, SECOND_BLOCKS = (TaylorBlock(), LogBlock()), (SecondInvariantBlock(), HenckyBlock())
 BLOCKS = (*FIRST_BLOCKS, *SECOND_BLOCKS, SplineBlock(), ZeroModulusBlock(), ValanisLandelBlock())
 """Every block that a sum of two may have."""
+DISPERSIONS = 0.0, 0.2
+"""Of structure tensors about a preferred direction."""
+DIRECTED_PAIRS = tuple(product(FIRST_BLOCKS, map(DirectionBlock, DISPERSIONS)))
 PAIRS = tuple(Sum(pair) for pair in product(FIRST_BLOCKS, SECOND_BLOCKS))
 SINGLES: tuple[tuple[EnergyBlock | None, ...], ...] = (
     *((block, None) for block in FIRST_BLOCKS),
@@ -234,34 +246,69 @@ SINGLES: tuple[tuple[EnergyBlock | None, ...], ...] = (
 )
 
 
-class Auto(EnergyDiscrepancy):
+@dataclass(frozen=True)
+class _Average(EnergyDiscrepancy):
+    """The average of some sums of blocks, at even odds with sums that have a preferred direction where tests show one.
+
+    They do where each of them measured the stresses of two axes of a sheet: these are the axes of the direction.
+    """
+
+    has_direction: bool = False
+
+    parameters = AMPLITUDES
+    isotropic_sums: ClassVar[tuple[Sum, ...]]
+
+    @property
+    def sums(self) -> tuple[Sum, ...]:  # type: ignore[override]  # of the object, not the class
+        """Those that are the same in all directions, and others."""
+        if not self.has_direction:
+            return self.isotropic_sums
+        odds = sum(energy_sum.odds for energy_sum in self.isotropic_sums) / len(DIRECTED_PAIRS)
+        return (*self.isotropic_sums, *(Sum(pair, odds) for pair in DIRECTED_PAIRS))
+
+    def adapted_to(self, material: Material, experiment: Experiment) -> Self:
+        return replace(self, has_direction=material.is_isotropic and experiment.shows_direction)
+
+
+class Auto(_Average):
     """The evidence decides: the average of {taylor, log} + {second-invariant, hencky}, and of their single blocks.
 
-    A single block has a quarter of the prior odds of a sum.
+    A single block has a quarter of the prior odds of a sum. Tests of two axes add {taylor, log} + direction.
     """
 
     name = "auto"
-    formula = "average of {taylor, log} + {second-invariant, hencky} and, at a quarter of their odds, each one alone"
-    parameters = AMPLITUDES
-    sums = (*PAIRS, *(Sum(blocks, 0.25) for blocks in SINGLES))
+    formula = (
+        "average of {taylor, log} + {second-invariant, hencky} and, at a quarter of their odds, each one alone; with "
+        "tests of two axes also of {taylor, log} + direction"
+    )
+    isotropic_sums = (*PAIRS, *(Sum(blocks, 0.25) for blocks in SINGLES))
 
 
-class AutoBalanced(EnergyDiscrepancy):
+class AutoIsotropic(_Average):
+    """`auto` without a preferred direction, whatever the tests: its draws are materials for other programs."""
+
+    name = "auto-isotropic"
+    formula = "auto without direction"
+    isotropic_sums = Auto.isotropic_sums
+
+    def adapted_to(self, material: Material, experiment: Experiment) -> Self:
+        return self
+
+
+class AutoBalanced(_Average):
     """The average of the same at equal odds: narrower, and more often wrong."""
 
     name = "auto-balanced"
     formula = "average of the sums and single blocks of auto at equal odds"
-    parameters = AMPLITUDES
-    sums = (*PAIRS, *map(Sum, SINGLES))
+    isotropic_sums = (*PAIRS, *map(Sum, SINGLES))
 
 
-class AutoSharp(EnergyDiscrepancy):
+class AutoSharp(_Average):
     """The average of the same, and of no discrepancy: narrowest, and wrong where a small discrepancy hides in noise."""
 
     name = "auto-sharp"
     formula = "average of auto-balanced and no discrepancy"
-    parameters = AMPLITUDES
-    sums = (*AutoBalanced.sums, Sum(()))
+    isotropic_sums = (*AutoBalanced.isotropic_sums, Sum(()))
 
 
 def discrepancies() -> dict[str, type[Discrepancy]]:
