@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.posterior.plug_in import FACTORS
+from tissuq.experiments.modes import loading_mode
+from tissuq.posterior.plug_in import CONTRADICTION_SPREAD, FACTORS
 
 STRETCH = np.linspace(0.8, 1.3, 9)
 
@@ -76,3 +77,65 @@ def test_tolerances_of_the_user_leave_the_spread_alone():
     posterior = tq.fit(specimens(4), discrepancy="none", noise_sd=0.01, tolerances=tq.Tolerances(stress=0.1))
     assert posterior.model.fitted_errors.factor is None
     assert posterior.model.fitted_errors.fits == 3
+
+
+def compressed_and_sheared(softening):
+    """Compression of a neo-Hookean tissue, and shear of one as stiff at first that softens with the amount of shear."""
+    stretch, shear = np.linspace(0.9, 0.99, 12), np.linspace(0.008, 0.1, 12)
+    generator = np.random.default_rng(0)
+    compressed, sheared = 0.11 * (stretch - stretch**-2), 0.11 * shear / (1 + softening * shear)
+    return [
+        tq.Experiment("uniaxial", stretch, compressed + 1e-5 * generator.standard_normal(12), name="compression"),
+        tq.Experiment("simple-shear", shear, sheared + 1e-5 * generator.standard_normal(12), name="shear"),
+    ]
+
+
+@pytest.fixture(scope="module")
+def contradictory():
+    return tq.fit(compressed_and_sheared(8.0))
+
+
+def test_tests_that_no_stable_energy_reconciles_are_fitted_by_simpler_ones_and_spread(contradictory):
+    model = contradictory.model
+    assert model.discrepancy.name == "auto-first"
+    assert model.fitted_errors.stable_share < 0.05
+    standard = tq.estimands()["tissue"].sizes
+    assert np.hypot(model.tolerances.stress, model.tolerances.test) == pytest.approx(CONTRADICTION_SPREAD)
+    assert model.tolerances.stress / model.tolerances.test == pytest.approx(standard["stress"] / standard["test"])
+    assert model.tolerances.sizes["slack"] == standard["slack"]
+    assert "the tests contradict each other" in contradictory.warnings[0]
+    assert "spread" not in contradictory.how  # which was not estimated
+    low, high = contradictory.marginals["C10"].hdi()
+    assert low < 0.055 < high
+
+
+def test_tests_of_one_stable_material_do_not_contradict():
+    posterior = tq.fit(compressed_and_sheared(0.0))
+    assert posterior.model.fitted_errors.stable_share is None
+    assert posterior.model.discrepancy.name == "auto"
+    assert not any("contradict" in warning for warning in posterior.warnings)
+
+
+@pytest.mark.parametrize(("law", "values"), [("ogden-1", [0.02, -12.0]), ("yeoh", [0.01, 0.02, 0.1])])
+def test_laws_of_tension_and_compression_that_differ_do_not_contradict(law, values):
+    material = tq.materials()[law]()
+    points = {"uniaxial": np.linspace(0.82, 1.22, 14), "simple-shear": np.linspace(0.03, 0.35, 12)}
+    tests = [
+        tq.Experiment(mode, at, factor * tq.mechanics.engineering_stress(material, loading_mode(mode), at, values))
+        for (mode, at), factor in zip(points.items(), (1.15, 0.85), strict=True)
+    ]
+    assert tq.fit(tests).model.fitted_errors.stable_share is None
+
+
+def test_a_discrepancy_by_name_and_tolerances_of_the_user_are_kept_where_tests_contradict():
+    tests = compressed_and_sheared(8.0)
+    assert tq.fit(tests, discrepancy="log+hencky").model.discrepancy.name == "log+hencky"
+    stated = tq.fit(tests, tolerances=tq.Tolerances(stress=0.1)).model
+    assert (stated.discrepancy.name, stated.tolerances.stress) == ("auto", 0.1)
+
+
+def test_a_saved_fit_still_says_that_its_tests_contradict(contradictory, tmp_path):
+    contradictory.save(tmp_path / "fit.nc")
+    loaded = tq.Posterior.load(tmp_path / "fit.nc")
+    assert loaded.model.discrepancy.name == "auto-first"
+    assert loaded.warnings[0] == contradictory.warnings[0]

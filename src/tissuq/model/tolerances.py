@@ -270,6 +270,9 @@ class FittedErrors:
         Correlation of the noise of consecutive measurements.
     factor : float, optional
         Of the spreads of the stress between specimens and tests, over the stated ones, where several tests tell it.
+    stable_share : float, optional
+        Probability that an energy which reconciles several tests is stable, where that is so small that one of I1
+        alone took its place.
     fits : int
         How many fits of the same data the estimates took.
     """
@@ -279,6 +282,7 @@ class FittedErrors:
     level: float | None = None
     lag: float | None = None
     factor: float | None = None
+    stable_share: float | None = None
     fits: int = 0
 
     def points_of(self, experiment: Experiment) -> list[ErrorPoints]:
@@ -296,10 +300,24 @@ class FittedErrors:
     @property
     def account(self) -> str:
         """What was estimated and what it cost, in words; empty where nothing was."""
+        has_estimated_factor = self.factor is not None and self.stable_share is None
         estimates = [
             "the mean curve along which whole tests err" * (self.curve is not None),
-            f"the spread between tests ({self.factor:.3g} times the stated one)" if self.factor is not None else "",
+            f"the spread between tests ({self.factor:.3g} times the stated one)" if has_estimated_factor else "",
             f"the lag-1 correlation of {self.lag:.3g}" if self.lag is not None else "",
         ]
         named = " and ".join(filter(None, estimates))
         return f"{named} estimated by {self.fits} further fits and then taken as known" if named else ""
+
+    @property
+    def contradiction(self) -> str:
+        """That the tests contradict each other, in words; empty where they do not."""
+        if self.stable_share is None:
+            return ""
+        probability = "below 1 %" if self.stable_share < 0.01 else f"of {self.stable_share:.0%}"
+        return (
+            "the tests contradict each other: no stable isotropic material reconciles them (an energy that does is "
+            f"stable with a probability {probability}). So energies of I1 alone are fitted, and tests may differ "
+            f"{self.factor:.2g} times as much as stated: see whether grips, friction, slack, direction or the state of "
+            "the specimens differed."
+        )

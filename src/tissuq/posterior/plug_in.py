@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stable_ranges
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
@@ -23,6 +24,9 @@ FloatArray = NDArray[np.float64]
 
 FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Factors of the spreads between specimens and tests that are tried."""
+CONTRADICTION_SPREAD = 0.3
+"""Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
+has one of 0.42, as that of the moduli in shear and in tension or compression of 15 isotropic tissues."""
 MIN_PATH_COSINE = 0.999
 """Of the angle between the Hencky strains of tests that follow one path, tension or compression."""
 CURVE_ITERATIONS = 3
@@ -67,15 +71,19 @@ class ErrorEstimates:
     def with_estimated_factor(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose spreads of the stress, between specimens and tests, are as large as several tests tell.
 
-        Tests along different paths do not tell it: an energy reconciles them whatever they differ by, and what it
-        cannot (a direction of the tissue) is no spread. They are the stated ones times a factor, the root of its
-        posterior mean square over a grid, under a prior of mean square one, half Student's t with three degrees of
-        freedom; at the noise that is likely without it.
+        They are the stated ones times a factor, the root of its posterior mean square over a grid, under a prior of
+        mean square one, half Student's t with three degrees of freedom; at the noise that is likely without it. Tests
+        along different paths do not tell it: an energy reconciles them whatever they differ by, and what it cannot (a
+        direction of the tissue) is no spread. Where such an energy is hardly ever stable, the tests contradict each
+        other: energies of I1 alone are then fitted, with the spread of such tests (`CONTRADICTION_SPREAD`).
         """
         stated, has_several = model.tolerances, len(model.experiment.tests) > 1
         has_spread = bool(stated.stress or stated.test)
-        if not (has_several and has_spread and self._has_evidence(model) and _are_alike(model.experiment)):
+        if not (has_several and has_spread and self._has_evidence(model)):
             return model
+        model = self._reconciled(model)
+        if model.fitted_errors.stable_share is not None or not _are_alike(model.experiment):
+            return model.with_errors(fits=self._fits)
         model = self._with_curve(model)
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
         candidates = [replace(sketch, tolerances=stated.with_factor(float(factor))) for factor in FACTORS]
@@ -89,6 +97,19 @@ class ErrorEstimates:
         weight = np.exp(log_evidence - log_evidence.max()) * FACTORS / (1 + FACTORS**2) ** 2  # even in the logarithm
         factor = float(np.sqrt(weight @ FACTORS**2 / weight.sum()))
         return replace(model, tolerances=stated.with_factor(factor)).with_errors(factor=factor, fits=self._fits)
+
+    def _reconciled(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model with its mean curve; one of simpler energies and more spread, where tests contradict."""
+        with_curve, simpler = self._with_curve(model), model.discrepancy.of_contradictory_tests
+        if simpler is None:
+            return with_curve
+        ranges = stable_ranges(self._solution(replace(with_curve, discrepancy=model.discrepancy.sketch)))
+        share = min((of_mode.probability for of_mode in ranges.values()), default=1.0)
+        if share >= MIN_LOSS_PROBABILITY:
+            return with_curve
+        factor = max(1.0, CONTRADICTION_SPREAD / float(np.hypot(model.tolerances.stress, model.tolerances.test)))
+        contradictory = replace(model, discrepancy=simpler, tolerances=model.tolerances.with_factor(factor))
+        return contradictory.with_errors(factor=factor, stable_share=share)
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""

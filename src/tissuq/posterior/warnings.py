@@ -41,6 +41,8 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Ite
     """Yield the warnings that a posterior carries, the most severe first."""
     if solution.is_approximate and solution.diagnostics is not None:
         yield solution.diagnostics.verdict
+    if contradiction := solution.model.fitted_errors.contradiction:
+        yield contradiction
     if ranges and min(stable_range.probability for stable_range in ranges.values()) < MIN_STABLE_PROBABILITY:
         yield _instability(solution, min(ranges.values(), key=lambda stable_range: stable_range.probability))
     if not solution.is_of_data:

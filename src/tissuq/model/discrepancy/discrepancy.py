@@ -57,6 +57,11 @@ class Discrepancy(ABC):
         return self if self.is_energy else replace(self, curves=len(experiment.curves))
 
     @property
+    def of_contradictory_tests(self) -> Discrepancy | None:
+        """What takes its place where no stable energy that it has reconciles several tests; None where nothing does."""
+        return None
+
+    @property
     def sketch(self) -> Discrepancy:
         """One that costs less to integrate and stands for it where only a first idea of a posterior is wanted."""
         return self

@@ -35,6 +35,7 @@ from tissuq.registry import find, variants
 __all__ = [
     "Auto",
     "AutoBalanced",
+    "AutoFirst",
     "AutoIsotropic",
     "AutoSharp",
     "EnergyDiscrepancy",
@@ -266,6 +267,10 @@ class _Average(EnergyDiscrepancy):
         odds = sum(energy_sum.odds for energy_sum in self.isotropic_sums) / len(DIRECTED_PAIRS)
         return (*self.isotropic_sums, *(Sum(pair, odds) for pair in DIRECTED_PAIRS))
 
+    @property
+    def of_contradictory_tests(self) -> Discrepancy | None:
+        return None if self.has_direction else AutoFirst()
+
     def adapted_to(self, material: Material, experiment: Experiment) -> Self:
         return replace(self, has_direction=material.is_isotropic and experiment.shows_direction)
 
@@ -293,6 +298,18 @@ class AutoIsotropic(_Average):
 
     def adapted_to(self, material: Material, experiment: Experiment) -> Self:
         return self
+
+
+class AutoFirst(EnergyDiscrepancy):
+    """The average of `taylor` and `log`, energies of I1 alone: what `auto` comes down to where tests contradict.
+
+    That is where no stable energy reconciles them: then they differ by more than their stated spread.
+    """
+
+    name = "auto-first"
+    formula = "average of taylor and log"
+    parameters = AMPLITUDES[:1]
+    sums = tuple(Sum((block,)) for block in FIRST_BLOCKS)
 
 
 class AutoBalanced(_Average):
