@@ -5,7 +5,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.modes import loading_mode
-from tissuq.posterior.plug_in import CONTRADICTION_SPREAD, FACTORS
+from tissuq.model.tolerances import CONTRADICTION_SPREAD
+from tissuq.posterior.plug_in import FACTORS
 
 STRETCH = np.linspace(0.8, 1.3, 9)
 
@@ -98,11 +99,10 @@ def contradictory():
 def test_tests_that_no_stable_energy_reconciles_are_fitted_by_simpler_ones_and_spread(contradictory):
     model = contradictory.model
     assert model.discrepancy.name == "auto-first"
-    assert model.fitted_errors.stable_share < 0.05
+    assert model.fitted_errors.reconciling_stability < 0.05
     standard = tq.estimands()["tissue"].sizes
     assert np.hypot(model.tolerances.stress, model.tolerances.test) == pytest.approx(CONTRADICTION_SPREAD)
-    assert model.tolerances.stress / model.tolerances.test == pytest.approx(standard["stress"] / standard["test"])
-    assert model.tolerances.sizes["slack"] == standard["slack"]
+    assert {**model.tolerances.sizes, "test": standard["test"]} == dict(standard)
     assert "the tests contradict each other" in contradictory.warnings[0]
     assert "spread" not in contradictory.how  # which was not estimated
     low, high = contradictory.marginals["C10"].hdi()
@@ -111,7 +111,7 @@ def test_tests_that_no_stable_energy_reconciles_are_fitted_by_simpler_ones_and_s
 
 def test_tests_of_one_stable_material_do_not_contradict():
     posterior = tq.fit(compressed_and_sheared(0.0))
-    assert posterior.model.fitted_errors.stable_share is None
+    assert posterior.model.fitted_errors.reconciling_stability is None
     assert posterior.model.discrepancy.name == "auto"
     assert not any("contradict" in warning for warning in posterior.warnings)
 
@@ -124,7 +124,7 @@ def test_laws_of_tension_and_compression_that_differ_do_not_contradict(law, valu
         tq.Experiment(mode, at, factor * tq.mechanics.engineering_stress(material, loading_mode(mode), at, values))
         for (mode, at), factor in zip(points.items(), (1.15, 0.85), strict=True)
     ]
-    assert tq.fit(tests).model.fitted_errors.stable_share is None
+    assert tq.fit(tests).model.fitted_errors.reconciling_stability is None
 
 
 def test_a_discrepancy_by_name_and_tolerances_of_the_user_are_kept_where_tests_contradict():
@@ -139,3 +139,27 @@ def test_a_saved_fit_still_says_that_its_tests_contradict(contradictory, tmp_pat
     loaded = tq.Posterior.load(tmp_path / "fit.nc")
     assert loaded.model.discrepancy.name == "auto-first"
     assert loaded.warnings[0] == contradictory.warnings[0]
+
+
+def test_what_was_asked_for_is_kept_in_contradictory_tests_of_one_specimen():
+    tests = [test.labelled(specimen="S") for test in compressed_and_sheared(8.0)]
+    priors = {"c1": tq.HalfNormal(0.05), "c2": tq.HalfNormal(0.05)}
+    model = tq.fit(tests, priors=priors).model
+    assert model.tolerances.test == CONTRADICTION_SPREAD  # all that they do not share
+    assert model.tolerances.stress == tq.estimands()["specimen"].sizes["stress"]
+    assert model.priors["c1"] == priors["c1"]
+    assert "c2" not in model.symbols
+
+
+def test_each_contradictory_test_is_predicted_by_the_model_of_all(monkeypatch):
+    used = []
+
+    def spy(tests, **options):
+        used.append(posterior := tq.fit(tests, **options))
+        return posterior
+
+    monkeypatch.setattr("tissuq.studies.held_out.fit", spy)
+    third = compressed_and_sheared(8.0)[0].labelled(name="second compression")
+    shifted = tq.Experiment("uniaxial", third.stretch, 1.1 * third.stress, name="second compression")
+    tq.held_out_tests([*compressed_and_sheared(8.0), shifted])
+    assert [posterior.model.discrepancy.name for posterior in used] == ["auto-first"] * 4

@@ -181,10 +181,10 @@ class Assessment:
             yield f"it has no initial stiffness, so it takes none from {self.parameter}"
             return
         mean, low, high = self.initial_share
-        yield (
-            f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), by which "
-            f"{self.parameter} may be off"
-        )
+        meaning = f"by which {self.parameter} may be off"
+        if self.direction is not None and self.direction > 0.5:
+            meaning = "which along the axes of the tests is another than in the mean over all directions"
+        yield f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), {meaning}"
 
     def _stability(self) -> str:
         """Return the probability of stability over the measured range, in words."""

@@ -39,6 +39,11 @@ def measurement_warnings(experiment: Experiment) -> Iterator[str]:
             f"modulus is extrapolated: measure within {NEAR_STRAIN_SHARE * reach:.2g} of {control.name} "
             f"{control.reference:g}."
         )
+    if not experiment.shows_direction and any(test.shows_direction for test in experiment.tests):
+        yield (
+            "a preferred direction is looked for only where every test measured the stresses of both axes: fit those "
+            "that did by themselves to see one."
+        )
     if experiment.size < MIN_MEASUREMENTS:
         yield (
             f"{experiment.size} measurements are too few to show how the stress deviates from the material: "

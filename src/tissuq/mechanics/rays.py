@@ -70,13 +70,13 @@ MIN_EXPONENT, MAX_EXPONENT = -0.5, 3.0
 class Range(NamedTuple):
     """Limits of I1 - 3, of I2 - 3, of the logarithms of the principal stretches and of strains along the axes.
 
-    The latter are pairs of a dispersion and the largest size of `dispersed` strains with it.
+    The latter are a dispersion, and the least and the largest of `dispersed` strains with it, for each dispersion.
     """
 
     invariant_1: float = np.inf
     invariant_2: float = np.inf
     logarithms: tuple[float, float] = (-np.inf, np.inf)
-    along_axes: tuple[tuple[float, float], ...] = ()
+    along_axes: tuple[tuple[float, float, float], ...] = ()
 
     def within(self, other: Range) -> Range:
         """Return what lies in both."""
@@ -127,8 +127,10 @@ def _share_along_axes(logs: FloatArray, tilt: FloatArray, limits: Range) -> Floa
         strains = np.expm1(2 * share[:, None] * logs)
         change = turned * (strains[:, 1] - strains[:, 0])
         along = np.stack([strains[:, 0] + change, strains[:, 1] - change], axis=1)
-        sizes = [np.abs(dispersed(strains.sum(axis=1), along, k)).max(axis=1) / limit for k, limit in limits.along_axes]
-        is_within = np.max(sizes, axis=0) <= 1 + ROUNDING
+        is_within = np.ones(len(logs), dtype=bool)
+        for dispersion, least, largest in limits.along_axes:
+            z = dispersed(strains.sum(axis=1), along, dispersion)
+            is_within &= (np.maximum(z / largest, z / least) <= 1 + ROUNDING).all(axis=1)
         low, high = np.where(is_within, share, low), np.where(is_within, high, share)
         share = 0.5 * (low + high)
     return low

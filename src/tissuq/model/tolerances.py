@@ -28,6 +28,7 @@ from tissuq.registry import find, variants
 __all__ = [
     "AS_TESTED",
     "BETWEEN_SPECIMENS",
+    "CONTRADICTION_SPREAD",
     "ESTIMANDS",
     "SPECIMEN",
     "TISSUE",
@@ -39,6 +40,9 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
+CONTRADICTION_SPREAD = 0.3
+"""Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
+has one of 0.42, as that of the moduli in shear and in tension or compression of 15 isotropic tissues."""
 AS_TESTED, SPECIMEN, TISSUE = "as-tested", "specimen", "tissue"
 LABORATORY: Mapping[str, float] = MappingProxyType(
     {"length": 0.01, "slack": 0.005, "smooth": 0.02, "resolution": 0.002}
@@ -270,7 +274,7 @@ class FittedErrors:
         Correlation of the noise of consecutive measurements.
     factor : float, optional
         Of the spreads of the stress between specimens and tests, over the stated ones, where several tests tell it.
-    stable_share : float, optional
+    reconciling_stability : float, optional
         Probability that an energy which reconciles several tests is stable, where that is so small that one of I1
         alone took its place.
     fits : int
@@ -282,7 +286,7 @@ class FittedErrors:
     level: float | None = None
     lag: float | None = None
     factor: float | None = None
-    stable_share: float | None = None
+    reconciling_stability: float | None = None
     fits: int = 0
 
     def points_of(self, experiment: Experiment) -> list[ErrorPoints]:
@@ -300,10 +304,9 @@ class FittedErrors:
     @property
     def account(self) -> str:
         """What was estimated and what it cost, in words; empty where nothing was."""
-        has_estimated_factor = self.factor is not None and self.stable_share is None
         estimates = [
             "the mean curve along which whole tests err" * (self.curve is not None),
-            f"the spread between tests ({self.factor:.3g} times the stated one)" if has_estimated_factor else "",
+            f"the spread between tests ({self.factor:.3g} times the stated one)" if self.factor is not None else "",
             f"the lag-1 correlation of {self.lag:.3g}" if self.lag is not None else "",
         ]
         named = " and ".join(filter(None, estimates))
@@ -312,12 +315,13 @@ class FittedErrors:
     @property
     def contradiction(self) -> str:
         """That the tests contradict each other, in words; empty where they do not."""
-        if self.stable_share is None:
+        if self.reconciling_stability is None:
             return ""
-        probability = "below 1 %" if self.stable_share < 0.01 else f"of {self.stable_share:.0%}"
+        share = self.reconciling_stability
+        probability = "less than 1 %" if share < 0.01 else f"{share:.0%}"
         return (
-            "the tests contradict each other: no stable isotropic material reconciles them (an energy that does is "
-            f"stable with a probability {probability}). So energies of I1 alone are fitted, and tests may differ "
-            f"{self.factor:.2g} times as much as stated: see whether grips, friction, slack, direction or the state of "
+            "the tests contradict each other: a material that reconciles all of them is stable with a probability of "
+            f"{probability} only. So a simpler discrepancy is fitted (auto-first), and the stresses of tests may "
+            f"differ by {CONTRADICTION_SPREAD:.0%}. See whether grips, friction, slack, direction or the state of "
             "the specimens differed."
         )

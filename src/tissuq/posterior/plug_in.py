@@ -15,7 +15,7 @@ from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
 from tissuq.inference.solution import Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK
-from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
+from tissuq.model.tolerances import BETWEEN_SPECIMENS, CONTRADICTION_SPREAD, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
 __all__ = ["ErrorEstimates", "default_tolerances"]
@@ -24,9 +24,6 @@ FloatArray = NDArray[np.float64]
 
 FACTORS = np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
 """Factors of the spreads between specimens and tests that are tried."""
-CONTRADICTION_SPREAD = 0.3
-"""Standard deviation of the relative stress of tests that contradict each other. The logarithm of the ratio of two then
-has one of 0.42, as that of the moduli in shear and in tension or compression of 15 isotropic tissues."""
 MIN_PATH_COSINE = 0.999
 """Of the angle between the Hencky strains of tests that follow one path, tension or compression."""
 CURVE_ITERATIONS = 3
@@ -82,9 +79,8 @@ class ErrorEstimates:
         if not (has_several and has_spread and self._has_evidence(model)):
             return model
         model = self._reconciled(model)
-        if model.fitted_errors.stable_share is not None or not _are_alike(model.experiment):
+        if model.fitted_errors.reconciling_stability is not None or not _are_alike(model.experiment):
             return model.with_errors(fits=self._fits)
-        model = self._with_curve(model)
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
         candidates = [replace(sketch, tolerances=stated.with_factor(float(factor))) for factor in FACTORS]
         if self._sums_noise(model):
@@ -107,9 +103,18 @@ class ErrorEstimates:
         share = min((of_mode.probability for of_mode in ranges.values()), default=1.0)
         if share >= MIN_LOSS_PROBABILITY:
             return with_curve
-        factor = max(1.0, CONTRADICTION_SPREAD / float(np.hypot(model.tolerances.stress, model.tolerances.test)))
-        contradictory = replace(model, discrepancy=simpler, tolerances=model.tolerances.with_factor(factor))
-        return contradictory.with_errors(factor=factor, stable_share=share)
+        tests, specimens = specimens_of(model.experiment).shape
+        of_specimen = model.tolerances.stress if specimens == tests else 0.0
+        of_test = max(model.tolerances.test, float(np.sqrt(max(CONTRADICTION_SPREAD**2 - of_specimen**2, 0.0))))
+        symbols = [symbol for symbol in model.symbols if symbol not in model.energy_symbols]
+        symbols += [parameter.symbol for parameter in simpler.parameters]
+        contradictory = replace(
+            model,
+            discrepancy=simpler,
+            tolerances=model.tolerances.with_sizes(test=of_test),
+            chosen_priors={symbol: prior for symbol, prior in model.chosen_priors.items() if symbol in symbols},
+        )
+        return contradictory.with_errors(reconciling_stability=share)
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""

@@ -59,7 +59,8 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     if isinstance(options.get("noise_sd"), Sequence) and not isinstance(options["noise_sd"], str):
         raise InputError("to predict a test from the others give one noise_sd for all tests, or leave it unknown.")
     if options.get("tolerances") is None:  # those of all tests, of which one alone has none
-        options["tolerances"] = fit(tests, **options).model.tolerances
+        model = fit(tests, **options).model
+        options |= {"tolerances": model.tolerances, "discrepancy": model.discrepancy}
     rows = []
     for index, test in enumerate(tests):
         posterior = fit([training_test for number, training_test in enumerate(tests) if number != index], **options)

@@ -362,11 +362,14 @@ def _prediction_warnings(
             f"the {mode.name} stress, which is predicted by the material alone. To predict with a discrepancy, fit "
             "with one that is an energy, such as 'auto'."
         )
-    if _is_along_one_axis(mode) and not model.are_isotropic(posterior.solution.mixture.member).all():
-        texts.append(
-            f"the fit allows a preferred direction, and {mode.name} loading leaves the lateral stretches to the "
-            "material: predicted is a test along axis 1 where they are equal, as those of an isotropic material."
+    along, across, _ = mode.paths[0].at(mode.excursion([0.1])).moved(0.0).plane
+    if across is None and not model.are_isotropic(posterior.solution.mixture.member).all():
+        meaning = (
+            "its one stress is predicted as the mean of those of axes 1 and 2"
+            if along is None
+            else "predicted is a test along axis 1 whose lateral stretches are equal, as those of an isotropic material"
         )
+        texts.append(f"the fit allows a preferred direction, of which {mode.name} loading knows nothing: {meaning}.")
     was_fitted = data is not None and _was_fitted(model.experiment, data)
     if was_fitted:
         texts.append(
@@ -386,12 +389,6 @@ def _prediction_warnings(
             "the spread between specimens and tests, fit with --estimand tissue."
         )
     return texts
-
-
-def _is_along_one_axis(mode: LoadingMode) -> bool:
-    """Return whether a mode sets the stretch of axis 1 alone."""
-    along, across, _ = mode.paths[0].at(mode.excursion([0.1])).moved(0.0).plane
-    return along is not None and across is None
 
 
 def _was_fitted(experiment: Experiment, data: Experiment) -> bool:

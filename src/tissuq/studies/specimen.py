@@ -230,9 +230,10 @@ def run_specimen(
             )
             continue
         options = _options(settings, material, priors, symbols[name], unit)
-        options["tolerances"] = posteriors[name].model.tolerances
+        fitted = posteriors[name].model
+        options |= {"tolerances": fitted.tolerances, "discrepancy": fitted.discrepancy}
         try:
-            predictions = held_out_tests(experiment.tests, discrepancy=name, **options).to_dict("records")
+            predictions = held_out_tests(experiment.tests, **options).to_dict("records")
         except TissuqError as error:
             skipped[f"{name}, each test predicted from the others"] = str(error)
             continue

@@ -194,3 +194,31 @@ def test_odds_of_a_direction_are_even():
     members = model.members(tq.Experiment.of(sheet(2e-4, 0.02)).states)
     assert sum(member.probability for member in members if member.is_isotropic) == pytest.approx(0.5)
     assert sum(member.probability for member in members) == pytest.approx(1.0)
+
+
+def test_tension_leaves_compression_open(directed):
+    law = tq.mechanics.material_named("neo-hookean+exponential-fibres:one@0")
+    points = np.array([[0.93, 0.95], [0.9, 0.9], [0.85, 0.95]])
+    for channel, path in enumerate(Biaxial().paths):
+        stress = tq.mechanics.engineering_stress(law, path, points, [0.01, 0.02, 2.0])  # fibres bear no compression
+        band = directed.predict(points, mode="biaxial", channel=channel, noise=False)
+        assert (band["low"] <= stress).all()
+        assert (stress <= band["high"]).all()
+
+
+def test_modes_of_one_stress_say_what_they_predict_of_a_directed_material(directed):
+    from tissuq.studies.prediction import predicted
+
+    for mode, words in (("uniaxial", "along axis 1"), ("equibiaxial", "mean of those of axes 1 and 2")):
+        warnings = predicted(directed, mode=mode, stretch=[1.05, 1.1]).warnings
+        assert any("preferred direction" in warning and words in warning for warning in warnings)
+    assert not any("preferred" in warning for warning in predicted(directed, mode="planar", stretch=[1.05]).warnings)
+
+
+def test_a_test_of_one_axis_among_sheets_hides_their_direction_and_says_so():
+    from tissuq.assessment.measurements import measurement_warnings
+
+    line = np.linspace(1.02, 1.2, 12)
+    tests = [*sheet(2e-4, 0.02), tq.Experiment("uniaxial", line, 0.06 * (line - line**-2))]
+    assert any("preferred direction" in text for text in measurement_warnings(tq.Experiment.of(tests)))
+    assert not any("preferred direction" in text for text in measurement_warnings(tq.Experiment.of(tests[:2])))

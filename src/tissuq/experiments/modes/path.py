@@ -208,7 +208,7 @@ class States:
             * (cosine.real * sine.imag - sine.real * cosine.imag)
             / np.maximum(np.abs(cosine) ** 2 + np.abs(sine) ** 2, TINY)
         )
-        is_tilted = c12.real != 0
+        is_tilted = (c12.real != 0) | (order * cosine.real < 0)
         return np.where(is_tilted, angle, 0.0), np.where(is_tilted, rate / STEP / self.loaded_axes, 0.0)
 
     def by_path(self) -> Iterator[tuple[Path, Any, NDArray[np.intp]]]:

@@ -32,6 +32,8 @@ FloatArray = NDArray[np.float64]
 
 MAX_EXPONENT = 200.0
 """Largest exponent of a kernel; it is reached only far beyond the data."""
+SIGN_SHARE = 0.1
+"""Strain along an axis over the largest one, to which tests in tension count for compression, and the reverse."""
 TINY = 1e-8
 """Strain at which a process stands for its slope at the reference."""
 GRID_POINTS = 400
@@ -54,9 +56,10 @@ class Coordinates(NamedTuple):
 class EnergyBlock(ABC):
     """A random strain energy dW = c sum_k u_k dW_k with independent standard normal weights u.
 
-    Energy, stress and shear modulus of every dW_k vanish at the reference, so that the initial modulus stays the
-    material's own. A block says what stress its terms have in any loading mode. Where it has a length scale, that
-    is a multiple of the range of the data, with equal prior probability for each of ``lengths``.
+    Energy, stress and shear modulus of every dW_k vanish at the reference (where there is a direction, the mean of the
+    modulus over all directions), so that the initial modulus stays the material's own. A block says what stress its
+    terms have in any loading mode. Where it has a length scale, that is a multiple of the range of the data, with equal
+    prior probability for each of ``lengths``.
     """
 
     name: ClassVar[str]
@@ -335,7 +338,8 @@ class DirectionBlock(ProcessBlock):
         return _taylor(z, z_prime, length)
 
     def limits(self, reach: tuple[float, float]) -> Range:
-        return Range(along_axes=((self.dispersion, max(map(abs, reach))),))
+        least = SIGN_SHARE * max(map(abs, reach))  # what one sign tells of the other
+        return Range(along_axes=((self.dispersion, min(reach[0], -least), max(reach[1], least)),))
 
     def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
         (z, v), (isotropic, _) = self.coordinates(states), invariant_rates(states)
