@@ -26,7 +26,7 @@ from tissuq.experiments.reading.units import stress_unit
 from tissuq.inference.enumerators.noise_grid import at_level
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.quasi_monte_carlo import systematic
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import FittedErrors
@@ -182,7 +182,7 @@ class Assessment:
             return
         mean, low, high = self.initial_share
         meaning = f"by which {self.parameter} may be off"
-        if self.direction is not None and self.direction > 0.5:
+        if self.direction is not None and self.direction > PROBABLE_DIRECTION:
             meaning = "which along the axes of the tests is another than in the mean over all directions"
         yield f"it carries {mean:.0%} of the initial stiffness (95 % interval {low:.0%} to {high:.0%}), {meaning}"
 
@@ -244,7 +244,7 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
         },
         members=dict(solution.members),
         between=_between(solution, marginal),
-        direction=_direction(solution),
+        direction=solution.direction_probability,
         probability_of_none=_probability_of_none(solution, none),
         width_against_none=marginal.sd / none.marginals[model.headline].sd if none else None,
         scales=scales,
@@ -335,14 +335,6 @@ def _even(states: States) -> States:
 def _mean_and_ends(values: FloatArray) -> tuple[float, float, float]:
     low, high = np.quantile(values, [0.025, 0.975])
     return float(values.mean()), float(low), float(high)
-
-
-def _direction(solution: Solution) -> float | None:
-    """Return the probability of members with a preferred direction, where there are some."""
-    model, mixture = solution.model, solution.mixture
-    if mixture.member is None or all(member.is_isotropic for member in model.energy_members):
-        return None
-    return float(mixture.weights[~model.are_isotropic(mixture.member)].sum() / mixture.weights.sum())
 
 
 def _between(solution: Solution, marginal: Marginal) -> float:

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, States, loading_mode, loading_modes
+from tissuq.experiments.modes import LoadingMode, States, curve_modes, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import Solution, are_isotropic
 from tissuq.mechanics.invariants import farthest_stretch, invariants, largest_invariants
 from tissuq.mechanics.rays import through
 from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
@@ -132,9 +132,8 @@ def stability(solution: Solution, mode: LoadingMode, stretch: FloatArray) -> Sta
         When the material has directions, or its energy cannot be differentiated at many states at once.
     """
     components = _sampled_components(solution)
-    criteria = _criteria(
-        _curves(solution.model, components), mode, stretch, solution.model.are_isotropic(components.member)
-    )
+    curves, is_isotropic = _curves(solution.model, components), are_isotropic(solution.model, components)
+    criteria = _criteria(curves, mode, stretch, is_isotropic)
     stable = _from_reference(stretch - mode.reference, np.logical_and.reduce(criteria))
     shares = (flags.mean(axis=0) for flags in (*criteria, stable))
     return Stability(mode.name, stretch, *shares)
@@ -169,10 +168,8 @@ def stable_ranges(solution: Solution) -> dict[str, StableRange]:
     the same states, or through states between theirs.
     """
     ranges, components = {}, _sampled_components(solution)
-    is_isotropic = solution.model.are_isotropic(components.member)
-    for mode in (kind() for kind in loading_modes().values()):
-        if not mode.is_curve:
-            continue
+    is_isotropic = are_isotropic(solution.model, components)
+    for mode in curve_modes():
         stretch = _measured(solution.model.experiment, mode)
         try:
             criteria = _criteria(_curves(solution.model, components), mode, stretch, is_isotropic)
@@ -201,31 +198,28 @@ def are_stable(model: StatisticalModel, points: GaussianMixture, modes: Sequence
     ModelError
         As `stability` does.
     """
-    count, is_isotropic = len(points.weights), model.are_isotropic(points.member)
-    return stable_draws(lambda rows: _curves(model, points[rows]), count, model.experiment, modes, is_isotropic)
+    is_isotropic = are_isotropic(model, points)
+    return stable_draws(lambda rows: _curves(model, points[rows]), is_isotropic, model.experiment, modes)
 
 
 def stable_draws(
     curves_of: Callable[[NDArray[np.intp]], Curves],
-    count: int,
+    is_isotropic: Flags,
     data: Experiment,
     modes: Sequence[LoadingMode],
-    is_isotropic: Flags | None = None,
 ) -> Flags:
-    """Return whether draws (count,) are stable over the range that data measured, of all of some loading modes.
+    """Return whether draws (N,) are stable over the range that data measured, of all of some loading modes.
 
     Parameters
     ----------
     curves_of : callable
         From places of M draws, the function of states (n,) that gives their stresses (M, n).
-    count : int
+    is_isotropic : (N,) array of bool
+        Which draws have no preferred direction.
     data : Experiment
     modes : sequence of LoadingMode
-    is_isotropic : (count,) or (1,) array of bool, optional
-        Which draws have no preferred direction; without it, all.
     """
-    stable = np.ones(count, dtype=bool)
-    is_isotropic = np.broadcast_to(True if is_isotropic is None else is_isotropic, count)
+    stable = np.ones(len(is_isotropic), dtype=bool)
     paths = [(mode, _measured(data, mode)) for mode in modes]
     first_mode, first_stretch = paths[0]
     # The ends first, at little cost: most draws that are not stable fail there.

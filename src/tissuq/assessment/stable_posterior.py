@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.stability import are_stable
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
+from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
 from tissuq.inference.gaussian_mixture import CHAINS, GaussianMixture
 from tissuq.inference.marginal import Marginal, marginal_of_points
 from tissuq.inference.solution import Marginals, Solution, shares_of_members
@@ -41,7 +41,7 @@ def modes_named(names: str | Sequence[str]) -> tuple[str, ...]:
     requested = [names] if isinstance(names, str) else list(names)
     if ALL_MODES in requested and len(requested) > 1:
         raise InputError(f"'{ALL_MODES}' cannot be combined with other loading modes in stable_in: omit the others.")
-    curves = [name for name, kind in loading_modes().items() if kind().is_curve]
+    curves = [mode.name for mode in curve_modes()]
     modes = curves if requested == [ALL_MODES] else list(dict.fromkeys(loading_mode(name).name for name in requested))
     unsuitable = [name for name in modes if name not in curves]
     if unsuitable:

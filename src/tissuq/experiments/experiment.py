@@ -210,7 +210,7 @@ class Experiment:
         """Which specimen it was; of several tests see that of each."""
         return self.curves[0].specimen if len(self.tests) == 1 else ""
 
-    @property
+    @cached_property
     def shows_direction(self) -> bool:
         """Whether every test measured the stresses of two axes of a sheet, so that a preferred direction would show."""
         plane = self.states.moved(0.0).plane

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.stability import stable_draws
-from tissuq.experiments.modes import Deformation, LoadingMode, Path, SimpleShear, loading_modes
+from tissuq.experiments.modes import Deformation, LoadingMode, Path, SimpleShear, curve_modes
 from tissuq.mechanics.arithmetic import exp, library
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.posterior.ensemble import Ensemble
@@ -20,7 +20,6 @@ __all__ = [
     "ANGLES",
     "SeenStates",
     "are_stable",
-    "curve_modes",
     "differences",
     "initial_slope",
     "mode_stretches",
@@ -85,11 +84,6 @@ class SeenStates(Path):
         return Deformation.along_axes((l1, l2, l3))
 
 
-def curve_modes() -> list[LoadingMode]:
-    """Return the loading modes of one stretch and one stress."""
-    return [mode for mode in (kind() for kind in loading_modes().values()) if mode.is_curve]
-
-
 def mode_stretches(low: float, high: float) -> FloatArray:
     """Return the stretches at which a mode is compared: in equal steps on either side of the reference, without it."""
     ends = (np.linspace(1.0, end, POINTS_PER_PATH + 1)[1:] for end in (low, high) if end != 1.0)
@@ -134,7 +128,8 @@ def are_stable(ensemble: Ensemble) -> NDArray[np.bool_]:
         selected = replace(ensemble, draws=tuple(ensemble[int(index)] for index in indices))
         return selected.stresses_at
 
-    return stable_draws(curves_of, len(ensemble), ensemble.model.experiment, curve_modes())
+    all_isotropic = np.ones(len(ensemble), dtype=bool)
+    return stable_draws(curves_of, all_isotropic, ensemble.model.experiment, curve_modes())
 
 
 def _ray(max_invariants: tuple[float, float], angle: float) -> FloatArray:

@@ -15,11 +15,21 @@ from tissuq.inference.marginal import Marginal, widened
 from tissuq.model.discrepancy import side_by_side
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["Diagnostics", "Enumerator", "Marginals", "Solution", "shares_of_members"]
+__all__ = [
+    "PROBABLE_DIRECTION",
+    "Diagnostics",
+    "Enumerator",
+    "Marginals",
+    "Solution",
+    "are_isotropic",
+    "shares_of_members",
+]
 
 FloatArray = NDArray[np.float64]
 
 NO_ERROR: Mapping[str, float] = {}
+PROBABLE_DIRECTION = 0.5
+"""Probability of a preferred direction above which the material counts as one that has it."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +191,14 @@ class Solution:
         chains, draws, _ = self.sampled.shape
         return np.arange(chains * draws).reshape(chains, draws), self.sampled
 
+    @cached_property
+    def direction_probability(self) -> float | None:
+        """Probability of a preferred direction of the material; None where no energy has one."""
+        if all(member.is_isotropic for member in self.model.energy_members):
+            return None
+        weights = self.mixture.weights
+        return float(weights[~are_isotropic(self.model, self.mixture)].sum() / weights.sum())
+
     @property
     def is_approximate(self) -> bool:
         """Whether the result must not be used as it stands, because sampling has not converged."""
@@ -191,6 +209,13 @@ class Solution:
         """The number of chains, and of draws in each."""
         chains, draws = self.component_of_draw.shape
         return chains, draws
+
+
+def are_isotropic(model: StatisticalModel, mixture: GaussianMixture) -> NDArray[np.bool_]:
+    """Return which components (M,) of a posterior have no preferred direction."""
+    if mixture.member is None:
+        return np.ones(len(mixture.weights), dtype=bool)
+    return np.array([member.is_isotropic for member in model.energy_members])[mixture.member]
 
 
 class Enumerator(Protocol):

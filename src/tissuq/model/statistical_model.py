@@ -244,12 +244,6 @@ class StatisticalModel(ErrorModel):
             alike = [number for number, other in zip(numbers, limits, strict=True) if other == distinct]
             yield distinct, np.flatnonzero(np.isin(member, alike))
 
-    def are_isotropic(self, member: NDArray[np.intp] | None) -> NDArray[np.bool_]:
-        """Return which energy members (M,) have no preferred direction; of no members, that none has one."""
-        if member is None:
-            return np.ones(1, dtype=bool)
-        return np.array([candidate.is_isotropic for candidate in self.energy_members])[member]
-
     def energy_features(self, member: int) -> list[FloatArray]:
         """Return the stresses of each block's terms of a member as `rows`."""
         return [self._rows_of_block(*scaled_block) for scaled_block in self.energy_members[member].scaled_blocks]

@@ -206,6 +206,13 @@ class Tolerances:
         names = [name for name in (ScaleError.name, TestError.name) if name in self._sizes]
         return self.with_sizes(**{name: factor * self._sizes[name] for name in names})
 
+    def of_contradictory_tests(self, experiment: Experiment) -> Tolerances:
+        """Return the same with so much between tests that each differs by `CONTRADICTION_SPREAD` or more."""
+        tests, specimens = specimens_of(experiment).shape
+        of_specimen = self.stress if specimens == tests else 0.0
+        remainder = float(np.sqrt(max(CONTRADICTION_SPREAD**2 - of_specimen**2, 0.0)))
+        return self.with_sizes(test=max(self.test, remainder))
+
     @property
     def has_standard_spreads(self) -> bool:
         """Whether the spreads between specimens and tests are those of the estimand, not stated by themselves."""

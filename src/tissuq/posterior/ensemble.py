@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from tissuq.assessment.stability import calibrated_range, stable_draws
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.modes import LoadingMode, Path, States, loading_modes
+from tissuq.experiments.modes import LoadingMode, Path, States, curve_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
-from tissuq.inference.solution import Solution
+from tissuq.inference.solution import PROBABLE_DIRECTION, Solution, are_isotropic
 from tissuq.mechanics import Material, StretchMaterial, stress_basis
 from tissuq.mechanics.continuation import Continuation, continuations, rays_to_ends, sum_of_energies
 from tissuq.mechanics.invariants import invariant_rates, invariants, largest_invariants
@@ -37,8 +37,6 @@ Sampling = Literal["sobol", "latin", "random"]
 """How draws spread: a scrambled Sobol sequence, Latin hypercubes, or independently."""
 KNOTS = 1001
 """Of a discrepancy's functions: 25 or more in the shortest length scale."""
-MIN_ISOTROPIC_SHARE = 0.5
-"""Probability that a material is the same in all directions, at the least, for draws that are."""
 MOST_TRIES = 64
 """Draws tried for each admissible one that is wanted."""
 
@@ -185,8 +183,8 @@ def drawn_ensemble(
     """
     model = solution.model
     _check(model, count, seed, sampling)
-    solution = _isotropic(solution)
-    modes, draws, tried = _curve_modes(), list[EnergyDraw](), 0
+    solution, all_isotropic = _isotropic(solution), np.ones(count, dtype=bool)
+    modes, draws, tried = curve_modes(), list[EnergyDraw](), 0
     while len(draws) < count:
         if tried >= MOST_TRIES * count:
             raise ModelError(
@@ -194,9 +192,9 @@ def drawn_ensemble(
                 f"{count} are wanted: fit with stable_in='all', choose another material, or take all draws."
             )
         batch = _materials(solution, count, [seed, tried // count], sampling)
-        stable = np.ones(count, dtype=bool)
+        stable = all_isotropic
         if admissible:
-            stable = stable_draws(partial(_curves, batch), count, model.experiment, modes)
+            stable = stable_draws(partial(_curves, batch), all_isotropic, model.experiment, modes)
         accepted = np.flatnonzero(stable)[: count - len(draws)]
         draws += [batch[index] for index in accepted]
         tried += int(accepted[-1]) + 1 if len(draws) == count else count
@@ -263,16 +261,16 @@ def _check(model: StatisticalModel, count: int, seed: int, sampling: str) -> Non
 
 def _isotropic(solution: Solution) -> Solution:
     """Return the posterior given that there is no preferred direction."""
-    is_isotropic = solution.model.are_isotropic(solution.mixture.member)
-    if is_isotropic.all():
+    probability = solution.direction_probability
+    if not probability:
         return solution
-    isotropic = solution.mixture[np.flatnonzero(is_isotropic)]
-    share = float(isotropic.weights.sum() / solution.mixture.weights.sum())
-    if share < MIN_ISOTROPIC_SHARE:
+    if probability > PROBABLE_DIRECTION:
         raise ModelError(
-            f"the material has a preferred direction with a probability of {1 - share:.3g}, and draws as materials are "
-            "the same in all directions: fit with the discrepancy 'auto-isotropic' if its direction does not matter."
+            f"the material has a preferred direction with a probability of {probability:.3g}, and draws as materials "
+            "are the same in all directions: fit with the discrepancy 'auto-isotropic' if its direction does not "
+            "matter."
         )
+    isotropic = solution.mixture[np.flatnonzero(are_isotropic(solution.model, solution.mixture))]
     mixture = isotropic.weighted(isotropic.weights / isotropic.weights.sum())
     return replace(solution, represent=lambda: mixture)
 
@@ -366,7 +364,3 @@ def _ends(states: States) -> Iterator[tuple[float, float]]:
     for largest in largest_invariants(through(wider, rates)):
         yield 0.0, largest
     yield float(wider.min()), float(wider.max())
-
-
-def _curve_modes() -> list[LoadingMode]:
-    return [mode for mode in (kind() for kind in loading_modes().values()) if mode.is_curve]

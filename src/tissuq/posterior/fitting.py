@@ -177,7 +177,7 @@ def fit_many(
         model = StatisticalModel(data, *options, tolerances or Tolerances())
         if tolerances is None and (default := default_tolerances(model)):
             model = replace(model, tolerances=default)
-        return solver.with_estimated_factor(model) if model.tolerances.has_standard_spreads else model
+        return solver.with_spreads_of_tests(model) if model.tolerances.has_standard_spreads else model
 
     models = [model_of(Experiment.of(data)) for data in datasets]
     groups: dict[tuple[States, int], list[int]] = {}

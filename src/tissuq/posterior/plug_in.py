@@ -13,9 +13,10 @@ from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
 from tissuq.inference.solution import Solution
+from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK
-from tissuq.model.tolerances import BETWEEN_SPECIMENS, CONTRADICTION_SPREAD, SPECIMEN, TISSUE, Tolerances, specimens_of
+from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
 __all__ = ["ErrorEstimates", "default_tolerances"]
@@ -65,56 +66,52 @@ class ErrorEstimates:
             with_lag = self._with_curve(with_lag.with_errors(curve=None))
         return with_lag.with_errors(fits=model.fitted_errors.fits + self._fits) if self._fits else with_lag
 
-    def with_estimated_factor(self, model: StatisticalModel) -> StatisticalModel:
+    def with_spreads_of_tests(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose spreads of the stress, between specimens and tests, are as large as several tests tell.
 
-        They are the stated ones times a factor, the root of its posterior mean square over a grid, under a prior of
-        mean square one, half Student's t with three degrees of freedom; at the noise that is likely without it. Tests
-        along different paths do not tell it: an energy reconciles them whatever they differ by, and what it cannot (a
-        direction of the tissue) is no spread. Where such an energy is hardly ever stable, the tests contradict each
-        other: energies of I1 alone are then fitted, with the spread of such tests (`CONTRADICTION_SPREAD`).
+        Tests along one path tell a factor of the stated spreads. Those along different paths do not: an energy
+        reconciles them whatever they differ by, and what it cannot (a direction of the tissue) is no spread. Where such
+        an energy is hardly ever stable, the tests contradict each other: energies of I1 alone are then fitted, with the
+        spread of such tests.
         """
-        stated, has_several = model.tolerances, len(model.experiment.tests) > 1
-        has_spread = bool(stated.stress or stated.test)
-        if not (has_several and has_spread and self._has_evidence(model)):
+        has_several = len(model.experiment.tests) > 1
+        if not (has_several and (model.tolerances.stress or model.tolerances.test) and self._has_evidence(model)):
             return model
-        model = self._reconciled(model)
-        if model.fitted_errors.reconciling_stability is not None or not _are_alike(model.experiment):
-            return model.with_errors(fits=self._fits)
-        sketch = replace(model, discrepancy=model.discrepancy.sketch)
+        simpler, have_one_path = model.discrepancy.of_contradictory_tests, _have_one_path(model.experiment)
+        if simpler is None and not have_one_path:
+            return model
+        model = self._with_curve(model)
+        sums_noise, level = self._sums_noise(model), None
+        if sums_noise or simpler is not None:
+            solution = self._solution(_sketch(model))
+            level = solution.model.fitted_errors.level if sums_noise else None
+        if simpler is not None:
+            ranges = stable_ranges(solution).values()
+            probability = min((of_mode.probability for of_mode in ranges), default=1.0)
+            if probability < MIN_LOSS_PROBABILITY:
+                model = _of_contradictory_tests(model, simpler).with_errors(reconciling_stability=probability)
+                return model.with_errors(fits=self._fits)
+        if have_one_path:
+            model = self._with_factor(model, level)
+        return model.with_errors(fits=self._fits)
+
+    def _with_factor(self, model: StatisticalModel, level: float | None) -> StatisticalModel:
+        """Return a model with its spreads times the factor that its tests tell, at a level of errors if noise needs it.
+
+        The factor is the root of its posterior mean square over a grid, under a prior of mean square one, half
+        Student's t with three degrees of freedom; at the noise that is likely without it.
+        """
+        stated, sketch = model.tolerances, _sketch(model)
         candidates = [replace(sketch, tolerances=stated.with_factor(float(factor))) for factor in FACTORS]
-        if self._sums_noise(model):
-            level = self._solution(sketch).model.fitted_errors.level
+        if level is not None:
             candidates = [at_level(candidate.with_errors(level=level)) for candidate in candidates]
         evidences = [self._solution(candidate).log_evidence for candidate in candidates]
         if any(evidence is None for evidence in evidences):
-            return model.with_errors(fits=self._fits)
+            return model
         log_evidence = np.array(evidences, dtype=np.float64)
         weight = np.exp(log_evidence - log_evidence.max()) * FACTORS / (1 + FACTORS**2) ** 2  # even in the logarithm
         factor = float(np.sqrt(weight @ FACTORS**2 / weight.sum()))
-        return replace(model, tolerances=stated.with_factor(factor)).with_errors(factor=factor, fits=self._fits)
-
-    def _reconciled(self, model: StatisticalModel) -> StatisticalModel:
-        """Return a model with its mean curve; one of simpler energies and more spread, where tests contradict."""
-        with_curve, simpler = self._with_curve(model), model.discrepancy.of_contradictory_tests
-        if simpler is None:
-            return with_curve
-        ranges = stable_ranges(self._solution(replace(with_curve, discrepancy=model.discrepancy.sketch)))
-        share = min((of_mode.probability for of_mode in ranges.values()), default=1.0)
-        if share >= MIN_LOSS_PROBABILITY:
-            return with_curve
-        tests, specimens = specimens_of(model.experiment).shape
-        of_specimen = model.tolerances.stress if specimens == tests else 0.0
-        of_test = max(model.tolerances.test, float(np.sqrt(max(CONTRADICTION_SPREAD**2 - of_specimen**2, 0.0))))
-        symbols = [symbol for symbol in model.symbols if symbol not in model.energy_symbols]
-        symbols += [parameter.symbol for parameter in simpler.parameters]
-        contradictory = replace(
-            model,
-            discrepancy=simpler,
-            tolerances=model.tolerances.with_sizes(test=of_test),
-            chosen_priors={symbol: prior for symbol, prior in model.chosen_priors.items() if symbol in symbols},
-        )
-        return contradictory.with_errors(reconciling_stability=share)
+        return replace(model, tolerances=stated.with_factor(factor)).with_errors(factor=factor)
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with consecutive noise at the lag under which the data are most probable."""
@@ -162,6 +159,20 @@ class ErrorEstimates:
         return self._solve(model)
 
 
+def _sketch(model: StatisticalModel) -> StatisticalModel:
+    """Return a model with the few energies that stand for its discrepancy in estimates."""
+    return replace(model, discrepancy=model.discrepancy.sketch)
+
+
+def _of_contradictory_tests(model: StatisticalModel, simpler: Discrepancy) -> StatisticalModel:
+    """Return a model of tests that contradict each other, with a simpler discrepancy and more spread between tests."""
+    symbols = {symbol for symbol in model.symbols if symbol not in model.energy_symbols}
+    symbols |= {parameter.symbol for parameter in simpler.parameters}
+    priors = {symbol: prior for symbol, prior in model.chosen_priors.items() if symbol in symbols}
+    tolerances = model.tolerances.of_contradictory_tests(model.experiment)
+    return replace(model, discrepancy=simpler, tolerances=tolerances, chosen_priors=priors)
+
+
 def _pilot(model: StatisticalModel) -> StatisticalModel:
     """Return a model without errors of whole tests, of known noise: what these add to it at the least.
 
@@ -170,8 +181,7 @@ def _pilot(model: StatisticalModel) -> StatisticalModel:
     tests = model.experiment.tests
     size = np.array([np.sqrt((test.measured**2).mean()) for test in tests])
     noise_sd = np.hypot(model.noise.of_tests(model.experiment), PILOT_NOISE_SHARE * size)
-    sketch = replace(model, discrepancy=model.discrepancy.sketch, tolerances=Tolerances())
-    return with_known_noise(sketch, noise_sd)
+    return with_known_noise(replace(_sketch(model), tolerances=Tolerances()), noise_sd)
 
 
 def _curve_of(solution: Solution, model: StatisticalModel) -> tuple[FloatArray, FloatArray | None]:
@@ -196,7 +206,7 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
     return Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
 
 
-def _are_alike(experiment: Experiment) -> bool:
+def _have_one_path(experiment: Experiment) -> bool:
     """Return whether all tests follow one path from the reference, or its opposite."""
     farthest = []
     for test in experiment.tests:

@@ -50,9 +50,9 @@ class Solver:
             solutions = [stable_part(solution, self.stable_in, self.seed) for solution in solutions]
         return list(solutions)
 
-    def with_estimated_factor(self, model: StatisticalModel) -> StatisticalModel:
+    def with_spreads_of_tests(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model whose spreads between specimens and tests are as large as several tests tell."""
-        return self._error_estimates().with_estimated_factor(model)
+        return self._error_estimates().with_spreads_of_tests(model)
 
     def _error_estimates(self) -> ErrorEstimates:
         return ErrorEstimates(lambda model: self._solve([model])[0], self._is_integrated, self._sums_noise)

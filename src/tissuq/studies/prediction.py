@@ -363,14 +363,14 @@ def _prediction_warnings(
             "with one that is an energy, such as 'auto'."
         )
     along, across, _ = mode.paths[0].at(mode.excursion([0.1])).moved(0.0).plane
-    if across is None and not model.are_isotropic(posterior.solution.mixture.member).all():
+    if across is None and posterior.solution.direction_probability:
         meaning = (
             "its one stress is predicted as the mean of those of axes 1 and 2"
             if along is None
             else "predicted is a test along axis 1 whose lateral stretches are equal, as those of an isotropic material"
         )
         texts.append(f"the fit allows a preferred direction, of which {mode.name} loading knows nothing: {meaning}.")
-    was_fitted = data is not None and _was_fitted(model.experiment, data)
+    was_fitted = data is not None and any(test.has_measurements_of(data) for test in model.experiment.tests)
     if was_fitted:
         texts.append(
             "the run was fitted to these measurements: their prediction checks the fit and says nothing about "
@@ -391,15 +391,10 @@ def _prediction_warnings(
     return texts
 
 
-def _was_fitted(experiment: Experiment, data: Experiment) -> bool:
-    return any(test.has_measurements_of(data) for test in experiment.tests)
-
-
 def _calibrated_in_words(posterior: Posterior, mode: LoadingMode) -> str:
     """Return up to where both invariants were measured."""
-    ends = _range(posterior, mode)
-    if ends is not None:
-        control, (low, high) = mode.controls[0].name, ends
-        return f"in mode {mode.name} the run is calibrated from {low:.4g} to {high:.4g} ({control})"
+    if ends := _range(posterior, mode):
+        low, high = ends
+        return f"in mode {mode.name} the run is calibrated from {low:.4g} to {high:.4g} ({mode.controls[0].name})"
     I1, I2 = largest_invariants(posterior.model.experiment.states)
     return f"the run is calibrated up to I1 - 3 = {I1:.3g} and I2 - 3 = {I2:.3g}"

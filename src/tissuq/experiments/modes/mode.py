@@ -117,6 +117,11 @@ def loading_modes() -> dict[str, type[LoadingMode]]:
     return variants(LoadingMode)
 
 
+def curve_modes() -> list[LoadingMode]:
+    """Return the loading modes of one stretch and one stress."""
+    return [mode for mode in (kind() for kind in loading_modes().values()) if mode.is_curve]
+
+
 def loading_mode(mode: str | LoadingMode) -> LoadingMode:
     """Return the loading mode of that name; a mode is returned as it is.
 

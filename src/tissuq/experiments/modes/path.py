@@ -168,6 +168,15 @@ class States:
         numbers = [np.nan if component is None else component for component in components]
         return np.concatenate([np.broadcast_to(*pair) for pair in zip(numbers, self._counts, strict=True)])
 
+    @property
+    def _complex_step(self) -> Deformation:
+        """The deformation an imaginary step further, whose imaginary part over the step is its rate."""
+        return self.moved(1j * STEP)
+
+    def _with_rates(self, moved: NDArray[np.complex128]) -> tuple[FloatArray, FloatArray]:
+        """Return what was computed an imaginary step further (n, k), and its rates, over the number of loaded axes."""
+        return np.asarray(moved.real), np.asarray((moved.imag.T / STEP / self.loaded_axes).T)
+
     @cached_property
     def log_stretches(self) -> tuple[FloatArray, FloatArray]:
         """The logarithms (n, 3) of the principal stretches, and their rates (n, 3) along the paths.
@@ -175,9 +184,9 @@ class States:
         Divided by the number of loaded axes, so that the engineering stress of a separable energy
         w(l1) + w(l2) + w(l3) is sum_k l_k w'(l_k) rate_k.
         """
-        stretches = self.moved(1j * STEP).stretches
-        logs = np.log(np.stack([np.broadcast_to(stretch, len(self)).astype(complex) for stretch in stretches], axis=-1))
-        return np.asarray(logs.real), np.asarray((logs.imag.T / STEP / self.loaded_axes).T)
+        stretches = self._complex_step.stretches
+        columns = [np.broadcast_to(stretch, len(self)).astype(complex) for stretch in stretches]
+        return self._with_rates(np.log(np.stack(columns, axis=-1)))
 
     @cached_property
     def axis_strains(self) -> tuple[FloatArray, FloatArray]:
@@ -185,10 +194,9 @@ class States:
 
         Where a mode leaves them to the material, they are those of an isotropic one.
         """
-        moved = self.moved(1j * STEP)
+        moved = self._complex_step
         squares = [_known(*pair, len(self)) for pair in zip(moved.plane[:2], moved.stretches[:2], strict=True)]
-        strains = np.stack(squares, axis=-1) - 1
-        return np.asarray(strains.real), np.asarray((strains.imag.T / STEP / self.loaded_axes).T)
+        return self._with_rates(np.stack(squares, axis=-1) - 1)
 
     @cached_property
     def tilt(self) -> tuple[FloatArray, FloatArray]:
@@ -196,18 +204,15 @@ class States:
 
         Both are zero where principal axes are those of the test.
         """
-        moved = self.moved(1j * STEP)
+        moved = self._complex_step
         if moved.plane[2] is None:
             return np.zeros(len(self)), np.zeros(len(self))
         c11, c22, c12 = (_known(component, 0.0, len(self)) for component in moved.plane)
         order = np.sign(np.subtract(*(np.asarray(stretch).real for stretch in moved.stretches[:2])))
         cosine, sine = c11 - c22, 2 * c12
         angle = 0.5 * np.arctan2(order * sine.real, order * cosine.real)
-        rate = (
-            0.5
-            * (cosine.real * sine.imag - sine.real * cosine.imag)
-            / np.maximum(np.abs(cosine) ** 2 + np.abs(sine) ** 2, TINY)
-        )
+        square = np.maximum(np.abs(cosine) ** 2 + np.abs(sine) ** 2, TINY)
+        rate = 0.5 * (cosine.real * sine.imag - sine.real * cosine.imag) / square
         is_tilted = (c12.real != 0) | (order * cosine.real < 0)
         return np.where(is_tilted, angle, 0.0), np.where(is_tilted, rate / STEP / self.loaded_axes, 0.0)
 
