@@ -90,7 +90,7 @@ class Mixtures:
             value = np.where(
                 (step >= low) & (step <= high), step, 0.5 * (low + high)
             )  # at an end where it has converged
-        return np.where(spread > 0, value, centre)
+        return np.where(spread == 0, centre, value)
 
     def crps(self, values: FloatArray) -> FloatArray:
         """Return the continuous ranked probability score (g,) of a value at every place, in its unit; small is good.
