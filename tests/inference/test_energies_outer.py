@@ -78,7 +78,7 @@ def test_an_exponent_is_integrated():
 def test_proportional_noise_is_integrated():
     """The short version is that of a narrow prior of the share, below."""
     level = stress_level(DATA)
-    noises, shares = np.linspace(1e-4, 0.2, 50), np.linspace(1e-4, 0.3, 50)
+    noises, shares = np.linspace(1e-4, 0.2, 100), np.linspace(1e-4, 0.3, 100)
     values = [[conditional(UNIT, s + share * level, 2)[:2] for share in shares] for s in noises]
     log_density, mean = np.moveaxis(np.array(values), 2, 0)
     cell = (noises[1] - noises[0]) * (shares[1] - shares[0]) / (0.2 * 0.3)
@@ -87,7 +87,7 @@ def test_proportional_noise_is_integrated():
         noise="proportional",
         priors={"C10": tq.Uniform(0, 2), "noise_sd": tq.Uniform(0, 0.2), "noise_share": tq.Uniform(0, 0.3)},
     )
-    assert found.log_evidence == pytest.approx(evidence, abs=found.log_evidence_error + 0.03)  # of the coarse grid
+    assert found.log_evidence == pytest.approx(evidence, abs=found.log_evidence_error + 0.02)  # of the coarse grid
     table = found.summary()
     for symbol, own in (
         ("C10", mean),
@@ -146,7 +146,7 @@ def test_a_narrow_and_skewed_density_is_found():
         x, y = points.T
         return -0.5 * ((x - 1.2) / 0.02) ** 2 - 0.5 * ((y - x**2) / 0.05) ** 2
 
-    proposal = adapted(log_density, 2)
+    proposal = adapted(log_density, 2).proposal
     points = proposal.points(even_points(2, 2000))
     log_weights = log_density(points) - proposal.log_density(points)
     assert np.exp(log_weights).mean() == pytest.approx(2 * np.pi * 0.02 * 0.05, rel=0.05)
@@ -162,7 +162,7 @@ def test_the_proposal_is_a_normalised_density():
 def test_values_that_are_not_effective_are_said():
     outer = type("Outer", (), {"symbols": ("alpha1",)})()
     with pytest.raises(ConvergenceError, match="alpha1 was not found"):
-        relative_error(outer, np.array([0.0, *[-50.0] * 63]))
+        relative_error(outer, np.array([0.0, *[-50.0] * 63]), 20.0)
 
 
 def test_a_product_with_gaussian_priors_is_that_of_precisions():

@@ -144,7 +144,9 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
 
     exact = Likelihood(likelihood.problem, likelihood.emulator, has_error=False)
     size = len(likelihood.problem.symbols)
-    searched = [adapted(partial(_log_target, candidate), size, SEARCH_POINTS) for candidate in (exact, likelihood)]
+    searched = [
+        adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal for candidate in (exact, likelihood)
+    ]
     cube = qmc.Sobol(size, rng=np.random.default_rng([seed, 43])).random(ROUND_POINTS * MAX_ROUNDS)
     proposals: list[Proposal] = []
     scores, targets, logs = np.zeros((0, size)), np.zeros(0), np.zeros(0)

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import lgamma, log, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "SHIFTS",
+    "Adaptation",
     "Proposal",
     "adapted",
     "effective",
@@ -123,17 +125,33 @@ def log_normal(points: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * log(2 * pi))
 
 
-def adapted(log_density: Callable[[FloatArray], FloatArray], dimension: int, count: int | None = None) -> Proposal:
+class Adaptation(NamedTuple):
+    """A proposal, and the points (N, d) that led to it with log weights (N,): the density over what proposed them."""
+
+    proposal: Proposal
+    points: FloatArray
+    log_weights: FloatArray
+
+
+def adapted(
+    log_density: Callable[[FloatArray], FloatArray],
+    dimension: int,
+    count: int | None = None,
+    *,
+    start: Proposal | None = None,
+    min_effective: float | None = None,
+) -> Adaptation:
     """Return a proposal for a density near the standard normal or much narrower, known (N,) at points (N, d).
 
     Rounds of quasi-random points come nearer to the density: all points so far, weighted by a power of the density over
     the mixture of all proposals so far, give the next t distribution its mean and covariance; the power is the
     largest at most one that leaves enough of them effective (Cornuet et al. 2012, with tempering). ``count`` is the
-    number of points in a round.
+    number of points in a round, ``start`` the first proposal, and ``min_effective`` how many of all points are to be
+    effective in the end (by default a share of those of the last round).
     """
     count = count or 16 + 16 * dimension
     least_effective = 4.0 + 4 * dimension
-    proposal = Proposal(np.zeros(dimension), np.eye(dimension))
+    proposal = start or Proposal(np.zeros(dimension), np.eye(dimension))
     proposals, points, values = [], np.zeros((0, dimension)), np.zeros(0)
     uniforms = even_points(dimension, count * MAX_ROUNDS)
     for round_ in range(MAX_ROUNDS):
@@ -144,16 +162,18 @@ def adapted(log_density: Callable[[FloatArray], FloatArray], dimension: int, cou
         mixture = np.logaddexp.reduce(
             [proposal_of_round.log_density(points) for proposal_of_round in proposals], axis=0
         ) - log(len(proposals))
-        weights, power = _tempered(
-            np.nan_to_num(values - mixture, nan=LOG_OF_NOTHING, neginf=LOG_OF_NOTHING), least_effective
-        )
+        log_weights = np.nan_to_num(values - mixture, nan=LOG_OF_NOTHING, neginf=LOG_OF_NOTHING)
+        weights, power = _tempered(log_weights, least_effective)
         mean = weights @ points
         away = points - mean
         covariance = (weights[:, None] * away).T @ away + 1e-12 * np.eye(dimension)
         proposal = Proposal(mean, np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
-        if power == 1 and effective(values[-count:] - proposals[-1].log_density(new)) > MIN_EFFECTIVE_SHARE * count:
+        of_round = effective(values[-count:] - proposals[-1].log_density(new)) if power == 1 else 0.0
+        if min_effective is None and of_round > MIN_EFFECTIVE_SHARE * count:
             break
-    return proposal
+        if min_effective is not None and effective(log_weights) > min_effective:
+            break
+    return Adaptation(proposal, points, log_weights)
 
 
 def _tempered(log_weights: FloatArray, min_effective: float) -> tuple[FloatArray, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,7 +10,9 @@ from tissuq.assessment.stable_posterior import stable_part
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
+from tissuq.inference.enumerators.line import Accuracy
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
+from tissuq.inference.enumerators.outer import Guide
 from tissuq.inference.solution import Enumerator, Solution
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.posterior.plug_in import ErrorEstimates
@@ -77,11 +79,16 @@ class Solver:
                 return [solution for model in models for solution in self._solve([model])]
             return _sampler("nuts", str(error)).solve(models, self.seed)
 
-    def _solve_known(self, model: StatisticalModel) -> Solution:
-        """Return the posterior of a model with known noise, one of a sum over values of it."""
-        if model.energy_symbols:
-            return AmplitudeLattice(MAX_COMPONENTS_OF_VALUE).solve([model], self.seed)[0]
-        return self._solve([model])[0]
+    def _known_solver(self, accuracy: Accuracy) -> Callable[[StatisticalModel], Solution]:
+        """Return what solves models with known noise, similar ones that are summed."""
+        lattice = AmplitudeLattice(MAX_COMPONENTS_OF_VALUE, Guide(accuracy))
+
+        def solve_known(model: StatisticalModel) -> Solution:
+            if model.energy_symbols:
+                return lattice.solve([model], self.seed)[0]
+            return self._solve([model])[0]
+
+        return solve_known
 
     def _enumerator(self, model: StatisticalModel) -> Enumerator:
         """Return what enumerates the nonlinear parameters of a model by the method that was chosen.
@@ -92,7 +99,7 @@ class Solver:
             When it does not serve this model.
         """
         if self._sums_noise(model):
-            return NoiseGrid(self._solve_known)
+            return NoiseGrid(self._known_solver)
         if model.energy_symbols and self.method in ("auto", "exact"):
             return AmplitudeLattice()
         if self.method == "auto":

@@ -2,14 +2,15 @@
 
 Given a member and the ratios g = c / noise_sd of its amplitudes, everything is linear and Gaussian
 (`tissuq.inference.enumerators.lattice`). The integrand is smooth in log g and log noise_sd, so that equally spaced
-points integrate it with an error that falls exponentially with their number. Parameters that are left, such as
-exponents, take the values of weighted quasi-random points (`tissuq.inference.enumerators.outer`).
+points integrate it with an error that falls exponentially with their number. A parameter that is left, such as an
+exponent, takes values spread over its posterior, and several those of weighted quasi-random points
+(`tissuq.inference.enumerators.outer`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -25,7 +26,7 @@ from tissuq.inference.enumerators.amplitudes import (
     noise_grid,
 )
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Reduced
-from tissuq.inference.enumerators.outer import OUTER_STEP, Node, Outer, single_nodes, weighted_nodes
+from tissuq.inference.enumerators.outer import OUTER_STEP, Guide, Node, Outer, single_nodes, weighted_nodes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.linear import LinearPriors
 from tissuq.inference.marginal import Marginal, marginal_of_logs, marginal_of_points, marginal_of_table
@@ -51,6 +52,8 @@ MARGINAL_POINTS, MARGINAL_NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
 PULLED_DIVISOR = 5
 """So many times fewer, where priors of linear parameters depend on the noise, too."""
+MAX_CHEAP_BOUNDS, MAX_BOUNDED = 2, 8000
+"""Linear parameters up to which the masses within bounds cost little; points for which they are computed, of more."""
 TAILS_POWER = 0.25
 """Power of the weights by which components are taken that must represent the tails, too."""
 
@@ -63,9 +66,12 @@ class AmplitudeLattice:
     ----------
     components : int
         Components, at most, that represent a posterior in draws and predictions.
+    guide : Guide
+        Where parameters lie that no lattice sums over; kept from one model to the next, which must be similar.
     """
 
     components: int = MAX_COMPONENTS
+    guide: Guide = field(default_factory=Guide)
 
     def why_not(self, model: StatisticalModel) -> str:
         """Return why an energy discrepancy cannot be integrated with the rest of a model; nothing where it can."""
@@ -103,7 +109,7 @@ class AmplitudeLattice:
             )
         with one_thread():
             if Outer(models[0]).symbols:
-                sums = (_EnergySums(model, *weighted_nodes(model)) for model in models)
+                sums = (_EnergySums(model, *weighted_nodes(model, self.guide)) for model in models)
                 return [energy_sums.solution(self.components, seed) for energy_sums in sums]
             nodes = single_nodes(models)
             sums = (_EnergySums(model, [node], np.zeros(1), 0.0) for model, node in zip(models, nodes, strict=True))
@@ -145,12 +151,20 @@ class _EnergySums:
         self._priors = LinearPriors(model)
         self._box = self._priors.box
         mean, root, _ = self._priors.times(self._bare[0], self._bare[1] * points.noise_sd[:, None, None])
-        mass_outside = self._box.beyond(mean, root)
-        near = np.flatnonzero(mass_outside.sum(axis=1) > TOUCHED_MASS)
+        mass_outside, log_weight = self._box.beyond(mean, root), points.log_weight + log_weights[self._node]
+        is_near = mass_outside.sum(axis=1) > TOUCHED_MASS
+        if mean.shape[1] > MAX_CHEAP_BOUNDS and is_near.sum() > MAX_BOUNDED:
+            at_most = log_weight + points.log_inside
+            total = np.logaddexp.reduce(at_most)
+            rows = systematic(np.exp(at_most - total)[None], MAX_BOUNDED)[0]
+            points, self._node, self._bare = points[rows], self._node[rows], (self._bare[0][rows], self._bare[1][rows])
+            mean, root, mass_outside, is_near = mean[rows], root[rows], mass_outside[rows], is_near[rows]
+            log_weight = total - np.log(MAX_BOUNDED) - points.log_inside
+        near = np.flatnonzero(is_near)
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
         boxes = self._box.repeated(len(near))
         log_mass[near], error_of_mass[near] = boxes.log_mass(mean[near], root[near])
-        masses = points.log_weight + log_weights[self._node] + log_mass
+        masses = log_weight + log_mass
         top = masses.max()
         total = np.exp(masses - top).sum()
         self._points, self._weights = points, np.exp(masses - top) / total
@@ -235,6 +249,8 @@ class _EnergySums:
         if symbol not in self._nodes[0].ratios:  # one value at each node
             first_of_node = np.flatnonzero(np.diff(self._node, prepend=-1))
             shares = np.add.reduceat(self._weights, first_of_node)
+            if self._nodes[0].place is not None:
+                return self._outer.marginal([self._nodes[number] for number in self._node[first_of_node]], shares)
             return marginal_of_points(values[first_of_node], shares, self.model.priors[symbol].support)
         return marginal_of_points(values, self._weights, self.model.priors[symbol].support)
 

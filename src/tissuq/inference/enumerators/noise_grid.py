@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
+from tissuq.inference.enumerators.line import FINE, ROUGH, Accuracy
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal, blended, marginal_of_table
 from tissuq.inference.solution import Marginals, Solution
@@ -63,11 +64,12 @@ class NoiseGrid:
 
     Parameters
     ----------
-    solve_known : callable
-        Returns the solution of a model with known noise, with its evidence.
+    known_solver : callable
+        Returns a function that gives the solution of a model with known noise, with its evidence; it may learn from one
+        model for the next. The argument is the accuracy of the evidence.
     """
 
-    solve_known: Callable[[StatisticalModel], Solution]
+    known_solver: Callable[[Accuracy], Callable[[StatisticalModel], Solution]]
 
     @staticmethod
     def why_not(model: StatisticalModel) -> str:
@@ -88,12 +90,13 @@ class NoiseGrid:
     def _sum(self, model: StatisticalModel, seed: int) -> Solution:
         known: dict[float, Solution] = {}
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
+        solvers = {id(sketch): self.known_solver(ROUGH), id(model): self.known_solver(FINE)}
         _, mean_sd = model.noise_of_tests
 
         def log_weight(of: StatisticalModel, log_noise: float) -> float:
             """Return the logarithm of the posterior density of the logarithm of the noise, up to a constant."""
             noise_sd = np.exp(log_noise)
-            known[log_noise] = self.solve_known(at_noise(of, noise_sd))
+            known[log_noise] = solvers[id(of)](at_noise(of, noise_sd))
             log_evidence = known[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,32 +11,40 @@ from numpy.typing import NDArray
 from tissuq.errors import ConvergenceError
 from tissuq.inference.enumerators.amplitudes import Points, Weighing
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Directions, Lattice, Rows
-from tissuq.inference.quasi_monte_carlo import adapted, effective, even_points, log_normal, systematic
+from tissuq.inference.enumerators.line import FINE, Accuracy, Line, first_places, known_along, peaks
+from tissuq.inference.marginal import Marginal, marginal_of_table
+from tissuq.inference.quasi_monte_carlo import Proposal, adapted, effective, log_normal, systematic
 from tissuq.mechanics.invariants import invariant_rates
 from tissuq.model.statistical_model import StatisticalModel
 
-__all__ = ["OUTER_STEP", "Node", "Outer", "single_nodes", "weighted_nodes", "weighted_settings"]
+__all__ = ["OUTER_STEP", "Guide", "Node", "Outer", "single_nodes", "weighted_nodes"]
 
 FloatArray = NDArray[np.float64]
 
-VALUES_PER_PARAMETER, MIN_EFFECTIVE_VALUES = 64, 20
-"""Values taken for each of the parameters, and once more; how many must be effective."""
+VALUES_PER_PARAMETER = 64
+"""Values taken at first for each of the parameters, and once more."""
 MAX_SCORE = 8.0
 """Standard deviations beyond which probabilities round to one."""
 LOG_RATIO_SD = 3.0
 """Standard deviation of the log of a ratio of noise parameters, in the coordinate that proposes it."""
 
 
+TINY = 1e-300
+"""The smallest number of which there is a logarithm."""
 Places = NDArray[np.intp]
 UNLIKELY_PROBABILITY = 1e-3
 """Probability of an amplitude's prior below which a lattice may begin."""
-OUTER_STEP, BEGINNINGS = 2 * LOG_RATIO_STEP, 4
+OUTER_STEP, BEGINNINGS = 2 * LOG_RATIO_STEP, 2
 """Step of the lattices at values of the outer parameters, and how many places they begin at in turn: so their errors
 are of either sign and cancel."""
 MAX_POINTS_OF_NODE, MAX_POINTS = 2000, 60_000
 """Points kept of each value, and where there are no outer parameters."""
 SCOUT_MEMBERS = 6
 """Members, about, whose posterior guides the search for the values."""
+GUIDED_DIVISOR = 8
+"""So many times fewer values in a round, where it is known from a similar model about where they lie."""
+NEGLIGIBLE_MEMBERS = 1e-3
+"""Share of the posterior, in its middle, of all members that are left out."""
 GOLDEN_RATIO = 0.6180339887
 """Multiples of it, modulo one, are where systematic resampling starts at each node in turn."""
 
@@ -76,6 +84,17 @@ class Outer:
         log_density = log_normal(point[None, ~self.of_noise])[0]
         return float(log_density + (self._middle + LOG_RATIO_SD * point + np.log(LOG_RATIO_SD))[self.of_noise].sum())
 
+    def marginal(self, nodes: Sequence[Node], shares: FloatArray) -> Marginal:
+        """Return the marginal of the one parameter, no ratio, from the shares (K,) of nodes at its places."""
+        from scipy.special import ndtr
+
+        widths, places = np.array([node.width for node in nodes]), np.array([node.place for node in nodes])
+        points, density, _ = Line(places, np.log(np.maximum(shares / widths, TINY))).distribution
+        values = self._model.priors[self.symbols[0]].quantile(ndtr(points))
+        is_new = np.concatenate([[True], np.diff(values) > 0])
+        values, points, density = values[is_new], points[is_new], density[is_new]
+        return marginal_of_table(values, density * np.gradient(points) / np.gradient(values))
+
     def ratios(self, settings: FloatArray) -> dict[str, float]:
         """Return those of the noise's parameters to noise_sd, by symbol."""
         pairs = zip(self.symbols, settings, self.of_noise, strict=True)
@@ -95,39 +114,7 @@ class Outer:
         return Rows(basis[:, is_linear] / scale[:, None], stresses[:, None], scale, model.experiment.size)
 
 
-def weighted_settings(outer: Outer, scout: Callable[[FloatArray], float]) -> tuple[FloatArray, FloatArray]:
-    """Return values (K, d) of the outer parameters, and the log of prior over proposal (K,) at each, over K.
-
-    Parameters
-    ----------
-    outer : Outer
-    scout : callable
-        Log of the likelihood at values (d,), roughly: where it leads is where values are taken.
-
-    Raises
-    ------
-    ConvergenceError
-        When that is far outside the priors.
-    """
-    d = len(outer.symbols)
-
-    def log_density(points: FloatArray) -> FloatArray:
-        return np.array([scout(outer.settings(point)) + outer.log_base(point) for point in points])
-
-    proposal = adapted(log_density, d)
-    far = [symbol for symbol, score in zip(outer.symbols, np.abs(proposal.mean), strict=True) if score > MAX_SCORE - 1]
-    if far:
-        raise ConvergenceError(
-            f"the data put {', '.join(far)} where the prior leaves next to nothing (less than 1e-12): give a prior "
-            "that holds what the data say, in MPa where it is a stress."
-        )
-    points = proposal.points(even_points(d, VALUES_PER_PARAMETER * (d + 1)))
-    base = np.array([outer.log_base(point) for point in points])
-    settings = np.array([outer.settings(point) for point in points])
-    return settings, base - proposal.log_density(points) - np.log(len(points))
-
-
-def relative_error(outer: Outer, log_masses: FloatArray) -> float:
+def relative_error(outer: Outer, log_masses: FloatArray, min_effective: float) -> float:
     """Return the relative error of a sum of independent masses, given their logarithms (K,).
 
     Raises
@@ -136,13 +123,26 @@ def relative_error(outer: Outer, log_masses: FloatArray) -> float:
         When few of them hold nearly everything.
     """
     count = effective(log_masses)
-    if count < MIN_EFFECTIVE_VALUES:
+    if count < min_effective:
         raise ConvergenceError(
             f"the posterior of {', '.join(outer.symbols)} was not found well enough to integrate the discrepancy: "
             f"{count:.0f} of {len(log_masses)} values are effective. Give these parameters narrower priors, or choose "
             "a material with fewer of them."
         )
     return float(np.sqrt(1 / count - 1 / len(log_masses)))
+
+
+@dataclass
+class Guide:
+    """Where the posterior of the outer parameters was last: what the search in a similar model begins with.
+
+    A lower accuracy takes fewer values.
+    """
+
+    accuracy: Accuracy = FINE
+    places: FloatArray | None = None
+    peaks: FloatArray | None = None
+    proposal: Proposal | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +157,8 @@ class Node:
         Relative error of the points' sum.
     ratios : mapping of str to float
         Those of the noise's parameters to noise_sd.
+    place, width : float
+        Of one outer parameter: its coordinate, and of that the length for which the node stands; None of more.
     """
 
     points: Points
@@ -165,6 +167,13 @@ class Node:
     error: float
     outer: FloatArray = field(default_factory=lambda: np.zeros(0))
     ratios: Mapping[str, float] = field(default_factory=dict)
+    place: float | None = None
+    width: float = 1.0
+
+    @property
+    def log_mass(self) -> float:
+        """The logarithm of the points' sum."""
+        return float(np.logaddexp.reduce(self.points.log_weight))
 
 
 def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
@@ -181,18 +190,112 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     return nodes
 
 
-def weighted_nodes(model: StatisticalModel) -> tuple[list[Node], FloatArray, float]:
-    """Return nodes at quasi-random values of the outer parameters, their log weights, and their evidence's error."""
+def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
+    """Return nodes at values of the outer parameters, their log weights, and the relative error of their sum.
+
+    One parameter takes equally spaced values of a coordinate; more take quasi-random ones of an adapted proposal.
+
+    Raises
+    ------
+    ConvergenceError
+        When the posterior of these parameters is far outside their priors, or few of the values hold nearly all of it.
+    """
     outer = Outer(model)
-    members = np.arange(len(model.energy_members))
-    scouts = members[:: -(-len(members) // SCOUT_MEMBERS)]
-    sums = _Sums(model, outer)
-    settings, log_weights = weighted_settings(
-        outer, lambda values: float(np.logaddexp.reduce(sums.points(values, scouts).log_weight))
-    )
-    nodes = [sums.node(values, members) for values in settings]
-    masses = log_weights + np.array([np.logaddexp.reduce(node.points.log_weight) for node in nodes])
-    return nodes, log_weights, relative_error(outer, masses)
+    search = _Search(_Sums(model, outer), outer, len(model.energy_members))
+    return search.on_line(guide) if len(outer.symbols) == 1 else search.by_proposal(guide)
+
+
+class _Search:
+    """The search for values of the outer parameters of one model."""
+
+    def __init__(self, sums: _Sums, outer: Outer, member_count: int) -> None:
+        self._sums, self._outer, self._members = sums, outer, np.arange(member_count)
+        self._nodes: list[Node] = []
+
+    def on_line(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
+        """Return nodes at equally spaced places of the one outer parameter's coordinate."""
+        places = guide.places
+        if places is None:
+            scout = known_along(lambda place: self._scouted(np.array([place])), first_places(), MAX_SCORE)
+            places = scout.spread(guide.accuracy)
+        nodes: dict[float, Node] = {}
+
+        def log_density(place: float) -> float:
+            nodes[place] = self._node(np.array([place]))
+            return nodes[place].log_mass + self._outer.log_base(np.array([place]))
+
+        self._leave_out_members(places[[len(places) // 2]])
+        places = np.concatenate([places, self._peaks(guide)])
+        line = known_along(log_density, places, MAX_SCORE, guide.accuracy)
+        guide.places = line.spread(guide.accuracy)
+        self._check_place(line.places[[line.log_masses.argmax()]])
+        cells = zip(line.places, np.exp(line.log_masses - line.logs), strict=True)
+        chosen = [replace(nodes[float(place)], place=float(place), width=float(width)) for place, width in cells]
+        return chosen, line.log_masses - [node.log_mass for node in chosen], line.error
+
+    def _peaks(self, guide: Guide) -> FloatArray:
+        """Return places about where the material alone fits the data: a posterior may have a narrow peak there."""
+        model = self._sums.model
+        freedom, noise = model.experiment.size - len(model.linear), model.noise
+
+        def log_likelihood(place: float) -> float:
+            rows = self._outer.rows(self._outer.settings(np.array([place])))
+            basis, _ = np.linalg.qr(rows.design)
+            misfit = float(((rows.stresses - basis @ (basis.T @ rows.stresses)) ** 2).sum())
+            if noise.parameters:
+                return -0.5 * freedom * float(np.log(max(misfit, TINY)))
+            return -0.5 * misfit / float(noise.sd({}, 0.0)) ** 2
+
+        if guide.peaks is None:
+            guide.peaks = peaks(log_likelihood, MAX_SCORE / 2)
+        return guide.peaks
+
+    def by_proposal(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
+        """Return nodes at points that a proposal gives, adapted until enough of them are effective."""
+        d = len(self._outer.symbols)
+        start = guide.proposal
+        if start is None:
+            start = adapted(lambda points: np.array([self._scouted(point) for point in points]), d).proposal
+        self._check_place(start.mean)
+        self._leave_out_members(start.mean)
+        nodes = list[Node]()
+
+        def log_masses(points: FloatArray) -> FloatArray:
+            nodes.extend(self._node(point) for point in points)
+            bases = [self._outer.log_base(point) for point in points]
+            return np.array([node.log_mass for node in nodes[-len(points) :]]) + bases
+
+        count = VALUES_PER_PARAMETER * (d + 1) // (1 if guide.proposal is None else GUIDED_DIVISOR)
+        min_effective = guide.accuracy.min_effective
+        found = adapted(log_masses, d, count, start=start, min_effective=min_effective)
+        guide.proposal = found.proposal
+        error = relative_error(self._outer, found.log_weights, min_effective)
+        log_weights = found.log_weights - [node.log_mass for node in nodes] - np.log(len(nodes))
+        return nodes, log_weights, error
+
+    def _scouted(self, point: FloatArray) -> float:
+        """Return the logarithm of the density at a point (d,), roughly: from a few of the members."""
+        scouts = self._members[:: -(-len(self._members) // SCOUT_MEMBERS)]
+        points = self._sums.points(self._outer.settings(point), scouts)
+        return float(np.logaddexp.reduce(points.log_weight)) + self._outer.log_base(point)
+
+    def _node(self, point: FloatArray) -> Node:
+        return self._sums.node(self._outer.settings(point), self._members)
+
+    def _leave_out_members(self, point: FloatArray) -> None:
+        """Leave out members that have next to no mass at a point (d,) in the middle of the posterior."""
+        points = self._sums.points(self._outer.settings(point), self._members)
+        masses = np.bincount(points.lattice, np.exp(points.log_weight - points.log_weight.max()), len(self._members))
+        order = np.argsort(masses)
+        self._members = np.sort(order[np.cumsum(masses[order]) > NEGLIGIBLE_MEMBERS * masses.sum()])
+
+    def _check_place(self, point: FloatArray) -> None:
+        far = [s for s, score in zip(self._outer.symbols, np.abs(point), strict=True) if score > MAX_SCORE - 1]
+        if far:
+            raise ConvergenceError(
+                f"the data put {', '.join(far)} where the prior leaves next to nothing (less than 1e-12): give a prior "
+                "that holds what the data say, in MPa where it is a stress."
+            )
 
 
 class _Terms:
@@ -223,18 +326,18 @@ class _Sums:
     """The posterior of one model at any value of its outer parameters."""
 
     def __init__(self, model: StatisticalModel, outer: Outer) -> None:
-        self._model, self._outer, self._calls = model, outer, 0
+        self.model, self._outer, self._calls = model, outer, 0
         self._terms = _Terms([model])
         self._known: dict[tuple[int, int], Directions] = {}
 
     def points(self, settings: FloatArray, members: Places) -> Points:
         """Return the points that matter; ``lattice`` is a place among the members."""
-        return Weighing(self._model, self._lattices(settings, members), 0, self._outer.ratios(settings)).points()[0]
+        return Weighing(self.model, self._lattices(settings, members), 0, self._outer.ratios(settings)).points()[0]
 
     def node(self, settings: FloatArray, members: Places) -> Node:
         """Return the posterior of all but the outer parameters, by few points of the same weight."""
         lattices, ratios = self._lattices(settings, members), self._outer.ratios(settings)
-        points, error = Weighing(self._model, lattices, 0, ratios).points()
+        points, error = Weighing(self.model, lattices, 0, ratios).points()
         points = _thinned(points, MAX_POINTS_OF_NODE, GOLDEN_RATIO * self._calls % 1)
         mean, root = _linear(lattices, 0, points)
         return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)

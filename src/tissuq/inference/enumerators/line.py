@@ -1,0 +1,185 @@
+"""A density of one coordinate, of one mode or several, known at few places: more where it changes fast, and matters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FINE", "ROUGH", "Accuracy", "Line", "first_places", "known_along", "peaks"]
+
+FloatArray = NDArray[np.float64]
+
+FIRST_END, FIRST_PLACES = 4.0, 17
+"""Where a search begins on either side of zero, and with how many places."""
+MIN_INTERVAL, MIN_RELATIVE_GAP = 1e-4, 0.25
+"""Between two places; and at first over the smaller one of the gaps beside."""
+NEGLIGIBLE_DROP = 7.5
+"""Log density below the largest one at which places do not matter."""
+MAX_PLACES = 100
+"""Places of one search."""
+PEAK_PLACES, MAX_PEAK_DROP, PARABOLAS = 161, 50.0, 6
+"""Places among which peaks are sought, how far the logarithm of one may lie below the largest, and parabolas each."""
+MAX_EXCESS = 0.5
+"""By which a log density between two places may exceed those there."""
+POINTS_PER_INTERVAL = 40
+"""Between two places, at which the density is interpolated."""
+
+
+class Accuracy(NamedTuple):
+    """How well a density is to be known.
+
+    Attributes
+    ----------
+    max_difference : float
+        Log densities of neighbouring places differ by no more, where they matter.
+    max_share : float
+        Share of the mass between two neighbouring places, at the most.
+    end_drop : float
+        Log density below the largest one at which no more places are added at the ends.
+    probabilities : tuple of float
+        Of places that are spread over the density.
+    min_effective : float
+        Effective number, at the least, of quasi-random points of a density of more coordinates.
+    """
+
+    max_difference: float
+    max_share: float
+    end_drop: float
+    probabilities: tuple[float, ...]
+    min_effective: float
+
+
+FINE = Accuracy(2.0, 0.22, 6.5, (0.001, 0.012, 0.06, 0.16, 0.32, 0.5, 0.68, 0.84, 0.94, 0.988, 0.999), 20.0)
+ROUGH = Accuracy(4.0, 0.5, 3.0, (0.005, 0.1, 0.5, 0.9, 0.995), 6.0)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A density, known as its logarithm (K,) at ascending places (K,)."""
+
+    places: FloatArray
+    logs: FloatArray
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, FloatArray]:
+        """Many points, and the density there over its largest known value: Akima's interpolation of its logarithm."""
+        from scipy.interpolate import Akima1DInterpolator
+
+        fractions = np.arange(POINTS_PER_INTERVAL * (len(self.places) - 1) + 1) / POINTS_PER_INTERVAL
+        points = np.interp(fractions, np.arange(len(self.places)), self.places)
+        heights = self.logs - self.logs.max()
+        interval = np.minimum(fractions.astype(int), len(heights) - 2)
+        most = np.maximum(heights[:-1], heights[1:])[interval] + MAX_EXCESS
+        return points, np.exp(np.minimum(Akima1DInterpolator(self.places, heights)(points), most))
+
+    @property
+    def log_masses(self) -> FloatArray:
+        """The logarithms (K,) of the masses that belong to the places: of the density between them and the next."""
+        points, density = self._table
+        cells = density * np.gradient(points)
+        position = np.interp(points, self.places, np.arange(len(self.places)))
+        before = np.minimum(position.astype(int), len(self.places) - 2)
+        after = position - before
+        masses = np.bincount(before, cells * (1 - after), len(self.places))
+        masses[1:] += np.bincount(before, cells * after, len(self.places))[:-1]
+        return np.asarray(np.log(np.maximum(masses, 1e-300)) + self.logs.max())
+
+    @property
+    def shares_between(self) -> FloatArray:
+        """The shares (K - 1,) of the mass between neighbouring places."""
+        _, _, cumulative = self.distribution
+        return np.diff(cumulative[::POINTS_PER_INTERVAL])
+
+    @property
+    def error(self) -> float:
+        """The relative error of the whole mass, from that of straight lines between the logarithms."""
+        points, density = self._table
+        straight = np.exp(np.interp(points, self.places, self.logs - self.logs.max()))
+        return float(abs((straight @ np.gradient(points)) / (density @ np.gradient(points)) - 1))
+
+    @property
+    def distribution(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points, and density and cumulative probability there."""
+        points, density = self._table
+        steps = 0.5 * (density[1:] + density[:-1]) * np.diff(points)
+        cumulative = np.concatenate([[0.0], np.cumsum(steps)])
+        return points, density / cumulative[-1], cumulative / cumulative[-1]
+
+    def spread(self, accuracy: Accuracy) -> FloatArray:
+        """Return places that are spread over the density: close where it is large."""
+        points, _, cumulative = self.distribution
+        return np.unique(np.interp(accuracy.probabilities, cumulative, points))
+
+
+def peaks(log_density: Callable[[float], float], end: float) -> FloatArray:
+    """Return the places of the largest peaks of a density that costs little, each with one on either side of it.
+
+    These are about a standard deviation away.
+    """
+    places = np.linspace(-end, end, PEAK_PLACES)
+    logs = np.nan_to_num([log_density(place) for place in places], nan=-1e300, neginf=-1e300)
+    inner = logs[1:-1]
+    tops = 1 + np.flatnonzero((inner >= logs[:-2]) & (inner > logs[2:]) & (inner > logs.max() - MAX_PEAK_DROP))
+    return np.array([place for top in tops for place in _about(log_density, places[top], places[1] - places[0])])
+
+
+def _about(log_density: Callable[[float], float], top: float, step: float) -> FloatArray:
+    """Return a peak near a place, by parabolas, and places a standard deviation beside it."""
+    for _ in range(PARABOLAS):
+        before, here, after = (log_density(top + side * step) for side in (-1, 0, 1))
+        curvature = max((2 * here - before - after) / step**2, 1e-12)
+        top += float(np.clip((after - before) / (2 * step * curvature), -step, step))
+        step = min(0.5 * step, curvature**-0.5)
+    return np.asarray(top + min(curvature**-0.5, FIRST_END / FIRST_PLACES) * np.array([-1.0, 0.0, 1.0]))
+
+
+def _apart(places: FloatArray) -> FloatArray:
+    """Return ascending places without those that are much closer to the one before than others are."""
+    gaps = np.diff(places)
+    around = np.minimum(np.append(np.inf, gaps[:-1]), np.append(gaps[1:], np.inf))
+    is_apart = np.append(True, gaps > MIN_RELATIVE_GAP * np.where(np.isfinite(around), around, 0.0))
+    return np.asarray(places[is_apart])
+
+
+def first_places() -> FloatArray:
+    """Return places from which a search begins where nothing is known."""
+    return np.linspace(-FIRST_END, FIRST_END, FIRST_PLACES)
+
+
+def known_along(
+    log_density: Callable[[float], float], places: Iterable[float], end: float, accuracy: Accuracy = FINE
+) -> Line:
+    """Return a density at places, more than at first where it changes fast, and matters, and beyond them.
+
+    Parameters
+    ----------
+    log_density : callable
+        Returns the logarithm of the density at a place.
+    places : iterable of float
+    end : float
+        No place is farther from zero.
+    accuracy : Accuracy
+    """
+    known: dict[float, float] = {}
+    new = set(_apart(np.unique(np.clip(list(places), -end, end))).tolist())
+    while new and len(known) < MAX_PLACES:
+        known |= {place: log_density(place) for place in sorted(new)}
+        ordered = np.array(sorted(known))
+        logs = np.nan_to_num([known[place] for place in ordered], nan=-1e300, neginf=-1e300)
+        matters = logs > logs.max() - NEGLIGIBLE_DROP
+        is_rough = (matters[1:] | matters[:-1]) & (np.abs(np.diff(logs)) > accuracy.max_difference)
+        is_rough |= Line(ordered, logs).shares_between > accuracy.max_share
+        is_rough &= np.diff(ordered) > MIN_INTERVAL
+        new = set(0.5 * (ordered[1:] + ordered[:-1])[is_rough])
+        beyond = 2 * ordered[[0, -1]] - ordered[[1, -2]]
+        at_ends = logs[[0, -1]] > logs.max() - accuracy.end_drop
+        new |= set(np.clip(beyond, -end, end)[at_ends])
+        new -= set(known)
+    first, last = np.flatnonzero(matters)[[0, -1]]
+    kept = slice(max(first - 1, 0), last + 2)
+    return Line(ordered[kept], logs[kept])
