@@ -50,6 +50,7 @@ from tissuq.parameters.priors import (
 from tissuq.population import Population as Population, fit_population as fit_population
 from tissuq.posterior.ensemble import EnergyDraw as EnergyDraw, Ensemble as Ensemble
 from tissuq.posterior.fitting import fit as fit, fit_many as fit_many
+from tissuq.posterior.laws import LawComparison as LawComparison, fit_laws as fit_laws
 from tissuq.posterior.posterior import Posterior as Posterior
 from tissuq.report.cards import write_cards as write_cards
 from tissuq.studies.calibrate import calibrate as calibrate

@@ -32,7 +32,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import FittedErrors
 from tissuq.prediction.moments import drawn_curves
 
-__all__ = ["Assessment", "assess", "has_energy"]
+__all__ = ["Assessment", "assess", "has_energy", "shares_of_discrepancy"]
 
 FloatArray = NDArray[np.float64]
 Solve = Callable[[Sequence[StatisticalModel]], Sequence[Solution]]
@@ -223,7 +223,7 @@ def assess(solution: Solution, solve: Solve, ranges: Mapping[str, StableRange]) 
     """
     model, marginal = solution.model, solution.marginals[solution.model.headline]
     none = _without(model, solve)
-    share, initial_share = _shares(solution)
+    share, initial_share = shares_of_discrepancy(solution)
     stiffness = modulus(solution)
     scales = scale_symbols(model)
     is_rescaled = bool(scales) and solution.diagnostics is None
@@ -299,7 +299,7 @@ def _evidence_changes(solution: Solution, rescaled_solutions: Mapping[str, Solut
     return {} if log_evidence is None else {name: float(value - log_evidence) for name, value in evidences.items()}
 
 
-def _shares(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def shares_of_discrepancy(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals."""
     experiment, components = solution.model.experiment, solution.mixture
     mode = experiment.curves[0].mode

@@ -161,16 +161,17 @@ def stability_over(
     return stability(solution, loading, np.atleast_1d(np.asarray(stretch, dtype=float)))
 
 
-def stable_ranges(solution: Solution) -> dict[str, StableRange]:
+def stable_ranges(solution: Solution, reach: float = 1.0) -> dict[str, StableRange]:
     """Return the range in which the draws are stable, for every mode of one stretch and one stress.
 
-    Empty where stability cannot be computed from the material's energy. In the other modes the material passes through
-    the same states, or through states between theirs.
+    Over the measured range; with a reach above one, as far as I1 - 3 and I2 - 3 are so many times the largest measured
+    ones. Empty where stability cannot be computed from the material's energy. In the other modes the material passes
+    through the same states, or through states between theirs.
     """
     ranges, components = {}, _sampled_components(solution)
     is_isotropic = are_isotropic(solution.model, components)
     for mode in curve_modes():
-        stretch = _measured(solution.model.experiment, mode)
+        stretch = _measured(solution.model.experiment, mode, reach)
         try:
             criteria = _criteria(_curves(solution.model, components), mode, stretch, is_isotropic)
         except ModelError:
@@ -232,9 +233,16 @@ def stable_draws(
     return stable
 
 
-def _measured(data: Experiment, mode: LoadingMode) -> FloatArray:
-    """Return stretches of a mode on either side of the reference, and that, over the range that was measured."""
-    return np.unique(np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE) for end in calibrated_range(data, mode)]))
+def _measured(data: Experiment, mode: LoadingMode, reach: float = 1.0) -> FloatArray:
+    """Return stretches of a mode on either side of the reference, and that, over the range that was measured or more.
+
+    Of a larger reach, up to so many times the measured invariants.
+    """
+    I1, I2 = largest_invariants(data.states)
+    ends = calibrated_range(data, mode)
+    if reach > 1:
+        ends = farthest_stretch(mode, (reach * I1, reach * I2), -1), farthest_stretch(mode, (reach * I1, reach * I2), 1)
+    return np.unique(np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE) for end in ends]))
 
 
 def _sampled_components(solution: Solution) -> GaussianMixture:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from filecmp import cmp
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,9 +12,17 @@ from tissuq.cli import reading
 from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, once_each, parse_prior, progress
 from tissuq.cli.reading import one_noise
 from tissuq.errors import InputError
-from tissuq.studies.settings import load_settings
+from tissuq.studies.settings import load_settings, setting_of
+
+if TYPE_CHECKING:
+    from tissuq.mechanics import Material
+    from tissuq.studies.laws import LawSettings
+    from tissuq.studies.specimen import SpecimenSettings
 
 __all__ = ["fit", "population"]
+
+ALL_LAWS = "all"
+"""In place of materials: every law that is the same in all directions."""
 
 
 @reading.reads_files
@@ -27,9 +35,10 @@ def fit(
         ),
     ] = None,
     material: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
-            help="Material, a sum (gent+mooney-rivlin), or your own law.py:Name [neo-hookean]; see tissuq materials."
+            help="Material, a sum (gent+mooney-rivlin), or your own law.py:Name [neo-hookean]; see tissuq materials. "
+            "Repeat for more, or 'all', to compare laws."
         ),
     ] = None,
     discrepancy: Annotated[
@@ -94,15 +103,14 @@ def fit(
     force: Force = False,
 ) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
-    from tissuq.cli.tables import print_summary, print_warnings
     from tissuq.mechanics import material_named
-    from tissuq.report.run_folder import check_target, run_folder
-    from tissuq.report.specimen import write_specimen_run
-    from tissuq.studies.specimen import SpecimenSettings, run_specimen
+    from tissuq.report.run_folder import check_target
+    from tissuq.studies.laws import LawSettings
+    from tissuq.studies.specimen import SpecimenSettings
 
     files = reading.files_of(file or [])
     options: dict[str, Any] = {
-        "material": material, "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
+        "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
         "estimand": estimand, "tolerances": reading.tolerances(tolerance), "stable_in": stable_in or None,
         "held_out": held_out,
     }  # fmt: skip
@@ -113,16 +121,44 @@ def fit(
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     if config and len(files) > 1:
         raise InputError("give FILES or --config, not both.")
-    law = material_named(material, laws=True) if material else None
-    settings = load_settings(SpecimenSettings, config, options, rivals=("noise", "noise_sd"))
+    names = material or []
+    is_comparison = len(names) > 1 or names == [ALL_LAWS]
+    if config and not names:
+        is_comparison = setting_of(config, "laws") is not None
+    options |= {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
+    own = {name: material_named(name, laws=True) for name in names if name != ALL_LAWS}
+    kind = LawSettings if is_comparison else SpecimenSettings
+    settings = load_settings(kind, config, options, rivals=("noise", "noise_sd"))
     beside = config.parent if config else Path()
     sources = [beside / test.file for test in settings.tests or (settings,)]
     if files and config:
         _check_same(files[0], sources[0], config)
     target = out or Path("runs") / reading.run_name(file or [], config, sources)
     check_target(target, force=force)
+    if isinstance(settings, LawSettings):
+        _compare_laws(settings, beside, own, sources, target, figures=figures, force=force)
+    else:
+        _fit_one(settings, beside, own, sources, target, figures=figures, force=force)
+
+
+def _fit_one(
+    settings: SpecimenSettings,
+    beside: Path,
+    own: dict[str, Material],
+    sources: list[Path],
+    target: Path,
+    *,
+    figures: bool,
+    force: bool,
+) -> None:
+    """Fit one material, write the run and print its summary."""
+    from tissuq.cli.tables import print_summary, print_warnings
+    from tissuq.report.run_folder import run_folder
+    from tissuq.report.specimen import write_specimen_run
+    from tissuq.studies.specimen import run_specimen
+
     with progress() as step:
-        study = run_specimen(settings, beside, step, law)
+        study = run_specimen(settings, beside, step, next(iter(own.values()), None))
         step("writing")
         with run_folder(target, force=force) as folder:
             write_specimen_run(study, sources, folder, figures=figures)
@@ -131,6 +167,36 @@ def fit(
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     not_converged(study.not_converged)
+
+
+def _compare_laws(
+    settings: LawSettings,
+    beside: Path,
+    own: dict[str, Material],
+    sources: list[Path],
+    target: Path,
+    *,
+    figures: bool,
+    force: bool,
+) -> None:
+    """Fit several laws, write the run and print their table."""
+    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
+    from tissuq.report.run_folder import run_folder
+    from tissuq.studies.laws import run_laws
+
+    with progress() as step:
+        study = run_laws(settings, beside, step, own)
+        step("writing")
+        with run_folder(target, force=force) as folder:
+            write_law_run(study, sources, folder, figures=figures)
+    print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))
+    print(law_lead(study))
+    print_warnings(study.warnings)
+    for name, reason in study.comparison.skipped.items():
+        print(f"Not fitted: {name}: {reason}")
+    print(f"Report: {target / 'report.html'}")
+    not_converged([name for name, fit in study.comparison.fits.items() if fit.solution.is_approximate])
 
 
 def _check_same(file: Path, named: Path, config: Path) -> None:

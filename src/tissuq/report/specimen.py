@@ -12,7 +12,8 @@ from tissuq.assessment import Assessment
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
-from tissuq.experiments.reading.units import stress_unit
+from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.posterior.posterior import Posterior
 from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import (
     ASSESSMENT,
@@ -42,13 +43,21 @@ from tissuq.report.tables import (
     write_json,
 )
 from tissuq.studies.measured_file import MeasuredFile
-from tissuq.studies.specimen import SpecimenStudy
+from tissuq.studies.specimen import SpecimenSettings, SpecimenStudy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["curve_figure", "specimen_summary", "write_inspection", "write_specimen_run"]
+__all__ = [
+    "curve_figure",
+    "lines_of_tests",
+    "noise_in_words",
+    "specimen_summary",
+    "with_copied_files",
+    "write_inspection",
+    "write_specimen_run",
+]
 
 
 def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
@@ -65,7 +74,9 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
         Draw them, too.
     """
     (folder / INPUT).mkdir()
-    relocated = _with_files(study, sources, folder) | {"material": copied_laws(study.settings.material, folder)}
+    relocated = with_copied_files(study.settings, study.experiment, sources, folder) | {
+        "material": copied_laws(study.settings.material, folder)
+    }
     named = f" --material {relocated['material']}" if relocated["material"] != study.settings.material else ""
     command = f"fit{'' if figures else ' --no-figures'}{named}"
     of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
@@ -86,7 +97,9 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     write_page(folder, "specimen.html", **_context(study, summary), command=command)
 
 
-def _with_files(study: SpecimenStudy, sources: Sequence[Path], folder: Path) -> dict[str, Any]:
+def with_copied_files(
+    settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path], folder: Path
+) -> dict[str, Any]:
     """Return the settings of what was measured with the names of the files' copies, which go with the run."""
     names = [source.name for source in sources]
     copies = [
@@ -95,9 +108,9 @@ def _with_files(study: SpecimenStudy, sources: Sequence[Path], folder: Path) -> 
     ]
     for source, copy in zip(sources, copies, strict=True):
         shutil.copyfile(source, folder / copy)
-    if not study.settings.tests:
+    if not settings.tests:
         return {"file": copies[0]}
-    pairs = zip(study.settings.tests, study.experiment.tests, copies, strict=True)
+    pairs = zip(settings.tests, experiment.tests, copies, strict=True)
     return {
         "tests": tuple(test.model_copy(update={"file": copy, "name": measured.name}) for test, measured, copy in pairs)
     }
@@ -129,13 +142,11 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
 
 
 def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
-    noise = next(iter(study.posteriors.values())).model.noise
-    known_noise = "" if noise.parameters else f"sd {_known_noise(study)} {study.unit.name}"
     return {
         "headline": study.headline,
         "settings": study.settings,
         "experiment": study.experiment,
-        "tests": [_test_line(test) for test in study.experiment.tests],
+        "tests": lines_of_tests(study.experiment),
         "tolerances": tolerances_in_words(study.tolerances, study.unit),
         "estimand": study.tolerances.meaning,
         "unit": study.unit.name,
@@ -153,14 +164,23 @@ def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
         "stability": readable_stability(stability_rows(study.posteriors)),
         "held_out": readable_held_out(study.held_out, study.headline, study.unit),
         "methods": readable_methods(study.posteriors),
-        "noise": known_noise or noise.description,
+        "noise": noise_in_words(study.settings, next(iter(study.posteriors.values())), study.unit),
         "skipped": study.skipped,
     }
 
 
-def _known_noise(study: SpecimenStudy) -> str:
-    values = [test.noise_sd for test in study.settings.tests if test.noise_sd is not None]
-    return ", ".join(f"{value:g}" for value in values) or f"{study.settings.noise_sd:g}"
+def noise_in_words(settings: SpecimenSettings, posterior: Posterior, unit: StressUnit) -> str:
+    """Return what the noise was, in words."""
+    noise = posterior.model.noise
+    if noise.parameters:
+        return noise.description
+    values = [test.noise_sd for test in settings.tests if test.noise_sd is not None]
+    return f"sd {', '.join(f'{value:g}' for value in values) or f'{settings.noise_sd:g}'} {unit.name}"
+
+
+def lines_of_tests(experiment: Experiment) -> list[str]:
+    """Return every test in a few words."""
+    return [_test_line(test) for test in experiment.tests]
 
 
 def _test_line(test: Experiment) -> str:

@@ -134,6 +134,6 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None) -> Path:
     name = name or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in files:
         available = ", ".join(names)
-        what = f"has no discrepancy '{name}'" if name else "has several discrepancies"
+        what = f"has no posterior '{name}'" if name else "has several posteriors"
         raise InputError(f"run '{run}' {what}: choose one of {available}.")
     return files[name]

@@ -13,7 +13,7 @@ from tissuq.errors import InputError, TissuqError
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["DAMAGE", "RECIPE", "damage_reported", "load_settings", "looked_up"]
+__all__ = ["DAMAGE", "RECIPE", "damage_reported", "load_settings", "looked_up", "setting_of"]
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
@@ -66,6 +66,11 @@ def damage_reported(file: Path) -> Iterator[None]:
         raise InputError(f"'{file}' cannot be read: {error.strerror or error}.") from error
     except DAMAGE as error:
         raise InputError(f"'{file}' is damaged ({type(error).__name__}). Make the run again.") from error
+
+
+def setting_of(config: Path, name: str) -> Any:
+    """Return one setting of a TOML file, None where it has none; errors as of `load_settings`."""
+    return _read_toml(config).get(name)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

@@ -36,7 +36,16 @@ from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.studies.settings import looked_up
 
-__all__ = ["ALL", "SpecimenSettings", "SpecimenStudy", "fitted", "run_specimen"]
+__all__ = [
+    "ALL",
+    "SpecimenSettings",
+    "SpecimenStudy",
+    "fitted",
+    "parameters_of",
+    "priors_in_mpa",
+    "run_specimen",
+    "warnings_of_files",
+]
 
 ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
@@ -192,8 +201,8 @@ def run_specimen(
     unit = stress_unit(experiment.stress_unit)
     is_all = settings.discrepancies == (ALL,)
     names = _every() if is_all else list(dict.fromkeys(settings.discrepancies))
-    symbols = {name: _parameters(settings, material, name, experiment) for name in names}
-    priors = _priors(settings, symbols, unit)
+    symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
+    priors = priors_in_mpa(settings, symbols, unit)
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
@@ -240,7 +249,7 @@ def run_specimen(
         held_out += [
             {"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in predictions
         ]
-    results = settings, experiment, posteriors, seconds, skipped, assessments, _data_warnings(readings)
+    results = settings, experiment, posteriors, seconds, skipped, assessments, warnings_of_files(readings)
     return SpecimenStudy(*results, tuple(held_out))
 
 
@@ -256,11 +265,11 @@ def fitted(
     """
     experiment = settings.experiment(folder)
     material, unit = law or material_named(settings.material), stress_unit(experiment.stress_unit)
-    parameters = _parameters(settings, material, discrepancy, experiment)
+    parameters = parameters_of(settings, material, discrepancy, experiment)
     applicable = {
         symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in parameters]
     }
-    priors = _priors(settings.model_copy(update={"priors": applicable}), {discrepancy: parameters}, unit)
+    priors = priors_in_mpa(settings.model_copy(update={"priors": applicable}), {discrepancy: parameters}, unit)
     return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
 
 
@@ -289,7 +298,7 @@ def _options(
     }
 
 
-def _data_warnings(readings: Sequence[Reading]) -> tuple[str, ...]:
+def warnings_of_files(readings: Sequence[Reading]) -> tuple[str, ...]:
     """Return the warnings about the files, each with the name of its test if there are several."""
     messages = [(reading.experiment.name, text) for reading in readings for text in data_warnings(reading)]
     return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in messages)
@@ -300,9 +309,10 @@ def _every() -> list[str]:
     return [name for name, kind in discrepancies().items() if kind is Auto or not issubclass(kind, excluded)]
 
 
-def _parameters(
+def parameters_of(
     settings: SpecimenSettings, material: Material, discrepancy: str, experiment: Experiment
 ) -> tuple[Parameter, ...]:
+    """Return the parameters of a fit: of the material, the discrepancy and the noise."""
     noise = settings.noise_in(stress_unit("MPa")).parameters
     error_model = discrepancy_named(discrepancy)
     with suppress(ModelError):  # which the fit itself raises
@@ -310,7 +320,7 @@ def _parameters(
     return (*material.parameters, *error_model.parameters, *noise)
 
 
-def _priors(
+def priors_in_mpa(
     settings: SpecimenSettings, parameters: Mapping[str, tuple[Parameter, ...]], unit: StressUnit
 ) -> Mapping[str, Prior]:
     """Return the chosen priors in MPa and stretch."""

@@ -1,0 +1,264 @@
+"""Which law: several materials fitted to the same tests with the same discrepancy, side by side and averaged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.stability import stable_ranges
+from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode
+from tissuq.inference.marginal import Marginal, blended
+from tissuq.mechanics import Material, material_named
+from tissuq.mechanics.material import materials
+from tissuq.posterior.fitting import fit
+from tissuq.posterior.posterior import Posterior
+from tissuq.prediction.bands import predict_average, predict_band
+from tissuq.prediction.densities import leave_one_out
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["ALL_LAWS", "LawComparison", "fit_laws", "laws_named"]
+
+FloatArray = NDArray[np.float64]
+
+ALL_LAWS = "all"
+"""In place of names: every law that is the same in all directions."""
+BEYOND_FACTOR = 1.5
+"""Of the largest measured I1 - 3 and I2 - 3, up to which stability is looked at beyond the measurements."""
+NEGLIGIBLE_PROBABILITY = 1e-4
+"""Of a law that is left out of averages."""
+
+
+@dataclass(frozen=True, eq=False)
+class LawComparison:
+    """Fits of several laws to the same tests.
+
+    Attributes
+    ----------
+    fits : mapping of str to Posterior
+        By the name of the law.
+    alone : mapping of str to Posterior
+        The laws without discrepancy, as tested: how near each comes to the measurements by itself.
+    seconds : mapping of str to float
+        How long each took.
+    skipped : mapping of str to str
+        Laws that could not be fitted, and why.
+    """
+
+    fits: Mapping[str, Posterior]
+    alone: Mapping[str, Posterior]
+    seconds: Mapping[str, float]
+    skipped: Mapping[str, str]
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """The laws side by side, the most probable first.
+
+        - parameters: number of parameters of the law.
+        - log_evidence, log_evidence_error; probability of the law, were all as probable before the data.
+        - elpd: expected log density of new measurements, each left out in turn; elpd_difference: by how much it falls
+          short of the best, and the standard error of that.
+        - r_squared, nrmse: of the law fitted alone, its median against the measurements; the root mean square error is
+          over the root mean square of the measured stress. Missing where it cannot be fitted.
+        - discrepancy_share, _low, _high: the part of the stress that the discrepancy carries: mean and 95 % interval.
+        - stable, stable_beyond: probability of stability over the range of the invariants that was measured, and up to
+          1.5 times these; in the least stable loading mode. Missing where the energy does not tell.
+        - modulus, modulus_low, modulus_high: median and 95 % HDI of the law's initial shear modulus, MPa.
+        - seconds: how long the fit took.
+        """
+        import pandas as pd
+
+        rows = [self._row(name, posterior) for name, posterior in self.fits.items()]
+        table = pd.DataFrame(rows, list(self.fits))
+        table.insert(3, "probability", [self.probabilities[name] for name in self.fits])
+        densities = [leave_one_out(posterior.solution).log_density for posterior in self.fits.values()]
+        best = max(densities, key=np.sum)
+        differences = [density - best for density in densities]
+        table.insert(4, "elpd", [float(density.sum()) for density in densities])
+        table.insert(5, "elpd_difference", [float(difference.sum()) for difference in differences])
+        errors = [float(np.sqrt(len(difference)) * difference.std()) for difference in differences]
+        table.insert(6, "elpd_difference_error", errors)
+        return table.sort_values("log_evidence", ascending=False)
+
+    @cached_property
+    def probabilities(self) -> Mapping[str, float]:
+        """The posterior probability of each law, were all as probable before the data; they sum to one.
+
+        Raises
+        ------
+        InputError
+            When none has an evidence.
+        """
+        known = {name: posterior.log_evidence for name, posterior in self.fits.items()}
+        evidences = np.array([np.nan if evidence is None else evidence for evidence in known.values()])
+        if np.isnan(evidences).all():
+            raise InputError("no fit has an evidence, by which laws are weighted: use the method 'auto' or 'exact'.")
+        weights = np.nan_to_num(np.exp(evidences - np.nanmax(evidences)))
+        return dict(zip(known, (weights / weights.sum()).tolist(), strict=True))
+
+    @cached_property
+    def modulus(self) -> Marginal:
+        """The initial shear modulus, MPa: the mixture of the laws' posteriors by their probabilities."""
+        likely = [(weight, self.fits[name].initial_shear_modulus) for name, weight in self._likely.items()]
+        return blended(likely, (-np.inf, np.inf))
+
+    @property
+    def between(self) -> float:
+        """The share of the modulus's variance that is between the laws."""
+        means = np.array([self.fits[name].initial_shear_modulus.mean for name in self._likely])
+        weights = np.array(list(self._likely.values()))
+        return float(weights @ (means - weights @ means) ** 2 / self.modulus.sd**2)
+
+    def predict(
+        self, stretch: ArrayLike, *, mode: str | LoadingMode | None = None, prob: float = 0.95, noise: bool = True
+    ) -> pd.DataFrame:
+        """Return median, low and high of the stress (MPa), averaged over the laws by their probabilities.
+
+        Parameters are those of `Posterior.predict`.
+        """
+        import pandas as pd
+
+        weighted = [(weight, self.fits[name].solution) for name, weight in self._likely.items()]
+        return pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
+
+    @property
+    def _likely(self) -> Mapping[str, float]:
+        """The laws that are probable at all, with weights that sum to one."""
+        likely = {name: p for name, p in self.probabilities.items() if p > NEGLIGIBLE_PROBABILITY}
+        return {name: p / sum(likely.values()) for name, p in likely.items()}
+
+    def _row(self, name: str, posterior: Posterior) -> dict[str, Any]:
+        share, _ = shares_of_discrepancy(posterior.solution)
+        stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
+        beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
+        modulus = posterior.initial_shear_modulus
+        r_squared, nrmse = _quality(self.alone[name]) if name in self.alone else (np.nan, np.nan)
+        return {
+            "parameters": len(posterior.model.material.parameters),
+            "log_evidence": np.nan if posterior.log_evidence is None else posterior.log_evidence,
+            "log_evidence_error": posterior.log_evidence_error or np.nan,
+            "r_squared": r_squared,
+            "nrmse": nrmse,
+            **dict(zip(("discrepancy_share", "discrepancy_share_low", "discrepancy_share_high"), share, strict=True)),
+            "stable": min(stable, default=np.nan),
+            "stable_beyond": min((of_mode.probability for of_mode in beyond), default=np.nan),
+            "modulus": float(modulus.quantile(0.5)),
+            **dict(zip(("modulus_low", "modulus_high"), modulus.hdi(), strict=True)),
+            "seconds": self.seconds[name],
+        }
+
+
+def fit_laws(
+    experiment: Experiment | Sequence[Experiment],
+    laws: str | Sequence[str | Material] = ALL_LAWS,
+    *,
+    priors: Mapping[str, Any] | None = None,
+    step: Callable[[str], None] = lambda name: None,
+    **options: Any,
+) -> LawComparison:
+    """Fit several laws to the same tests, with the same discrepancy and noise.
+
+    Parameters
+    ----------
+    experiment : Experiment or sequence of Experiment
+        As of `tissuq.fit`.
+    laws : str or sequence of str or Material
+        ``"all"``: every law that is the same in all directions; or names, as `tissuq.fit` takes them, or laws.
+    priors : mapping of str to Prior, optional
+        By parameter; a law takes those of its own.
+    step : callable
+        Is told the name of each law before it is fitted.
+    options
+        As of `tissuq.fit`.
+
+    Returns
+    -------
+    LawComparison
+        Of ``"all"``, laws that cannot be fitted are in its ``skipped``.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When a law that was named cannot be fitted, or of all none; or a prior is of no law.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import tissuq as tq
+    >>> stretch = np.linspace(0.7, 1.8, 20)
+    >>> data = tq.simulate("mooney-rivlin", {"C10": 0.5, "C01": 0.1}, stretch, noise_sd=0.02, seed=1)
+    >>> found = tq.fit_laws(data, ["neo-hookean", "mooney-rivlin"], discrepancy="none", noise_sd=0.02)
+    >>> found.table.index[0]
+    'mooney-rivlin'
+    >>> low, high = found.modulus.hdi()
+    >>> bool(low < 1.2 < high)
+    True
+    """
+    data = Experiment.of(experiment)
+    candidates, is_all = laws_named(laws), laws == ALL_LAWS
+    fits, alone, seconds = dict[str, Posterior](), dict[str, Posterior](), dict[str, float]()
+    skipped = dict[str, str]()
+    for name, law in candidates.items():
+        step(name)
+        start = perf_counter()
+        others = {parameter.symbol for other in candidates.values() for parameter in other.parameters}
+        others -= {parameter.symbol for parameter in law.parameters}
+        chosen = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in others}
+        try:
+            posterior = fit(data, material=law, priors=chosen, **options)
+            fits[name] = replace(posterior, solution=copy(posterior.solution))  # without what it was computed from
+            seconds[name] = perf_counter() - start
+            own = {symbol: prior for symbol, prior in chosen.items() if symbol in fits[name].model.material_symbols}
+            without = options | {"discrepancy": "none", "tolerances": "as-tested"}
+            with suppress(ConvergenceError, ModelError):
+                alone[name] = fit(data, material=law, priors=own, **without)
+        except (ConvergenceError, ModelError, InputError) as error:
+            if not is_all or (not fits and isinstance(error, InputError)):
+                raise
+            skipped[name] = str(error)
+    if not fits:
+        name, reason = next(iter(skipped.items()))
+        raise ModelError(f"no law can be fitted, not even '{name}': {reason}")
+    return LawComparison(fits, alone, seconds, skipped)
+
+
+def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:
+    """Return laws by their names, those with few parameters first where all are asked for.
+
+    Raises
+    ------
+    InputError, ModelError
+        When there is no such law, or one is named twice.
+    """
+    if laws == ALL_LAWS:
+        every = [kind() for kind in materials().values()]
+        return {law.name: law for law in sorted(every, key=lambda law: len(law.parameters)) if law.is_isotropic}
+    found = [material_named(law) for law in ([laws] if isinstance(laws, str) else laws)]
+    by_name = {law.name: law for law in found}
+    if len(by_name) < len(found):
+        raise InputError("a law is named twice: name each of the laws once.")
+    return by_name
+
+
+def _quality(posterior: Posterior) -> tuple[float, float]:
+    """Return R^2 and the normalised root mean square error of a fit's median."""
+    measured, predicted = [], []
+    for curve in posterior.model.experiment.curves:
+        options: dict[str, Any] = {"noise": False, "mode": curve.mode, "channel": curve.channel}
+        measured.append(curve.stress)
+        predicted.append(predict_band(posterior.solution, curve.points, **options).median)
+    stress, residual = np.concatenate(measured), np.concatenate(measured) - np.concatenate(predicted)
+    total = ((stress - stress.mean()) ** 2).sum()
+    return float(1 - (residual**2).sum() / total), float(np.sqrt((residual**2).mean() / (stress**2).mean()))

@@ -1,0 +1,171 @@
+"""The folder of a comparison of laws: table, posteriors, figures and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.prediction.bands import predict_band
+from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
+from tissuq.report.run_folder import (
+    INPUT,
+    copied_laws,
+    write_data,
+    write_figures,
+    write_page,
+    write_posteriors,
+    write_recipe,
+)
+from tissuq.report.specimen import lines_of_tests, noise_in_words, with_copied_files
+from tissuq.report.tables import Row, readable_methods, significant, tolerances_in_words, write_csv, write_json
+from tissuq.studies.laws import LawStudy
+from tissuq.studies.measured_file import MeasuredFile
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["HEADERS", "law_lead", "readable_laws", "write_law_run"]
+
+MAX_DRAWN, LINE_POINTS = 6, 80
+"""Laws of which curves are drawn, and points of each."""
+SIGNIFICANT_ERRORS = 2.0
+"""Standard errors of a difference of elpd beyond which it counts."""
+HEADERS = [
+    "law", "modulus", "95 % HPD", "parameters", "probability", "elpd less best", "R2 alone", "error alone",
+    "share of discrepancy", "stable / to 1.5 I",
+]  # fmt: skip
+
+
+def write_law_run(study: LawStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
+    """Write the results of a comparison into an empty folder; arguments as of `write_specimen_run`."""
+    (folder / INPUT).mkdir()
+    relocated = with_copied_files(study.settings, study.experiment, sources, folder)
+    copies = tuple(copied_laws(name, folder) for name in study.settings.laws)
+    named = "".join(f" --material {name}" for name in copies) if copies != study.settings.laws else ""
+    command = f"fit{'' if figures else ' --no-figures'}{named}"
+    of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
+    settings = study.settings.model_copy(update=relocated | {"laws": copies})
+    write_recipe(folder, command, settings, without=of_one_file | {"material"})
+    write_data(folder, study.experiment)
+    rows = [{"law": name} | _known(row) for name, row in study.comparison.table.iterrows()]
+    write_csv(folder / "laws.csv", rows)
+    write_json(folder / "laws.json", rows)
+    write_posteriors(folder, study.comparison.fits)
+    if figures:
+        write_figures(folder, {"moduli": modulus_figure(study), "curves": curve_figure(study)})
+    write_page(folder, "laws.html", **_context(study), command=command)
+
+
+def readable_laws(study: LawStudy) -> list[list[str]]:
+    """Return the rows of the table in words, under `HEADERS`; the moduli in the unit of the file."""
+    return [_readable(str(name), row, study.unit.to_mpa) for name, row in study.comparison.table.iterrows()]
+
+
+def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
+    median, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
+    difference = f"{row.elpd_difference:.1f} +- {row.elpd_difference_error:.1f}"
+    return [
+        name,
+        median,
+        f"[{low}, {high}]",
+        f"{row.parameters:.0f}",
+        _percent(row.probability),
+        difference if row.elpd_difference else "best",
+        "" if row.r_squared != row.r_squared else f"{row.r_squared:.4f}",
+        _percent(row.nrmse),
+        _percent(row.discrepancy_share),
+        f"{_percent(row.stable)} / {_percent(row.stable_beyond)}" if row.stable == row.stable else "",
+    ]
+
+
+def law_lead(study: LawStudy) -> str:
+    """Return the finding in a few sentences."""
+    comparison, unit = study.comparison, study.unit
+    table, modulus = comparison.table, comparison.modulus
+    low, high = (significant(end / unit.to_mpa) for end in modulus.hdi())
+    is_close = table.elpd_difference > -SIGNIFICANT_ERRORS * table.elpd_difference_error
+    close = [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]
+    told = (
+        f"of {len(table)} laws, only {close[0]} describes the measurements so well that no other is as good"
+        if len(close) == 1
+        else f"{len(close)} of {len(table)} laws, with the discrepancy '{study.settings.discrepancies[0]}', predict "
+        f"left-out measurements equally well: the data do not tell these apart"
+    )
+    alone, median = str(table.nrmse.idxmin()), significant(float(modulus.quantile(0.5)) / unit.to_mpa)
+    return (
+        f"The initial shear modulus, averaged over the laws, is {median} {unit.name}, 95 % HPD {low} to {high} "
+        f"{unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
+        f"{told[0].upper()}{told[1:]}. Alone, without discrepancy, {alone} comes nearest to the measurements "
+        f"(error {100 * table.nrmse[alone]:.1f} %)."
+    )
+
+
+def modulus_figure(study: LawStudy) -> Figure:
+    """Return the moduli of all laws with 95 % HPD, and their average."""
+    table, scale = study.comparison.table, study.unit.to_mpa
+    average = study.comparison.modulus
+    rows = [(str(name), row.modulus, row.modulus_low, row.modulus_high) for name, row in table.iterrows()]
+    rows += [("all, by probability", float(average.quantile(0.5)), *average.hdi())]
+    with new_figure(8.2, 0.34 * len(rows) + 1.0) as figure:
+        axis = figure.subplots()
+        for place, (name, median, low, high) in enumerate(reversed(rows)):
+            color = INK if name == rows[-1][0] else BAND
+            axis.plot([low / scale, high / scale], [place, place], color=color, lw=2.2, solid_capstyle="butt")
+            axis.plot(median / scale, place, "o", color=color, ms=5)
+        axis.set_yticks(range(len(rows)), [name for name, *_ in reversed(rows)])
+        axis.tick_params(axis="y", length=0)
+        axis.set_xlabel(f"initial shear modulus [{study.unit.name}]")
+    return figure
+
+
+def curve_figure(study: LawStudy) -> Figure:
+    """Return the stress of the laws alone that come nearest, over the measurements, a panel for each curve."""
+    curves, scale = study.experiment.curves, study.unit.to_mpa
+    names = [str(name) for name in study.comparison.table.nrmse.dropna().nsmallest(MAX_DRAWN).index]
+    with new_figure(8.2, (4.2 if len(curves) == 1 else 3.4) * -(-len(curves) // 2) + 0.7) as figure:
+        axes = figure.subplots(-(-len(curves) // 2), min(len(curves), 2), squeeze=False).ravel()
+        for axis, curve in zip(axes, curves, strict=False):
+            axis.plot(curve.abscissa, curve.stress / scale, ".", color=BASE, ms=4, label="measured")
+            points = np.linspace(curve.points.min(), curve.points.max(), LINE_POINTS)
+            points = points if curve.points.ndim == 1 else curve.points[curve.abscissa.argsort(kind="stable")]
+            for number, name in enumerate(names):
+                options: dict[str, Any] = {"mode": curve.mode, "channel": curve.channel}
+                band = predict_band(study.comparison.alone[name].solution, points, noise=False, **options)
+                axis.plot(band.stretch, band.median / scale, color=f"C{number}", lw=1.2, label=name)
+            axis.set_title(curve.name)
+            axis.set_xlabel(curve.mode.controls[0].name)
+            axis.set_ylabel(f"engineering stress [{study.unit.name}]")
+        for axis in axes[len(curves) :]:
+            axis.set_visible(False)
+        legend_above(figure, axes[: len(curves)], 4)
+    return figure
+
+
+def _context(study: LawStudy) -> dict[str, Any]:
+    comparison = study.comparison
+    return {
+        "experiment": study.experiment,
+        "tests": lines_of_tests(study.experiment),
+        "lead": law_lead(study),
+        "headers": [HEADERS[0], f"modulus [{study.unit.name}]", *HEADERS[2:]],
+        "rows": readable_laws(study),
+        "warnings": study.warnings,
+        "estimand": study.tolerances.meaning,
+        "tolerances": tolerances_in_words(study.tolerances, study.unit),
+        "discrepancy": study.settings.discrepancies[0],
+        "noise": noise_in_words(study.settings, next(iter(comparison.fits.values())), study.unit),
+        "methods": readable_methods(comparison.fits),
+        "skipped": comparison.skipped,
+    }
+
+
+def _known(row: Any) -> Row:
+    """Return the numbers of a row of the table, None for one that is missing."""
+    return {str(name): None if value != value else float(value) for name, value in row.items()}
+
+
+def _percent(share: float) -> str:
+    return "" if share != share else "< 0.1 %" if 0 < share < 0.001 else f"{100 * share:.3g} %"

@@ -1,0 +1,118 @@
+"""The comparison of laws from a user's files: settings, and what comes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from tissuq.assessment.measurements import measurement_warnings
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.mechanics import Material
+from tissuq.model.tolerances import Tolerances
+from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws, laws_named
+from tissuq.studies.specimen import (
+    ALL,
+    SpecimenSettings,
+    parameters_of,
+    priors_in_mpa,
+    warnings_of_files,
+)
+
+__all__ = ["LawSettings", "LawStudy", "run_laws"]
+
+
+class LawSettings(SpecimenSettings):
+    """Everything that a comparison of laws depends on: as of a fit, but for the material."""
+
+    laws: tuple[str, ...] = Field((ALL_LAWS,), min_length=1)
+
+    @model_validator(mode="after")
+    def _one_discrepancy(self) -> Self:
+        if len(self.discrepancies) > 1 or self.discrepancies == (ALL,):
+            raise ValueError("laws are compared with one discrepancy: give one, or one material")
+        if self.held_out:
+            raise ValueError("held_out is for one material: give one")
+        if ALL_LAWS in self.laws and self.laws != (ALL_LAWS,):
+            raise ValueError(f"'{ALL_LAWS}' cannot be combined with other materials; give '{ALL_LAWS}', or names")
+        return self
+
+
+@dataclass(frozen=True)
+class LawStudy:
+    """Results of a comparison of laws.
+
+    Attributes
+    ----------
+    settings : LawSettings
+    experiment : Experiment
+    comparison : LawComparison
+    data_warnings : tuple of str
+        What is implausible in the measurements.
+    """
+
+    settings: LawSettings
+    experiment: Experiment
+    comparison: LawComparison
+    data_warnings: tuple[str, ...] = ()
+
+    @property
+    def unit(self) -> StressUnit:
+        """The unit in which the file, or the first of several, gives stresses."""
+        return stress_unit(self.experiment.stress_unit)
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """The errors of the tests that the intervals include."""
+        return next(iter(self.comparison.fits.values())).model.tolerances
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about data and fits, each once with the laws that it concerns."""
+        concerned: dict[str, list[str]] = {}
+        for name, posterior in self.comparison.fits.items():
+            for text in posterior.warnings:
+                concerned.setdefault(text, []).append(name)
+        texts = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        return [*self.data_warnings, *measurement_warnings(self.experiment), *texts]
+
+
+def run_laws(
+    settings: LawSettings,
+    folder: Path = Path(),
+    step: Callable[[str], None] = lambda text: None,
+    own: Mapping[str, Material] | None = None,
+) -> LawStudy:
+    """Read the file, or those of several tests, and fit every chosen law.
+
+    Settings may come from a file, so that laws of the user's own which they name are not run; these are given as
+    ``own``, by the names in the settings.
+
+    Raises
+    ------
+    InputError, ModelError, ConvergenceError
+        When file or settings cannot be used, or a law that was named cannot be fitted.
+    """
+    readings = settings.readings(folder)
+    experiment = Experiment.of([reading.experiment for reading in readings])
+    unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
+    is_all = settings.laws == (ALL_LAWS,)
+    laws = laws_named(ALL_LAWS if is_all else [(own or {}).get(name, name) for name in settings.laws])
+    parameters = {name: parameters_of(settings, law, discrepancy, experiment) for name, law in laws.items()}
+    comparison = fit_laws(
+        experiment,
+        ALL_LAWS if is_all else list(laws.values()),
+        discrepancy=discrepancy,
+        noise=settings.noise_in(unit),
+        priors=priors_in_mpa(settings, parameters, unit),
+        tolerances=settings.tolerances_in(unit),
+        method=settings.method,
+        stable_in=settings.stable_in,
+        seed=settings.seed,
+        step=step,
+    )
+    return LawStudy(settings, experiment, comparison, warnings_of_files(readings))

@@ -1,0 +1,89 @@
+"""`tissuq fit` with several materials, as a user runs it."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+from .conftest import STRESS_KPA, STRETCH, tree
+
+ALONE = ["--discrepancy", "none", "--noise-sd", "1", "--estimand", "as-tested"]
+TWO = ["--material", "neo-hookean", "--material", "mooney-rivlin"]
+LAW = """
+def softening(I1, I2, mu, k):
+    return mu * (I1 - 3) / 2 - k * (I1 - 3) ** 2
+"""
+
+
+def rows_of(folder):
+    with (folder / "laws.csv").open(newline="") as lines:
+        return {row["law"]: row for row in csv.DictReader(lines)}
+
+
+def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
+    said = cli("fit", specimen, *TWO, *ALONE, "--out", "two")
+    assert said.status == 0, said.err
+    words = " ".join(said.out.split())
+    assert "Laws of specimen, moduli in kPa" in words
+    assert "The initial shear modulus, averaged over the laws, is" in words
+    rows = rows_of(here / "two")
+    stretch, stress = np.array(STRETCH), 1e-3 * np.array(STRESS_KPA)
+    experiment = tq.Experiment("uniaxial", stretch, stress)
+    for name, row in rows.items():
+        options = {"discrepancy": "none", "noise_sd": 1e-3, "tolerances": "as-tested"}
+        posterior = tq.fit(experiment, material=name, **options)
+        assert float(row["log_evidence"]) == pytest.approx(posterior.log_evidence, rel=1e-6)
+        assert float(row["modulus"]) == pytest.approx(posterior.initial_shear_modulus.quantile(0.5), rel=1e-6)
+    page = (here / "two" / "report.html").read_text()
+    assert page.count("<svg") + page.count("data:image/svg+xml") == 2
+    predicted = cli("predict", "two", "--discrepancy", "mooney-rivlin", "--mode", "planar", "--no-figures")
+    assert predicted.status == 0, predicted.err
+    asked = cli("predict", "two", "--mode", "planar", "--no-figures", "--out", "other")
+    assert (asked.status, asked.err.count("\n")) == (2, 1)
+    assert "choose one of mooney-rivlin, neo-hookean" in asked.err
+
+
+def test_a_comparison_is_repeated_from_its_recipe(cli, here, specimen):
+    assert cli("fit", specimen, *TWO, *ALONE, "--no-figures", "--out", "first").status == 0
+    recipe = tomllib.loads((here / "first" / "run.toml").read_text())
+    assert recipe["laws"] == ["neo-hookean", "mooney-rivlin"]
+    assert "material" not in recipe
+    assert cli("fit", "--config", "first/run.toml", "--no-figures", "--out", "again").status == 0
+    first, again = (rows_of(here / folder) for folder in ("first", "again"))
+    for name, row in first.items():
+        assert row | {"seconds": ""} == again[name] | {"seconds": ""}
+
+
+def test_a_law_of_ones_own_takes_part(cli, here, specimen):
+    (here / "law.py").write_text(LAW)
+    said = cli("fit", specimen, "--material", "law.py:softening", "--material", "neo-hookean", *ALONE, "--no-figures")
+    assert said.status == 0, said.err
+    folder = here / "runs" / "specimen"
+    assert set(rows_of(folder)) == {"softening", "neo-hookean"}
+    assert (folder / "input" / "law.py").read_text() == LAW
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([*TWO, "--discrepancy", "all"], ["laws are compared with one discrepancy"]),
+        ([*TWO, "--held-out"], ["held_out"]),
+        (["--material", "all", "--material", "gent"], ["'all' cannot be combined"]),
+        (["--material", "gent", "--material", "no-such-law"], ["no-such-law"]),
+        ([*TWO, "--prior", "Jm=uniform(1,2)"], ["Jm"]),
+    ],
+)
+def test_bad_input_is_one_message_and_leaves_nothing(cli, here, specimen, options, words):
+    before = tree(here)
+    said = cli("fit", specimen, *options)
+    assert said.status == 2
+    assert said.err.startswith("tissuq: ")
+    assert said.err.count("\n") == 1
+    for word in words:
+        assert word in said.err
+    assert tree(here) == before
