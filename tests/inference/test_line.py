@@ -53,6 +53,12 @@ def test_the_error_tells_how_far_the_mass_is_off():
     assert abs(logsumexp(coarse.log_masses)) < 3 * coarse.error
 
 
+def test_places_without_a_density_are_none():
+    line = known_along(lambda place: -0.5 * place**2 if place < 0.8 else np.nan, first_places(), END)
+    cumulative = norm.cdf(line.distribution[0]) / norm.cdf(0.8)
+    np.testing.assert_allclose(line.distribution[2], np.minimum(cumulative, 1), atol=0.02)
+
+
 def test_a_density_that_does_not_fall_before_the_end_stops_there():
     line = known_along(lambda place: place, first_places(), END)
     assert line.places[-1] == END

@@ -18,8 +18,8 @@ FIRST_END, FIRST_PLACES = 4.0, 17
 """Where a search begins on either side of zero, and with how many places."""
 MIN_INTERVAL, MIN_RELATIVE_GAP = 1e-4, 0.25
 """Between two places; and at first over the smaller one of the gaps beside."""
-NEGLIGIBLE_DROP = 7.5
-"""Log density below the largest one at which places do not matter."""
+NEGLIGIBLE_DROP, MAX_DROP = 7.5, 1e3
+"""Log density below the largest one at which places do not matter, and the lowest that is told apart."""
 MAX_PLACES = 100
 """Places of one search."""
 PEAK_PLACES, MAX_PEAK_DROP, PARABOLAS = 161, 50.0, 6
@@ -170,7 +170,8 @@ def known_along(
     while new and len(known) < MAX_PLACES:
         known |= {place: log_density(place) for place in sorted(new)}
         ordered = np.array(sorted(known))
-        logs = np.nan_to_num([known[place] for place in ordered], nan=-1e300, neginf=-1e300)
+        logs = np.nan_to_num([known[place] for place in ordered], nan=-np.inf)
+        logs = np.maximum(logs, logs.max() - MAX_DROP)
         matters = logs > logs.max() - NEGLIGIBLE_DROP
         is_rough = (matters[1:] | matters[:-1]) & (np.abs(np.diff(logs)) > accuracy.max_difference)
         is_rough |= Line(ordered, logs).shares_between > accuracy.max_share

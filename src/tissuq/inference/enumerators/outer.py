@@ -193,7 +193,7 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
 def weighted_nodes(model: StatisticalModel, guide: Guide) -> tuple[list[Node], FloatArray, float]:
     """Return nodes at values of the outer parameters, their log weights, and the relative error of their sum.
 
-    One parameter takes equally spaced values of a coordinate; more take quasi-random ones of an adapted proposal.
+    One parameter takes values spread along its posterior; more take quasi-random ones of an adapted proposal.
 
     Raises
     ------
@@ -210,10 +210,9 @@ class _Search:
 
     def __init__(self, sums: _Sums, outer: Outer, member_count: int) -> None:
         self._sums, self._outer, self._members = sums, outer, np.arange(member_count)
-        self._nodes: list[Node] = []
 
     def on_line(self, guide: Guide) -> tuple[list[Node], FloatArray, float]:
-        """Return nodes at equally spaced places of the one outer parameter's coordinate."""
+        """Return nodes at places of the one outer parameter's coordinate that are spread along its posterior."""
         places = guide.places
         if places is None:
             scout = known_along(lambda place: self._scouted(np.array([place])), first_places(), MAX_SCORE)
@@ -231,7 +230,7 @@ class _Search:
         self._check_place(line.places[[line.log_masses.argmax()]])
         cells = zip(line.places, np.exp(line.log_masses - line.logs), strict=True)
         chosen = [replace(nodes[float(place)], place=float(place), width=float(width)) for place, width in cells]
-        return chosen, line.log_masses - [node.log_mass for node in chosen], line.error
+        return *_weighted(chosen, line.log_masses), line.error
 
     def _peaks(self, guide: Guide) -> FloatArray:
         """Return places about where the material alone fits the data: a posterior may have a narrow peak there."""
@@ -270,8 +269,7 @@ class _Search:
         found = adapted(log_masses, d, count, start=start, min_effective=min_effective)
         guide.proposal = found.proposal
         error = relative_error(self._outer, found.log_weights, min_effective)
-        log_weights = found.log_weights - [node.log_mass for node in nodes] - np.log(len(nodes))
-        return nodes, log_weights, error
+        return *_weighted(nodes, found.log_weights - np.log(len(nodes))), error
 
     def _scouted(self, point: FloatArray) -> float:
         """Return the logarithm of the density at a point (d,), roughly: from a few of the members."""
@@ -296,6 +294,13 @@ class _Search:
                 f"the data put {', '.join(far)} where the prior leaves next to nothing (less than 1e-12): give a prior "
                 "that holds what the data say, in MPa where it is a stress."
             )
+
+
+def _weighted(nodes: Sequence[Node], log_masses: FloatArray) -> tuple[list[Node], FloatArray]:
+    """Return nodes with a mass at all, and log weights that give them these masses (K,)."""
+    own = np.array([node.log_mass for node in nodes])
+    numbers = np.flatnonzero(np.isfinite(own))
+    return [nodes[int(number)] for number in numbers], (log_masses - own)[numbers]
 
 
 class _Terms:
