@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 from warnings import warn
@@ -11,7 +12,7 @@ from tissuq.mechanics import Material
 from tissuq.model.discrepancy import Auto, Discrepancy, NoDiscrepancy
 from tissuq.posterior.archive import read_modes
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.settings import RECIPE, damage_reported, load_settings
+from tissuq.studies.settings import RECIPE, damage_reported, load_settings, setting_of
 
 if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenSettings
@@ -134,6 +135,14 @@ def _file_in(run: Path, discrepancy: str | Discrepancy | None) -> Path:
     name = name or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in files:
         available = ", ".join(names)
-        what = f"has no posterior '{name}'" if name else "has several posteriors"
+        one, several = ("law", "laws") if _compares_laws(run) else ("discrepancy", "discrepancies")
+        what = f"has no {one} '{name}'" if name else f"has several {several}"
         raise InputError(f"run '{run}' {what}: choose one of {available}.")
     return files[name]
+
+
+def _compares_laws(run: Path) -> bool:
+    """Return whether the posteriors of a run are those of several laws."""
+    with suppress(InputError):
+        return setting_of(run / RECIPE, "laws") is not None
+    return False
