@@ -238,9 +238,9 @@ def _measured(data: Experiment, mode: LoadingMode, reach: float = 1.0) -> FloatA
 
     Of a larger reach, up to so many times the measured invariants.
     """
-    I1, I2 = largest_invariants(data.states)
     ends = calibrated_range(data, mode)
     if reach > 1:
+        I1, I2 = largest_invariants(data.states)
         ends = farthest_stretch(mode, (reach * I1, reach * I2), -1), farthest_stretch(mode, (reach * I1, reach * I2), 1)
     return np.unique(np.concatenate([np.linspace(1.0, end, POINTS_PER_SIDE) for end in ends]))
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from filecmp import cmp
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -15,14 +16,15 @@ from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings, setting_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tissuq.mechanics import Material
-    from tissuq.studies.laws import LawSettings
-    from tissuq.studies.specimen import SpecimenSettings
+    from tissuq.studies.laws import LawStudy
+    from tissuq.studies.specimen import SpecimenStudy
+
+    Study = TypeVar("Study", SpecimenStudy, LawStudy)
 
 __all__ = ["fit", "population"]
-
-ALL_LAWS = "all"
-"""In place of materials: every law that is the same in all directions."""
 
 
 @reading.reads_files
@@ -104,6 +106,7 @@ def fit(
 ) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
     from tissuq.mechanics import material_named
+    from tissuq.posterior.laws import ALL_LAWS
     from tissuq.report.run_folder import check_target
     from tissuq.studies.laws import LawSettings
     from tissuq.studies.specimen import SpecimenSettings
@@ -127,7 +130,7 @@ def fit(
         is_comparison = setting_of(config, "laws") is not None
     options |= {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
     own = {name: material_named(name, laws=True) for name in names if name != ALL_LAWS}
-    kind = LawSettings if is_comparison else SpecimenSettings
+    kind: type[SpecimenSettings] = LawSettings if is_comparison else SpecimenSettings
     settings = load_settings(kind, config, options, rivals=("noise", "noise_sd"))
     beside = config.parent if config else Path()
     sources = [beside / test.file for test in settings.tests or (settings,)]
@@ -135,68 +138,67 @@ def fit(
         _check_same(files[0], sources[0], config)
     target = out or Path("runs") / reading.run_name(file or [], config, sources)
     check_target(target, force=force)
-    if isinstance(settings, LawSettings):
-        _compare_laws(settings, beside, own, sources, target, figures=figures, force=force)
-    else:
-        _fit_one(settings, beside, own, sources, target, figures=figures, force=force)
+    fit_all = _compare_laws if is_comparison else _fit_one
+    fit_all(settings, beside, own, sources, target, figures=figures, force=force)
 
 
 def _fit_one(
-    settings: SpecimenSettings,
-    beside: Path,
-    own: dict[str, Material],
-    sources: list[Path],
-    target: Path,
-    *,
-    figures: bool,
-    force: bool,
+    settings: Any, beside: Path, own: dict[str, Material], sources: list[Path], target: Path, **options: bool
 ) -> None:
     """Fit one material, write the run and print its summary."""
-    from tissuq.cli.tables import print_summary, print_warnings
-    from tissuq.report.run_folder import run_folder
+    from tissuq.cli.tables import print_summary
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import run_specimen
 
-    with progress() as step:
-        study = run_specimen(settings, beside, step, next(iter(own.values()), None))
-        step("writing")
-        with run_folder(target, force=force) as folder:
-            write_specimen_run(study, sources, folder, figures=figures)
+    run = partial(run_specimen, settings, beside, law=next(iter(own.values()), None))
+    study = _written(run, write_specimen_run, sources, target, **options)
     print_summary(target, study.experiment)
-    print_warnings(study.warnings)
-    for name, reason in study.skipped.items():
-        print(f"Not fitted: {name}: {reason}")
-    not_converged(study.not_converged)
+    _print_remarks(study)
 
 
 def _compare_laws(
-    settings: LawSettings,
-    beside: Path,
-    own: dict[str, Material],
+    settings: Any, beside: Path, own: dict[str, Material], sources: list[Path], target: Path, **options: bool
+) -> None:
+    """Fit several laws, write the run and print their table."""
+    from tissuq.cli.tables import print_rows
+    from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
+    from tissuq.studies.laws import run_laws
+
+    study = _written(partial(run_laws, settings, beside, own=own), write_law_run, sources, target, **options)
+    print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))
+    print(law_lead(study))
+    _print_remarks(study, f"Report: {target / 'report.html'}")
+
+
+def _written(
+    run: Callable[..., Study],
+    write: Callable[..., None],
     sources: list[Path],
     target: Path,
     *,
     figures: bool,
     force: bool,
-) -> None:
-    """Fit several laws, write the run and print their table."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
+) -> Study:
+    """Return what comes of a run, when it is written into its folder."""
     from tissuq.report.run_folder import run_folder
-    from tissuq.studies.laws import run_laws
 
     with progress() as step:
-        study = run_laws(settings, beside, step, own)
+        study = run(step=step)
         step("writing")
         with run_folder(target, force=force) as folder:
-            write_law_run(study, sources, folder, figures=figures)
-    print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))
-    print(law_lead(study))
+            write(study, sources, folder, figures=figures)
+    return study
+
+
+def _print_remarks(study: SpecimenStudy | LawStudy, *lines: str) -> None:
+    """Print the warnings of a study, what could not be fitted, and some lines; say what has not converged."""
+    from tissuq.cli.tables import print_warnings
+
     print_warnings(study.warnings)
-    for name, reason in study.comparison.skipped.items():
+    for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
-    print(f"Report: {target / 'report.html'}")
-    not_converged([name for name, fit in study.comparison.fits.items() if fit.solution.is_approximate])
+    print(*lines, sep="\n", end="\n" * bool(lines))
+    not_converged(study.not_converged)
 
 
 def _check_same(file: Path, named: Path, config: Path) -> None:

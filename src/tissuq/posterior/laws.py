@@ -111,13 +111,13 @@ class LawComparison:
     @cached_property
     def modulus(self) -> Marginal:
         """The initial shear modulus, MPa: the mixture of the laws' posteriors by their probabilities."""
-        likely = [(weight, self.fits[name].initial_shear_modulus) for name, weight in self._likely.items()]
+        likely = [(weight, self._moduli[name]) for name, weight in self._likely.items()]
         return blended(likely, (-np.inf, np.inf))
 
     @property
     def between(self) -> float:
         """The share of the modulus's variance that is between the laws."""
-        means = np.array([self.fits[name].initial_shear_modulus.mean for name in self._likely])
+        means = np.array([self._moduli[name].mean for name in self._likely])
         weights = np.array(list(self._likely.values()))
         return float(weights @ (means - weights @ means) ** 2 / self.modulus.sd**2)
 
@@ -133,6 +133,11 @@ class LawComparison:
         weighted = [(weight, self.fits[name].solution) for name, weight in self._likely.items()]
         return pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
 
+    @cached_property
+    def _moduli(self) -> Mapping[str, Marginal]:
+        """The initial shear modulus of each law, MPa."""
+        return {name: posterior.initial_shear_modulus for name, posterior in self.fits.items()}
+
     @property
     def _likely(self) -> Mapping[str, float]:
         """The laws that are probable at all, with weights that sum to one."""
@@ -143,7 +148,7 @@ class LawComparison:
         share, _ = shares_of_discrepancy(posterior.solution)
         stable = [of_mode.probability for of_mode in posterior.stable_ranges.values()]
         beyond = stable_ranges(posterior.solution, BEYOND_FACTOR).values()
-        modulus = posterior.initial_shear_modulus
+        modulus = self._moduli[name]
         r_squared, nrmse = _quality(self.alone[name]) if name in self.alone else (np.nan, np.nan)
         return {
             "parameters": len(posterior.model.material.parameters),
@@ -209,12 +214,11 @@ def fit_laws(
     data = Experiment.of(experiment)
     candidates, is_all = laws_named(laws), laws == ALL_LAWS
     fits, alone, seconds = dict[str, Posterior](), dict[str, Posterior](), dict[str, float]()
-    skipped = dict[str, str]()
+    skipped, symbols = dict[str, str](), {p.symbol for law in candidates.values() for p in law.parameters}
     for name, law in candidates.items():
         step(name)
         start = perf_counter()
-        others = {parameter.symbol for other in candidates.values() for parameter in other.parameters}
-        others -= {parameter.symbol for parameter in law.parameters}
+        others = symbols - {parameter.symbol for parameter in law.parameters}
         chosen = {symbol: prior for symbol, prior in (priors or {}).items() if symbol not in others}
         try:
             posterior = fit(data, material=law, priors=chosen, **options)

@@ -10,19 +10,10 @@ import numpy as np
 
 from tissuq.prediction.bands import predict_band
 from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
-from tissuq.report.run_folder import (
-    INPUT,
-    copied_laws,
-    write_data,
-    write_figures,
-    write_page,
-    write_posteriors,
-    write_recipe,
-)
-from tissuq.report.specimen import lines_of_tests, noise_in_words, with_copied_files
-from tissuq.report.tables import Row, readable_methods, significant, tolerances_in_words, write_csv, write_json
+from tissuq.report.run_folder import write_figures, write_page, write_posteriors
+from tissuq.report.specimen import lines_of_tests, noise_in_words, write_inputs
+from tissuq.report.tables import known_number, readable_methods, significant, tolerances_in_words, write_csv, write_json
 from tissuq.studies.laws import LawStudy
-from tissuq.studies.measured_file import MeasuredFile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,16 +32,11 @@ HEADERS = [
 
 def write_law_run(study: LawStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
     """Write the results of a comparison into an empty folder; arguments as of `write_specimen_run`."""
-    (folder / INPUT).mkdir()
-    relocated = with_copied_files(study.settings, study.experiment, sources, folder)
-    copies = tuple(copied_laws(name, folder) for name in study.settings.laws)
-    named = "".join(f" --material {name}" for name in copies) if copies != study.settings.laws else ""
-    command = f"fit{'' if figures else ' --no-figures'}{named}"
-    of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
-    settings = study.settings.model_copy(update=relocated | {"laws": copies})
-    write_recipe(folder, command, settings, without=of_one_file | {"material"})
-    write_data(folder, study.experiment)
-    rows = [{"law": name} | _known(row) for name, row in study.comparison.table.iterrows()]
+    command = write_inputs(study.settings, study.experiment, sources, folder, figures=figures)
+    rows = [
+        {"law": name} | {str(column): known_number(value) for column, value in row.items()}
+        for name, row in study.comparison.table.iterrows()
+    ]
     write_csv(folder / "laws.csv", rows)
     write_json(folder / "laws.json", rows)
     write_posteriors(folder, study.comparison.fits)
@@ -160,11 +146,6 @@ def _context(study: LawStudy) -> dict[str, Any]:
         "methods": readable_methods(comparison.fits),
         "skipped": comparison.skipped,
     }
-
-
-def _known(row: Any) -> Row:
-    """Return the numbers of a row of the table, None for one that is missing."""
-    return {str(name): None if value != value else float(value) for name, value in row.items()}
 
 
 def _percent(share: float) -> str:

@@ -42,6 +42,7 @@ from tissuq.report.tables import (
     write_csv,
     write_json,
 )
+from tissuq.studies.laws import LawSettings
 from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenSettings, SpecimenStudy
 
@@ -54,7 +55,7 @@ __all__ = [
     "lines_of_tests",
     "noise_in_words",
     "specimen_summary",
-    "with_copied_files",
+    "write_inputs",
     "write_inspection",
     "write_specimen_run",
 ]
@@ -73,15 +74,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     figures : bool
         Draw them, too.
     """
-    (folder / INPUT).mkdir()
-    relocated = with_copied_files(study.settings, study.experiment, sources, folder) | {
-        "material": copied_laws(study.settings.material, folder)
-    }
-    named = f" --material {relocated['material']}" if relocated["material"] != study.settings.material else ""
-    command = f"fit{'' if figures else ' --no-figures'}{named}"
-    of_one_file = frozenset(MeasuredFile.model_fields) if study.settings.tests else frozenset(["tests"])
-    write_recipe(folder, command, study.settings.model_copy(update=relocated), without=of_one_file)
-    write_data(folder, study.experiment)
+    command = write_inputs(study.settings, study.experiment, sources, folder, figures=figures)
     summary = specimen_summary(study)
     write_tables(folder, summary, study.posteriors)
     stability = stability_rows(study.posteriors)
@@ -97,7 +90,27 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     write_page(folder, "specimen.html", **_context(study, summary), command=command)
 
 
-def with_copied_files(
+def write_inputs(
+    settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path], folder: Path, *, figures: bool
+) -> str:
+    """Write copies of the files and laws, recipe and measurements of a fit; return the command in the recipe."""
+    (folder / INPUT).mkdir()
+    named = list(settings.laws) if isinstance(settings, LawSettings) else [settings.material]
+    copies = [copied_laws(name, folder) for name in named]
+    relocated = _with_copied_files(settings, experiment, sources, folder)
+    without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
+    if isinstance(settings, LawSettings):
+        relocated, without = relocated | {"laws": tuple(copies)}, without | {"material"}
+    else:
+        relocated |= {"material": copies[0]}
+    options = "".join(f" --material {name}" for name in copies) if copies != named else ""
+    command = f"fit{'' if figures else ' --no-figures'}{options}"
+    write_recipe(folder, command, settings.model_copy(update=relocated), without=without)
+    write_data(folder, experiment)
+    return command
+
+
+def _with_copied_files(
     settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path], folder: Path
 ) -> dict[str, Any]:
     """Return the settings of what was measured with the names of the files' copies, which go with the run."""

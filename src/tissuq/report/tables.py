@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "headline_of",
+    "known_number",
     "parameter_rows",
     "readable_held_out",
     "readable_methods",
@@ -81,7 +82,7 @@ def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
                     "parameter": parameter.symbol,
                     "unit": parameter.unit,
                     "prior": str(posterior.model.priors[parameter.symbol]),
-                    **{name: _known(numbers[name]) for name in ("mean", "sd", "median", "hdi_low", "hdi_high")},
+                    **{name: known_number(numbers[name]) for name in ("mean", "sd", "median", "hdi_low", "hdi_high")},
                     "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
                     "ess": float(numbers["ess"]) if "ess" in numbers else None,
                 }
@@ -106,7 +107,7 @@ def stability_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
                 "surely_high": stable_range.surely_high,
             }
             for side, loss in (("below", stable_range.loss_below), ("above", stable_range.loss_above)):
-                row |= {f"lost_{side}_{name}": _known(value) for name, value in loss._asdict().items()}
+                row |= {f"lost_{side}_{name}": known_number(value) for name, value in loss._asdict().items()}
             rows.append(row)
     return rows
 
@@ -125,7 +126,8 @@ def stability_cells(posterior: Posterior) -> Row:
     return dict(zip(STABILITY, (lowest.probability, *losses), strict=True))
 
 
-def _known(number: float) -> float | None:
+def known_number(number: float) -> float | None:
+    """Return a number, None for one that is missing."""
     return None if number != number else float(number)
 
 

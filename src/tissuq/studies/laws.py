@@ -21,6 +21,7 @@ from tissuq.studies.specimen import (
     parameters_of,
     priors_in_mpa,
     warnings_of_files,
+    warnings_of_fits,
 )
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
@@ -71,13 +72,19 @@ class LawStudy:
         return next(iter(self.comparison.fits.values())).model.tolerances
 
     @property
+    def skipped(self) -> Mapping[str, str]:
+        """Laws that could not be fitted, and why."""
+        return self.comparison.skipped
+
+    @property
+    def not_converged(self) -> list[str]:
+        """Laws of which sampling has not converged."""
+        return [name for name, posterior in self.comparison.fits.items() if posterior.solution.is_approximate]
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings about data and fits, each once with the laws that it concerns."""
-        concerned: dict[str, list[str]] = {}
-        for name, posterior in self.comparison.fits.items():
-            for text in posterior.warnings:
-                concerned.setdefault(text, []).append(name)
-        texts = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        texts = warnings_of_fits(self.comparison.fits)
         return [*self.data_warnings, *measurement_warnings(self.experiment), *texts]
 
 

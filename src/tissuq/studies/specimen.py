@@ -45,6 +45,7 @@ __all__ = [
     "priors_in_mpa",
     "run_specimen",
     "warnings_of_files",
+    "warnings_of_fits",
 ]
 
 ALL = "all"
@@ -152,11 +153,7 @@ class SpecimenStudy:
     @property
     def warnings(self) -> list[str]:
         """Warnings about data and fits, each once with the discrepancies that it concerns."""
-        concerned: dict[str, list[str]] = {}
-        for name, posterior in self.posteriors.items():
-            for text in posterior.warnings:
-                concerned.setdefault(text, []).append(name)
-        texts = [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        texts = warnings_of_fits(self.posteriors)
         return [*self.data_warnings, *texts, *measurement_warnings(self.experiment)]
 
     @property
@@ -302,6 +299,15 @@ def warnings_of_files(readings: Sequence[Reading]) -> tuple[str, ...]:
     """Return the warnings about the files, each with the name of its test if there are several."""
     messages = [(reading.experiment.name, text) for reading in readings for text in data_warnings(reading)]
     return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in messages)
+
+
+def warnings_of_fits(posteriors: Mapping[str, Posterior]) -> list[str]:
+    """Return the warnings about fits, each once with the names of those that it concerns."""
+    concerned: dict[str, list[str]] = {}
+    for name, posterior in posteriors.items():
+        for text in posterior.warnings:
+            concerned.setdefault(text, []).append(name)
+    return [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
 
 
 def _every() -> list[str]:

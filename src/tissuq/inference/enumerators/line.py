@@ -77,7 +77,7 @@ class Line:
         most = np.maximum(heights[:-1], heights[1:])[interval] + MAX_EXCESS
         return points, np.exp(np.minimum(Akima1DInterpolator(self.places, heights)(points), most))
 
-    @property
+    @cached_property
     def log_masses(self) -> FloatArray:
         """The logarithms (K,) of the masses that belong to the places: of the density between them and the next."""
         points, density = self._table

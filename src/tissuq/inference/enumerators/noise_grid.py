@@ -90,13 +90,14 @@ class NoiseGrid:
     def _sum(self, model: StatisticalModel, seed: int) -> Solution:
         known: dict[float, Solution] = {}
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
-        solvers = {id(sketch): self.known_solver(ROUGH), id(model): self.known_solver(FINE)}
         _, mean_sd = model.noise_of_tests
 
-        def log_weight(of: StatisticalModel, log_noise: float) -> float:
+        def log_weight(
+            of: StatisticalModel, solve_known: Callable[[StatisticalModel], Solution], log_noise: float
+        ) -> float:
             """Return the logarithm of the posterior density of the logarithm of the noise, up to a constant."""
             noise_sd = np.exp(log_noise)
-            known[log_noise] = solvers[id(of)](at_noise(of, noise_sd))
+            known[log_noise] = solve_known(at_noise(of, noise_sd))
             log_evidence = known[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
@@ -108,8 +109,8 @@ class NoiseGrid:
         low = min(np.log((model.tolerances.resolution or MIN_NOISE_SHARE) * largest / END_FACTOR), high - MAX_STEP)
         low, high = (low, high) if ends[0] < high and low < ends[1] else ends
         first = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
-        nodes = _nodes(*_refined(partial(log_weight, sketch), first, ends))
-        logs, log_weights = _widened(partial(log_weight, model), nodes, ends)
+        nodes = _nodes(*_refined(partial(log_weight, sketch, self.known_solver(ROUGH)), first, ends))
+        logs, log_weights = _widened(partial(log_weight, model, self.known_solver(FINE)), nodes, ends)
         return _joined(model, [known[float(value)] for value in logs], logs, log_weights, seed)
 
 
