@@ -221,9 +221,9 @@ def test_a_draw_goes_on_by_the_stated_formula_with_one_score_in_all_directions(p
             V, last = end_of_ray(within, unit, end)
             slope = slope_beyond(unit, end, V, *with_errors(last, score))
             for strain in end * np.array([1.02, 1.5, 2.2]):
-                assert derivative(draw.energy, strain * unit, unit) == pytest.approx(slope(strain), rel=1e-4)
+                assert derivative(draw.energy, strain * unit, unit) == pytest.approx(slope(strain), rel=1e-3)
                 expected = within(stretches_of(end * unit)) + quad(slope, end, strain)[0]
-                assert draw.energy(stretches_of(strain * unit)) == pytest.approx(expected, rel=1e-4)
+                assert draw.energy(stretches_of(strain * unit)) == pytest.approx(expected, rel=1e-3)
 
 
 def test_scores_of_draws_have_students_distribution_without_the_outermost_tails(posteriors):

@@ -285,7 +285,7 @@ def test_the_model_alone_is_not_continued(posterior, ensemble):
     points = np.array([0.5, 1.3, 2.5])
     band = posterior.predict(points, noise=False, discrepancy=False)
     c10 = posterior.solution.marginals["C10"]
-    np.testing.assert_allclose(band["median"] / (2 * (points - points**-2)), c10.mean, rtol=0.01)
+    np.testing.assert_allclose(band["median"] / (2 * (points - points**-2)), c10.quantile(0.5), rtol=1e-3)
     draw = ensemble.alone[0]
     expected = 2 * draw.values["C10"] * (points - points**-2)
     np.testing.assert_allclose(tq.engineering_stress(draw, loading_mode("uniaxial"), points, ()), expected, rtol=1e-9)

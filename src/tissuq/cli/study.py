@@ -102,8 +102,8 @@ def coverage(
     preset: Annotated[
         str | None,
         typer.Option(
-            help="Instead: paper, panel, random-materials, further-families, strength, formulations, transfer, rivals, "
-            "or sbc."
+            help="Instead: paper, panel, random-materials, further-families, small-strains, strength, formulations, "
+            "transfer, rivals, or sbc."
         ),
     ] = None,
     out: Out = None,

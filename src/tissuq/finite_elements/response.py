@@ -264,7 +264,7 @@ class Solve:
         """A digest of all its numbers, which identifies the task."""
         digest = sha256(repr((self.case, self.draw.parts, self.steps, self.bulk_ratio, self.max_invariants)).encode())
         for pieces in self.draw.discrepancy or ():
-            digest.update(np.array([pieces.start, pieces.step]).tobytes() + pieces.coefficients.tobytes())
+            digest.update(pieces.knots.tobytes() + pieces.coefficients.tobytes())
         if self.draw.continuation is not None:
             digest.update(self.draw.continuation.coefficients.tobytes())
         return digest.hexdigest()[:24]

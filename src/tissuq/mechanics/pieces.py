@@ -15,31 +15,29 @@ FloatArray = NDArray[np.float64]
 
 
 class Pieces(NamedTuple):
-    """A function in quartic pieces between knots at equal distances, continued with the slope it has at its ends.
+    """A function in quartic pieces between knots, continued with the slope it has at its ends.
 
     Its slope is a cubic spline, so that its second derivative is smooth, too. Arrays of NumPy (also complex ones) and
     of JAX pass through, which may trace the fields.
 
     Attributes
     ----------
-    start, step : float
-        The first knot, and the distance between knots.
+    knots : (g + 1,) array
     coefficients : (5, g) array
         Of every piece, the highest power of the distance from its first knot first.
     """
 
-    start: Any
-    step: Any
+    knots: Any
     coefficients: Any
 
     def __call__(self, coordinate: Any) -> Any:
         """Return the function's values."""
-        arrays, count = library(coordinate), self.coefficients.shape[-1]
-        end = self.start + count * self.step
-        inside = arrays.where(coordinate.real > end, end, coordinate)
-        inside = arrays.where(coordinate.real < self.start, self.start, inside)
-        piece = arrays.clip(arrays.floor((inside.real - self.start) / self.step), 0, count - 1).astype(int)
-        u = inside - (self.start + piece * self.step)
+        arrays = library(coordinate)
+        knots = arrays.asarray(self.knots)
+        inside = arrays.where(coordinate.real > knots[-1], knots[-1], coordinate)
+        inside = arrays.where(coordinate.real < knots[0], knots[0], inside)
+        piece = arrays.searchsorted(knots[1:-1], inside.real, side="right")
+        u = inside - knots[piece]
         a, b, c, d, e = (arrays.asarray(power)[piece] for power in self.coefficients)
         value = (((a * u + b) * u + c) * u + d) * u + e
         slope = ((4 * a * u + 3 * b) * u + 2 * c) * u + d
@@ -47,23 +45,21 @@ class Pieces(NamedTuple):
 
     def slope(self, coordinate: FloatArray) -> FloatArray:
         """Return the function's slope at coordinates (n,)."""
-        count = self.coefficients.shape[-1]
-        inside = np.clip((coordinate - self.start) / self.step, 0, count)
-        piece = np.minimum(inside.astype(int), count - 1)
-        u = (inside - piece) * self.step
+        inside = np.clip(coordinate, self.knots[0], self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], inside, side="right")
+        u = inside - self.knots[piece]
         a, b, c, d, _ = self.coefficients[:, piece]
         return np.asarray(((4 * a * u + 3 * b) * u + 2 * c) * u + d)
 
 
 def pieces(knots: FloatArray, slopes: FloatArray) -> list[Pieces]:
-    """Return functions that vanish at zero from their slopes (g, N) at knots (g,) of equal distances around zero."""
+    """Return functions that vanish at zero from their slopes (g, N) at knots (g,) around zero."""
     from scipy.interpolate import CubicSpline
 
     functions = CubicSpline(knots, slopes).antiderivative()
     coefficients = functions.c.copy()
     coefficients[-1] -= functions(0.0)
-    step = float(knots[-1] - knots[0]) / (len(knots) - 1)
-    return [Pieces(float(knots[0]), step, coefficients[..., n]) for n in range(slopes.shape[1])]
+    return [Pieces(knots, coefficients[..., n]) for n in range(slopes.shape[1])]
 
 
 class PiecewiseEnergy(NamedTuple):

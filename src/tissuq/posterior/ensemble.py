@@ -321,7 +321,7 @@ def _materials(solution: Solution, count: int, seed: list[int], sampling: Sampli
 def _energies(model: StatisticalModel, points: GaussianMixture, factor: FloatArray) -> list[PiecewiseEnergy]:
     """Return the discrepancies of draws, over the range of the data."""
     start = len(model.linear)
-    grid = Coordinates(*(np.linspace(*ends, KNOTS) for ends in _ends(model.experiment.states)))
+    grid = Coordinates(*(_knots(*ends) for ends in _ends(model.experiment.states)))
     slopes = [np.zeros((KNOTS, len(factor))) for _ in grid]
     assert points.member is not None  # noqa: S101 (an energy discrepancy has members)
     for number in np.unique(points.member):
@@ -334,6 +334,12 @@ def _energies(model: StatisticalModel, points: GaussianMixture, factor: FloatArr
                 slope[:, rows] += features @ weights.T
     functions = (pieces(knots, values) for knots, values in zip(grid, slopes, strict=True))
     return [PiecewiseEnergy(*terms) for terms in zip(*functions, strict=True)]
+
+
+def _knots(low: float, high: float) -> FloatArray:
+    """Return knots around zero, their distances in proportion to the root of how far they are from it."""
+    roots = np.linspace(-np.sqrt(-low), np.sqrt(high), KNOTS)
+    return np.asarray(roots * np.abs(roots))
 
 
 def _continued(

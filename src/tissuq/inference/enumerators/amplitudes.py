@@ -242,8 +242,10 @@ def noise_grid(model: StatisticalModel, points: Points, freedom: int, count: int
         0.5 * np.log(np.maximum(size / freedom, TINY_SQUARE)) for size in (points.misfit, points.misfit + points.strain)
     )
     reach_below, reach_above = _reach(freedom)
-    low, high = np.clip([low.min() - reach_below, high.max() + reach_above], *_ends(model, {}))
-    return np.exp(np.linspace(low, high, count))
+    taken = np.log(points.noise_sd)  # which a prior may draw away from what is likely by the data alone
+    ends = min(low.min() - reach_below, taken.min()), max(high.max() + reach_above, taken.max())
+    first, last = np.clip(ends, *_ends(model, {}))
+    return np.exp(np.linspace(first, last, count))
 
 
 def _ends(model: StatisticalModel, ratios: Mapping[str, float]) -> FloatArray:

@@ -22,6 +22,7 @@ __all__ = [
     "HenckyBlock",
     "LogBlock",
     "SecondInvariantBlock",
+    "SmallStrainBlock",
     "SplineBlock",
     "TaylorBlock",
     "ValanisLandelBlock",
@@ -36,6 +37,8 @@ SIGN_SHARE = 0.1
 """Strain along an axis over the largest one, to which tests in tension count for compression, and the reverse."""
 TINY = 1e-8
 """Strain at which a process stands for its slope at the reference."""
+LOG_CORRELATION = 4.0
+"""Correlation length of a process in the logarithm of I1 - 3: it changes little between strains of one size."""
 GRID_POINTS = 400
 """Number of points over the data's range among which the pivots of a process are chosen."""
 
@@ -207,7 +210,7 @@ class TaylorBlock(InvariantBlock):
 
     name = "taylor"
     formula = "W1 = c g(x), cov g = exp(x x' / L^2) - 1, x = I1 - 3"
-    lengths = (0.4, 0.8, 1.6, 3.2)
+    lengths = (1.4, 2.8)
 
     def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
         return _taylor(z, z_prime, length)
@@ -228,6 +231,21 @@ class LogBlock(InvariantBlock):
 
     def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
         return np.asarray(pinned_squared_exponential(z / length, z_prime / length, 0))
+
+
+class SmallStrainBlock(InvariantBlock):
+    """W1 = c g(t), t = log(1 + x / L): what changes at small strains may be as large as what changes at large ones.
+
+    A length of 0.004 is a sixteenth of the range of strain, from which the process changes with the logarithm of x.
+    """
+
+    name = "small-strain"
+    formula = "W1 = c g(log(1 + x / L)), cov g squared exponential given g(0) = 0, x = I1 - 3"
+    lengths = (0.001, 0.004, 0.016)
+
+    def covariance(self, z: FloatArray, z_prime: FloatArray, length: float) -> FloatArray:
+        score, score_prime = (np.log1p(x / length) / LOG_CORRELATION for x in (z, z_prime))
+        return np.asarray(pinned_squared_exponential(score, score_prime, 0))
 
 
 class SplineBlock(InvariantBlock):

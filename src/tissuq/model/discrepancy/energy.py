@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
@@ -22,6 +23,7 @@ from tissuq.model.discrepancy.blocks import (
     HenckyBlock,
     LogBlock,
     SecondInvariantBlock,
+    SmallStrainBlock,
     SplineBlock,
     TaylorBlock,
     ValanisLandelBlock,
@@ -167,6 +169,10 @@ class Logarithmic(_Single, block=LogBlock()):
     """A process in log(I1 - 2): fast change near the reference."""
 
 
+class SmallStrain(_Single, block=SmallStrainBlock()):
+    """A process in the logarithm of I1 - 3: softening, or fibres that take up load, at small strains."""
+
+
 class Spline(_Single, block=SplineBlock()):
     """An integrated Wiener process in I1 - 3."""
 
@@ -234,17 +240,30 @@ class Sketch(EnergyDiscrepancy):
         return [replace(member, probability=member.probability / total) for member in few]
 
 
-FIRST_BLOCKS, SECOND_BLOCKS = (TaylorBlock(), LogBlock()), (SecondInvariantBlock(), HenckyBlock())
+FIRST_BLOCKS = {TaylorBlock(): 1.0, LogBlock(): 1.0, SmallStrainBlock(): 0.05}
+"""Energies of I1 and their prior odds.
+
+Where tests show what is at small strains, the evidence for it is larger by far more than these odds; where they do not,
+it is not to widen the interval.
+"""
+SECOND_BLOCKS = SecondInvariantBlock(), HenckyBlock()
 BLOCKS = (*FIRST_BLOCKS, *SECOND_BLOCKS, SplineBlock(), ZeroModulusBlock(), ValanisLandelBlock())
 """Every block that a sum of two may have."""
 DISPERSIONS = 0.0, 0.2
 """Of structure tensors about a preferred direction."""
-DIRECTED_PAIRS = tuple(product(FIRST_BLOCKS, map(DirectionBlock, DISPERSIONS)))
-PAIRS = tuple(Sum(pair) for pair in product(FIRST_BLOCKS, SECOND_BLOCKS))
-SINGLES: tuple[tuple[EnergyBlock | None, ...], ...] = (
-    *((block, None) for block in FIRST_BLOCKS),
-    *((None, block) for block in SECOND_BLOCKS),
-)
+
+
+def _pairs(second_blocks: Iterable[EnergyBlock], odds: float = 1.0) -> tuple[Sum, ...]:
+    """Return every energy of I1 with each of some others, such odds times those of the first."""
+    pairs = product(FIRST_BLOCKS.items(), second_blocks)
+    return tuple(Sum((first, second), odds * odds_of_first) for (first, odds_of_first), second in pairs)
+
+
+def _pairs_and_singles(odds_of_single: float) -> tuple[Sum, ...]:
+    """Return every sum of an energy of I1 and another, and each block alone at such odds."""
+    singles = [Sum((block, None), odds_of_single * odds) for block, odds in FIRST_BLOCKS.items()]
+    singles += [Sum((None, block), odds_of_single) for block in SECOND_BLOCKS]
+    return (*_pairs(SECOND_BLOCKS), *singles)
 
 
 @dataclass(frozen=True)
@@ -264,8 +283,9 @@ class _Average(EnergyDiscrepancy):
         """Those that are the same in all directions, and others."""
         if not self.has_direction:
             return self.isotropic_sums
-        odds = sum(energy_sum.odds for energy_sum in self.isotropic_sums) / len(DIRECTED_PAIRS)
-        return (*self.isotropic_sums, *(Sum(pair, odds) for pair in DIRECTED_PAIRS))
+        directions = [DirectionBlock(dispersion) for dispersion in DISPERSIONS]
+        odds = sum(energy_sum.odds for energy_sum in self.isotropic_sums)
+        return (*self.isotropic_sums, *_pairs(directions, odds / len(directions) / sum(FIRST_BLOCKS.values())))
 
     @property
     def of_contradictory_tests(self) -> Discrepancy | None:
@@ -278,15 +298,16 @@ class _Average(EnergyDiscrepancy):
 class Auto(_Average):
     """The evidence decides: the average of {taylor, log} + {second-invariant, hencky}, and of their single blocks.
 
-    A single block has a quarter of the prior odds of a sum. Tests of two axes add {taylor, log} + direction.
+    A single block has a quarter of the prior odds of a sum, `small-strain` in place of taylor and log a twentieth of
+    theirs. Tests of two axes add {taylor, log, small-strain} + direction.
     """
 
     name = "auto"
     formula = (
-        "average of {taylor, log} + {second-invariant, hencky} and, at a quarter of their odds, each one alone; with "
-        "tests of two axes also of {taylor, log} + direction"
+        "average of {taylor, log, small-strain at a twentieth of their odds} + {second-invariant, hencky} and, at a "
+        "quarter of the odds, each one alone; with tests of two axes also of the first + direction"
     )
-    isotropic_sums = (*PAIRS, *(Sum(blocks, 0.25) for blocks in SINGLES))
+    isotropic_sums = _pairs_and_singles(odds_of_single=0.25)
 
 
 class AutoIsotropic(_Average):
@@ -301,15 +322,15 @@ class AutoIsotropic(_Average):
 
 
 class AutoFirst(EnergyDiscrepancy):
-    """The average of `taylor` and `log`, energies of I1 alone: what `auto` comes down to where tests contradict.
+    """The average of `auto`'s energies of I1 alone: what it comes down to where tests contradict each other.
 
     That is where no stable energy reconciles them: then they differ by more than their stated spread.
     """
 
     name = "auto-first"
-    formula = "average of taylor and log"
+    formula = "average of taylor, log and, at a twentieth of their odds, small-strain"
     parameters = AMPLITUDES[:1]
-    sums = tuple(Sum((block,)) for block in FIRST_BLOCKS)
+    sums = tuple(Sum((block,), odds) for block, odds in FIRST_BLOCKS.items())
 
 
 class AutoBalanced(_Average):
@@ -317,7 +338,7 @@ class AutoBalanced(_Average):
 
     name = "auto-balanced"
     formula = "average of the sums and single blocks of auto at equal odds"
-    isotropic_sums = (*PAIRS, *map(Sum, SINGLES))
+    isotropic_sums = _pairs_and_singles(odds_of_single=1.0)
 
 
 class AutoSharp(_Average):

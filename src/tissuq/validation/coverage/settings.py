@@ -22,7 +22,17 @@ from tissuq.validation.coverage.truths import FAMILIES, FIXED, MIN_LOCKING_LIMIT
 
 __all__ = ["BLOCK", "PRESETS", "CoverageSettings", "Design", "preset"]
 
-PRESETS = ("paper", "panel", "random-materials", "strength", "formulations", "transfer", "rivals", "further-families")
+PRESETS = (
+    "paper",
+    "panel",
+    "random-materials",
+    "strength",
+    "formulations",
+    "transfer",
+    "rivals",
+    "further-families",
+    "small-strains",
+)
 BLOCK = 50
 """Number of data sets of one task."""
 LOCKING = {"gent": MIN_LOCKING_LIMIT, "gent-gent": MIN_LOCKING_LIMIT, "fixed-gent": 30.0}

@@ -19,6 +19,7 @@ __all__ = [
     "FIXED",
     "FURTHER",
     "MIN_LOCKING_LIMIT",
+    "SMALL_STRAINS",
     "TRUTHS",
     "Law",
     "Truth",
@@ -28,14 +29,17 @@ __all__ = [
     "demiray",
     "draw_truth",
     "exp_ln",
+    "exponential_softening",
     "gent",
     "gent_gent",
     "hart_smith",
+    "hyperbolic_softening",
     "knowles",
     "lopez_pamies",
     "mooney_rivlin",
     "neo_hookean",
     "ogden",
+    "power_softening",
     "recruitment",
     "veronda_westmann",
     "yeoh",
@@ -146,6 +150,21 @@ def recruitment(gain: float, half_load: float) -> Law:
     return _of_invariants(lambda x, y: (1 + gain * x / (x + half_load), 0 * x))
 
 
+def hyperbolic_softening(loss: float, decay: float) -> Law:
+    """W1 = 1 - loss x / (x + decay), x = I1 - 3: bonds that give way one after another."""
+    return recruitment(-loss, decay)
+
+
+def exponential_softening(loss: float, decay: float) -> Law:
+    """W1 = 1 - loss (1 - exp(-x / decay)), x = I1 - 3."""
+    return _of_invariants(lambda x, y: (1 + loss * np.expm1(-x / decay), 0 * x))
+
+
+def power_softening(exponent: float, decay: float) -> Law:
+    """W1 = (1 + x / decay)^-exponent, x = I1 - 3."""
+    return _of_invariants(lambda x, y: ((1 + x / decay) ** -exponent, 0 * x))
+
+
 def _of_invariants(derivatives: Derivatives) -> Law:
     def stress(mode: LoadingMode, stretch: FloatArray) -> FloatArray:
         states = mode.at(stretch)
@@ -171,6 +190,11 @@ def _random_ogden_of_two_terms(generator: Generator) -> Law:
     return ogden((share, generator.uniform(1, 5)), (1 - share, -generator.uniform(1, 4)))
 
 
+def _decay(generator: Generator) -> float:
+    """Return I1 - 3 within which a material softens, from 0.02 (a strain of 8 %) to 2."""
+    return float(np.exp(generator.uniform(*np.log([0.02, 2.0]))))
+
+
 FAMILIES: dict[str, Callable[[Generator], Law]] = {
     "neo-hookean": lambda generator: neo_hookean(),
     "mooney-rivlin": lambda generator: mooney_rivlin(generator.uniform(0, 1)),
@@ -193,9 +217,16 @@ FURTHER: dict[str, Callable[[Generator], Law]] = {
     "exp-ln": lambda generator: exp_ln(generator.uniform(0.02, 0.15), generator.uniform(0, 0.3)),
     "hart-smith": lambda generator: hart_smith(generator.uniform(5e-4, 5e-3), generator.uniform(0, 0.5)),
     "lopez-pamies": lambda generator: lopez_pamies(*generator.uniform([0.6, 1.5, 0.0], [1.2, 4.0, 0.3])),
-    "recruitment": lambda generator: recruitment(generator.uniform(0.2, 2), generator.uniform(0.2, 2)),
 }
 """Families on which no default was chosen."""
+
+SMALL_STRAINS: dict[str, Callable[[Generator], Law]] = {
+    "hyperbolic-softening": lambda generator: hyperbolic_softening(generator.uniform(0.2, 0.9), _decay(generator)),
+    "exponential-softening": lambda generator: exponential_softening(generator.uniform(0.2, 0.9), _decay(generator)),
+    "power-softening": lambda generator: power_softening(generator.uniform(0.1, 0.6), _decay(generator)),
+    "recruitment": lambda generator: recruitment(generator.uniform(0.2, 2), generator.uniform(0.2, 2)),
+}
+"""Families whose modulus changes at small strains; the block for these and its odds were chosen on them."""
 
 C10_SPREAD = 0.5
 """Standard deviation of log C10 (MPa), where no scale is given."""
@@ -211,7 +242,7 @@ FIXED: dict[str, tuple[float, Law]] = {
 }
 """C10 (MPa) and law of materials of which there is one each; the first is that of Zeraatpisheh et al. (2021)."""
 
-TRUTHS = (*FAMILIES, *FIXED, *FURTHER)
+TRUTHS = (*FAMILIES, *FIXED, *FURTHER, *SMALL_STRAINS)
 """The names of all families and fixed materials."""
 
 
@@ -241,4 +272,4 @@ def draw_truth(name: str, seed: tuple[int, ...], scale: Sequence[float] = ()) ->
         return Truth(*FIXED[name])
     generator = np.random.default_rng(seed)
     log_C10 = generator.uniform(*np.log(scale)) if scale else C10_SPREAD * generator.standard_normal()
-    return Truth(float(np.exp(log_C10)), (FAMILIES | FURTHER)[name](generator))
+    return Truth(float(np.exp(log_C10)), (FAMILIES | FURTHER | SMALL_STRAINS)[name](generator))
