@@ -95,7 +95,10 @@ def test_chosen_priors_replace_defaults():
         (lambda: model(noise_sd=0.0), "noise_sd must be a positive number"),
         (lambda: model(noise_sd=-1.0), "noise_sd must be a positive number"),
         (lambda: model(noise_sd=float("nan")), "noise_sd must be a positive number"),
-        (lambda: model(noise_sd="big"), "one of unknown, proportional, repeats, autoregressive; not 'big'"),
+        (
+            lambda: model(noise_sd="big"),
+            "one of unknown, independent, proportional, repeats, autoregressive; not 'big'",
+        ),
         (lambda: model("yeoh", Yeoh()), "adds C20, C30, which material 'yeoh' has already"),
         (lambda: model(chosen_priors={"mu": tq.Uniform(0, 1)}), "a prior for 'mu'"),
         (lambda: model(chosen_priors={"C10": tq.Uniform(-1, 1)}), "C10: .* reaches beyond"),

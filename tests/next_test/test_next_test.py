@@ -171,7 +171,6 @@ def test_noise_that_grows_with_the_stress_makes_large_stretches_worth_less():
     [
         ({"discrepancy": "gp"}, tq.Candidate("planar", [1.1]), "another, unknown one of the planar stress"),
         ({"discrepancy": "auto"}, tq.Candidate("planar", [1.1, 3.0]), "choose a range within"),
-        ({"discrepancy": "none", "noise": "autoregressive", "noise_sd": None}, tq.Candidate("planar", [1.1]), "corr"),
         ({"discrepancy": "none", "tolerances": tq.Tolerances(length=0.02)}, tq.Candidate("planar", [1.1]), "share"),
     ],
 )
@@ -182,3 +181,19 @@ def test_what_the_posterior_does_not_say_is_refused(options, test, words):
     posterior = tq.fit(data, **({"noise_sd": NOISE} | options))
     with pytest.raises(tq.InputError, match=words):
         asked_of(posterior, "C10", specimen="same").expected(test)
+
+
+def test_correlated_errors_tell_as_little_as_larger_independent_ones():
+    # Against the covariance of first-order autoregression in the further test, sampled as densely as the data.
+    stretch, generator = np.linspace(0.75, 1.4, 200), np.random.default_rng(1)
+    score, errors = generator.standard_normal(200), [0.0]
+    for new in score[1:]:
+        errors.append(0.6 * errors[-1] + 0.8 * new)
+    data = tq.Experiment("uniaxial", stretch, 0.5 * neo_hooke("uniaxial", stretch) + NOISE * np.array(errors))
+    posterior = tq.fit(data, discrepancy="none", noise="autoregressive", priors={"C10": tq.Uniform(0, 50)})
+    expected = asked_of(posterior, "C10", specimen="same").expected(tq.Candidate("planar", stretch)).sd_after[0]
+    lag, x = posterior.model.fitted_errors.lag, neo_hooke("planar", stretch)
+    sd = posterior.summary().loc[["C10", "noise_sd"], ["mean", "sd"]].to_numpy()
+    apart = np.abs(np.subtract.outer(np.arange(200), np.arange(200)))
+    information = x @ np.linalg.solve(sd[1, 0] ** 2 * lag**apart, x)
+    assert expected == pytest.approx((sd[0, 1] ** -2 + information) ** -0.5, rel=0.03)

@@ -163,3 +163,63 @@ def test_each_contradictory_test_is_predicted_by_the_model_of_all(monkeypatch):
     shifted = tq.Experiment("uniaxial", third.stretch, 1.1 * third.stress, name="second compression")
     tq.held_out_tests([*compressed_and_sheared(8.0), shifted])
     assert [posterior.model.discrepancy.name for posterior in used] == ["auto-first"] * 4
+
+
+def drifting(lag, count=80, sd=0.02, seed=4):
+    """One test whose errors are those of first-order autoregression."""
+    stretch, score = np.linspace(0.8, 1.5, count), np.random.default_rng(seed).standard_normal(count)
+    errors = [score[0]]
+    for new in score[1:]:
+        errors.append(lag * errors[-1] + np.sqrt(1 - lag**2) * new)
+    return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * np.array(errors))
+
+
+def test_unknown_noise_is_autoregressive_where_the_data_are_more_probable_so():
+    data = drifting(0.7)
+    tolerances = tq.Tolerances("as-tested", length=0.01, slack=0.005)
+    model = tq.fit(data, discrepancy="zero-modulus", tolerances=tolerances).model
+    assert model.noise.name == "autoregressive"
+    # Dense covariances, C10 integrated and its amplitude summed, each at the best level of the noise.
+    errors, x = model.fitted_errors, 2 * (data.stretch - data.stretch**-2)
+    energy = 2 * (1 - data.stretch**-3) - x
+    length, slack = errors.slopes[:, 0] * (data.stretch - 1), errors.slopes[:, 0] * data.stretch
+    fixed = 0.01**2 * np.outer(length, length) + 0.005**2 * np.outer(slack, slack)
+    apart = np.abs(np.subtract.outer(np.arange(len(x)), np.arange(len(x))))
+    scale = model.priors["c1"].quantile(0.5)
+    amplitudes = scale * np.geomspace(1e-4, 1e3, 60)
+    prior = np.log(amplitudes / (1 + (amplitudes / scale) ** 2))
+
+    def log_density(covariance):
+        inverse, logdet = np.linalg.inv(covariance), np.linalg.slogdet(covariance)[1]
+        precision = x @ inverse @ x
+        rest = data.stress - x * (x @ inverse @ data.stress / precision)
+        return -0.5 * (rest @ inverse @ rest + logdet + np.log(precision))
+
+    def log_evidence(lag):
+        of_levels = [level**2 * lag**apart + fixed for level in np.geomspace(0.005, 0.1, 30)]
+        return max(
+            np.logaddexp.reduce([log_density(base + c**2 * np.outer(energy, energy)) for c in amplitudes] + prior)
+            for base in of_levels
+        )
+
+    best = max(map(log_evidence, np.linspace(0.1, 0.9, 9)))
+    assert best > log_evidence(0.0) + 3
+    assert log_evidence(errors.lag) > best - 0.3
+
+
+def test_independent_errors_stay_so():
+    assert [tq.fit(drifting(0.0, seed=seed)).model.noise.name for seed in range(3)] == ["unknown"] * 3
+
+
+@pytest.mark.parametrize(("noise", "count"), [("independent", 80), ("unknown", 11)])
+def test_noise_stays_independent_where_it_is_asked_for_or_points_are_few(noise, count):
+    posterior = tq.fit(drifting(0.8, count), noise=noise)
+    assert posterior.model.noise.name == noise
+    assert posterior.model.fitted_errors.lag is None
+
+
+def test_no_correlation_is_longer_than_a_tenth_of_the_curve():
+    smooth = drifting(0.0, sd=1e-4)
+    bumps = 0.01 * np.sin(40 * smooth.stretch)
+    wavy = tq.Experiment("uniaxial", smooth.stretch, smooth.stress + bumps)
+    assert 0.5 < tq.fit(wavy, discrepancy="taylor").model.fitted_errors.lag <= np.exp(-1 / 8)

@@ -57,8 +57,8 @@ def fit(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Instead: unknown, proportional (grows with the stress), repeats (same stretch again) or "
-            "autoregressive (errors of consecutive measurements correlated)."
+            help="Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
+            "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again)."
         ),
     ] = None,
     prior: Annotated[
@@ -237,7 +237,7 @@ def population(
         str | None, typer.Option(help="Sd of the noise, in the files' stress unit, or unknown [unknown].")
     ] = None,
     noise: Annotated[
-        str | None, typer.Option(help="Instead: unknown, proportional, repeats or autoregressive, as for tissuq fit.")
+        str | None, typer.Option(help="Instead: unknown, proportional, repeats or another one, as for tissuq fit.")
     ] = None,
     mode: Annotated[
         str | None, typer.Option(help="Loading mode of all files [as they or their names say, or uniaxial].")

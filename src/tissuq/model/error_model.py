@@ -17,12 +17,20 @@ from tissuq.model.measurement_errors import ErrorPoints, Shared
 from tissuq.model.noise import Noise, stress_level
 from tissuq.model.tolerances import FittedErrors, Tolerances, specimens_of
 
-__all__ = ["ErrorModel", "Whitening", "whitening"]
+__all__ = ["ErrorModel", "Whitening", "whitening", "widening_of_lag"]
 
 FloatArray = NDArray[np.float64]
 
 NEGLIGIBLE_SPREAD, ROUNDING = 1e-9, 1e-14
 """Variance of a shared error over that of the noise, and over the largest one, below which it is left out."""
+
+
+def widening_of_lag(lag: float) -> float:
+    """Return how much larger independent errors tell as little of a smooth curve as those of a lag-1 correlation.
+
+    The root of the spectral density of first-order autoregression at frequency zero, over its variance.
+    """
+    return float(np.sqrt((1 + lag) / (1 - lag)))
 
 
 @dataclass(frozen=True, eq=False)

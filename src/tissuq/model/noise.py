@@ -21,6 +21,7 @@ from tissuq.registry import find, plugins, variants
 
 __all__ = [
     "AutoregressiveNoise",
+    "IndependentNoise",
     "KnownNoise",
     "KnownNoises",
     "Noise",
@@ -126,10 +127,13 @@ class KnownNoises(KnownNoise):
 
 
 class UnknownNoise(Noise):
-    """The same standard deviation everywhere, a parameter."""
+    """The same standard deviation everywhere, a parameter.
+
+    Beside errors of the test, `tissuq.fit` takes autoregressive noise for it where the data are far more probable so.
+    """
 
     name = "unknown"
-    description = "unknown standard deviation"
+    description = "unknown standard deviation; of consecutive measurements correlated where the data say so"
     parameters: ClassVar[tuple[Parameter, ...]] = (NOISE_SD,)
 
     def sd(self, values: Mapping[str, Any], level: Any) -> Any:
@@ -137,6 +141,13 @@ class UnknownNoise(Noise):
 
     def __str__(self) -> str:
         return self.name
+
+
+class IndependentNoise(UnknownNoise):
+    """The same standard deviation everywhere, a parameter, and errors that are independent whatever the data say."""
+
+    name = "independent"
+    description = "unknown standard deviation, the errors of consecutive measurements independent"
 
 
 class ProportionalNoise(UnknownNoise):

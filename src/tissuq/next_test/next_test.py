@@ -14,6 +14,7 @@ from tissuq.errors import InputError, ModelError
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
+from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import BETWEEN_SPECIMENS, Tolerances, specimens_of
@@ -233,13 +234,18 @@ class NextTest:
     def _noise(
         self, components: GaussianMixture, candidate: Candidate, points: FloatArray, curve: FloatArray
     ) -> FloatArray:
-        """Return the sd (M, n) of all that is independent from measurement to measurement."""
+        """Return the sd (M, n) of all that is independent from measurement to measurement.
+
+        Errors that hang together from one to the next, if the test is sampled as those of the data, tell as little as
+        larger independent ones.
+        """
         model = self.model
         values = {
             symbol: column[:, None] for symbol, column in zip(model.nonlinear, components.settings.T, strict=True)
         }
         states = states_of(model, [(candidate.mode, points)])
         variance = model.noise_variance(values, np.abs(curve)) * model.relative_noise(states) ** 2
+        variance = variance * widening_of_lag(model.fitted_errors.lag or 0.0) ** 2
         total = variance + _scatter(model, components)[:, None] ** 2
         return np.asarray(np.sqrt(np.broadcast_to(total, (len(components.weights), len(curve)))))
 
@@ -285,11 +291,6 @@ def _check_model(model: StatisticalModel, specimen: Specimen) -> None:
     """Refuse a model whose errors do not determine those of a further test."""
     if specimen not in get_args(Specimen):
         raise InputError(f"specimen must be one of {', '.join(get_args(Specimen))}, not '{specimen}'.")
-    if model.fitted_errors.lag:
-        raise InputError(
-            "the errors of these data are autocorrelated, and those of a further test depend on its sampling: fit with "
-            "the noise 'unknown', or with fewer points."
-        )
     is_plain = not (model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy)
     if not model.discrepancy.is_energy and (specimen == "other" or len(model.experiment.curves) > 1):
         raise InputError(

@@ -55,8 +55,9 @@ def fit(
         tests are those of their scatter about smooth curves, and noise_sd is its geometric mean.
     noise : str or Noise
         Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), ``"repeats"`` (told
-        by repeated measurements at the same stretch), or ``"autoregressive"`` (errors of consecutive measurements
-        correlated).
+        by repeated measurements at the same stretch), ``"autoregressive"`` (errors of consecutive measurements
+        correlated), or ``"independent"``. Unknown noise beside errors of the test and an energy discrepancy is
+        autoregressive where the data are far more probable so, else independent.
     priors : mapping of str to Prior
         Priors in MPa (psi in stretch) that replace the defaults, by parameter.
     tolerances : Tolerances or str
@@ -177,7 +178,9 @@ def fit_many(
         model = StatisticalModel(data, *options, tolerances or Tolerances())
         if tolerances is None and (default := default_tolerances(model)):
             model = replace(model, tolerances=default)
-        return solver.with_spreads_of_tests(model) if model.tolerances.has_standard_spreads else model
+        if model.tolerances.has_standard_spreads:
+            model = solver.with_spreads_of_tests(model)
+        return solver.with_probable_noise(model)
 
     models = [model_of(Experiment.of(data)) for data in datasets]
     groups: dict[tuple[States, int], list[int]] = {}

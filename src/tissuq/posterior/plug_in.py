@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stable_ranges
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
-from tissuq.inference.enumerators.noise_grid import at_level, with_known_noise
+from tissuq.inference.enumerators.noise_grid import at_level, at_noise, with_known_noise
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.noise import AutoregressiveNoise, UnknownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK
 from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
@@ -35,6 +37,17 @@ CURVE_COMPONENTS = 200
 """Components that stand for the posterior in the mean curve."""
 LAG_GRID = (0.0, 0.2, 0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99)
 """Correlations of consecutive errors that are tried."""
+MIN_POINTS_OF_CURVE = 12
+"""Measurements of a curve from which it is seen whether consecutive errors are correlated."""
+LONGEST_CORRELATION, LAG_COUNT = 0.1, 5
+"""Correlation length of consecutive errors, over the points of a curve, beyond which an error is a smooth one of the
+test; correlations up to it that are tried."""
+MIN_LOG_EVIDENCE_GAIN = 3.0
+"""Of autoregressive noise over independent one, from which it is taken."""
+LEVEL_ACCURACY = 0.1
+"""Of the logarithm of the level at which noise is compared."""
+MAX_LEVEL_FACTOR, MAX_STEP_FACTOR = 20.0, 3.0
+"""How far that may be from the residuals of the pilot fit, and from one correlation to the next."""
 
 
 class ErrorEstimates:
@@ -95,6 +108,48 @@ class ErrorEstimates:
             model = self._with_factor(model, level)
         return model.with_errors(fits=self._fits)
 
+    def with_probable_noise(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model whose unknown noise is autoregressive where the data are far more probable so.
+
+        Only beside an energy discrepancy: without one, what looks like correlated errors is that of the material.
+        Compared are few energies, each noise at the level that suits it best. A longer correlation than a share of the
+        curve is not tried: such errors are the smooth ones of the test.
+        """
+        fewest = min(map(len, model.experiment.curves))
+        is_open = type(model.noise) is UnknownNoise and bool(model.energy_symbols) and self._sums_noise(model)
+        if not is_open or fewest < MIN_POINTS_OF_CURVE:
+            return model
+        model = self._with_curve(model)
+        autoregressive = replace(_sketch(model), noise=AutoregressiveNoise())
+        longest = np.exp(-1 / (LONGEST_CORRELATION * fewest))
+        lags, evidences = np.linspace(0, np.arctanh(longest), LAG_COUNT), list[float]()
+        level, factor = model.fitted_errors.level or model.noise_of_tests[1], MAX_LEVEL_FACTOR
+        for lag in np.tanh(lags):
+            level, evidence = self._best_level(autoregressive.with_errors(lag=float(lag)), level, factor)
+            evidences.append(evidence)
+            factor = MAX_STEP_FACTOR
+            if evidence < max(evidences) - MIN_LOG_EVIDENCE_GAIN:
+                break
+        fits = model.fitted_errors.fits + self._fits
+        if max(evidences) < evidences[0] + MIN_LOG_EVIDENCE_GAIN:
+            return model.with_errors(fits=fits)
+        lag = float(np.tanh(_peak(lags[: len(evidences)], np.array(evidences))))
+        return replace(model, noise=autoregressive.noise).with_errors(lag=lag, fits=fits)
+
+    def _best_level(self, model: StatisticalModel, level: float, factor: float) -> tuple[float, float]:
+        """Return the level of the noise, within a factor of another, with the largest log evidence, and that.
+
+        The levels that are tried count as one fit.
+        """
+        self._fits += 1
+
+        def negative_log_evidence(log_level: float) -> float:
+            return -(self._solve(at_noise(model, float(np.exp(log_level)))).log_evidence or 0.0)
+
+        ends = np.log([level / factor, level * factor])
+        best = minimize_scalar(negative_log_evidence, bounds=ends, method="bounded", options={"xatol": LEVEL_ACCURACY})
+        return float(np.exp(best.x)), -float(best.fun)
+
     def _with_factor(self, model: StatisticalModel, level: float | None) -> StatisticalModel:
         """Return a model with its spreads times the factor that its tests tell, at a level of errors if noise needs it.
 
@@ -117,15 +172,8 @@ class ErrorEstimates:
         """Return a model with consecutive noise at the lag under which the data are most probable."""
         if not model.noise.is_consecutive or model.fitted_errors.lag is not None:
             return model
-        candidates = [model.with_errors(lag=lag) for lag in LAG_GRID]
-        log_evidence = np.array([self._evidence(candidate) for candidate in candidates])
-        best = int(np.argmax(log_evidence))
-        if best in (0, len(LAG_GRID) - 1):
-            return candidates[best]
-        # A parabola through the best three, in the lag's inverse hyperbolic tangent.
-        neighbours = slice(best - 1, best + 2)
-        curvature, slope, _ = np.polyfit(np.arctanh(LAG_GRID[neighbours]), log_evidence[neighbours], 2)
-        return model.with_errors(lag=float(np.tanh(-slope / (2 * curvature))))
+        log_evidence = np.array([self._evidence(model.with_errors(lag=lag)) for lag in LAG_GRID])
+        return model.with_errors(lag=float(np.tanh(_peak(np.arctanh(LAG_GRID), log_evidence))))
 
     def _with_curve(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with tolerances along its own mean curve, and at its own level of errors.
@@ -157,6 +205,16 @@ class ErrorEstimates:
     def _solution(self, model: StatisticalModel) -> Solution:
         self._fits += 1
         return self._solve(model)
+
+
+def _peak(places: FloatArray, values: FloatArray) -> float:
+    """Return where a function is largest: at an end of its places (n,), or on the parabola through the best three."""
+    best = int(np.argmax(values))
+    if best in (0, len(values) - 1):
+        return float(places[best])
+    neighbours = slice(best - 1, best + 2)
+    curvature, slope, _ = np.polyfit(places[neighbours], values[neighbours], 2)
+    return float(-slope / (2 * curvature))
 
 
 def _sketch(model: StatisticalModel) -> StatisticalModel:

@@ -56,6 +56,10 @@ class Solver:
         """Return a model whose spreads between specimens and tests are as large as several tests tell."""
         return self._error_estimates().with_spreads_of_tests(model)
 
+    def with_probable_noise(self, model: StatisticalModel) -> StatisticalModel:
+        """Return a model whose unknown noise is autoregressive where the data are far more probable so."""
+        return self._error_estimates().with_probable_noise(model)
+
     def _error_estimates(self) -> ErrorEstimates:
         return ErrorEstimates(lambda model: self._solve([model])[0], self._is_integrated, self._sums_noise)
 

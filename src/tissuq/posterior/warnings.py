@@ -10,8 +10,9 @@ import numpy as np
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
 from tissuq.inference.solution import Solution
+from tissuq.model.error_model import widening_of_lag
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.prediction.moments import mean_curve
+from tissuq.prediction.moments import level_of_errors, mean_curve
 
 __all__ = ["warnings_about"]
 
@@ -74,9 +75,10 @@ def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Ite
         )
     lag1 = _lag1_correlation(solution)
     if lag1 is not None:
+        cure = "" if solution.model.noise.is_consecutive else "with the noise 'autoregressive', or "
         yield (
             f"residuals are autocorrelated (lag-1 correlation {lag1:.2f}): the measurements are not independent and "
-            "the intervals are too narrow. Fit with the noise 'autoregressive', or with fewer points."
+            f"the intervals are too narrow. Fit {cure}with fewer points."
         )
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
@@ -124,7 +126,11 @@ def _noise_is_inseparable(solution: Solution) -> bool:
 
 
 def _lag1_correlation(solution: Solution) -> float | None:
-    """Return the lag-1 correlation of the whitened residuals where it is significant, else None."""
+    """Return the lag-1 correlation of the whitened residuals where it is significant and makes a difference, else None.
+
+    It makes none where errors that are assumed (the resolution of the load cell) are so large that the residuals, as
+    correlated as they are, tell no more than those.
+    """
     model, curves = solution.model, []
     if model.is_correlated or model.experiment.size < MIN_MEASUREMENTS:
         return None
@@ -136,7 +142,10 @@ def _lag1_correlation(solution: Solution) -> float | None:
         start += count
     size = sum(float(curve @ curve) for curve in curves)
     lag1 = sum(float(curve[1:] @ curve[:-1]) for curve in curves) / size if size else 0.0
-    return lag1 if lag1 > max(MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS / np.sqrt(len(residual))) else None
+    if lag1 <= max(MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS / np.sqrt(len(residual))):
+        return None
+    is_covered = np.sqrt(size / len(residual)) * widening_of_lag(lag1) < level_of_errors(solution)
+    return None if is_covered else lag1
 
 
 def _cut_by_prior(solution: Solution) -> Iterator[tuple[str, str]]:

@@ -82,7 +82,7 @@ class FittedSettings(BaseModel):
 
     material: str = "neo-hookean"
     noise_sd: float | Literal["unknown"] = "unknown"
-    noise: Literal["unknown", "proportional", "repeats", "autoregressive"] | None = None
+    noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = None
     method: Method = "auto"
     seed: int = Field(0, ge=0, le=MAX_SEED)
 

@@ -23,7 +23,7 @@ from tissuq.model.noise import NOISE_SD, noise_named
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["NoiseGrid", "at_level", "with_known_noise"]
+__all__ = ["NoiseGrid", "at_level", "at_noise", "with_known_noise"]
 
 FloatArray = NDArray[np.float64]
 
