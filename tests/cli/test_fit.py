@@ -335,3 +335,13 @@ def test_an_estimand_that_does_not_exist_is_refused(cli, here, specimen):
     assert said.status == 2
     assert "there is no estimand 'patient'. Choose one of: as-tested, specimen, tissue." in said.err.replace("\n", " ")
     assert not (here / "runs").exists()
+
+
+def test_the_page_and_the_terminal_say_that_errors_are_correlated(cli, here):
+    points, score = np.linspace(0.8, 1.5, 60), np.random.default_rng(4).standard_normal(60)
+    errors = np.convolve(score, 0.7 ** np.arange(8))[:60]
+    file = written(here / "drift.csv", stretch=points, stress=600 * (points - points**-2) + 10 * errors)
+    said = cli("fit", file, "--stress-unit", "kPa", "--discrepancy", "taylor", "--no-figures", "--out", "run")
+    assert said.status == 0, said.err
+    assert "errors of consecutive measurements are correlated (lag-1 correlation 0." in " ".join(said.out.split())
+    assert "correlated (lag-1 correlation 0." in (here / "run" / "report.html").read_text(encoding="utf-8")

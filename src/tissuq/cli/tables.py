@@ -83,6 +83,8 @@ def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
     print_rows(title, headers, table)
     if rows[0].get("estimand") in ESTIMANDS:
         print(f"The intervals are of {ESTIMANDS[rows[0]['estimand']].description}.")
+    if rows[0].get("noise_lag"):
+        print(f"The errors of consecutive measurements are correlated (lag-1 correlation {rows[0]['noise_lag']:.2f}).")
     print(
         "HPD: 95 %. In band, alone: share of measurements inside the 95 % band with the discrepancy, and inside that "
         "of the material alone."

@@ -140,6 +140,7 @@ def specimen_summary(study: SpecimenStudy) -> list[Row]:
         row = summary_row(name, posterior, study.seconds[name])
         seconds = row.pop("seconds")
         row["estimand"] = posterior.model.tolerances.estimand
+        row["noise_lag"] = posterior.model.fitted_errors.lag
         rows.append(row | stability_cells(posterior) | {"seconds": seconds})
     return rows
 
@@ -184,9 +185,9 @@ def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
 
 def noise_in_words(settings: SpecimenSettings, posterior: Posterior, unit: StressUnit) -> str:
     """Return what the noise was, in words."""
-    noise = posterior.model.noise
+    noise, lag = posterior.model.noise, posterior.model.fitted_errors.lag
     if noise.parameters:
-        return noise.description
+        return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "")
     values = [test.noise_sd for test in settings.tests if test.noise_sd is not None]
     return f"sd {', '.join(f'{value:g}' for value in values) or f'{settings.noise_sd:g}'} {unit.name}"
 
