@@ -48,7 +48,7 @@ def test_where_one_parameter_makes_it_it_is_that_one_scaled():
 @pytest.mark.parametrize("discrepancy", slow_but(["taylor"], ["taylor", "auto"]))
 def test_the_assessment_says_which_parameters_keep_their_meaning(material, words, discrepancy):
     data = measured()
-    in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress, stress_unit="kPa")
+    in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress).labelled(stress_unit="kPa")
     found = tq.fit(in_kpa, material=material, discrepancy=discrepancy, noise_sd=0.03).assess()
     (sentence,) = (text for text in found.sentences if "initial shear modulus" in text)
     assert sentence.endswith(words)

@@ -42,8 +42,53 @@ def test_an_experiment_does_not_follow_changes_of_the_array_it_was_made_from():
 
 
 def test_a_copy_with_another_name_keeps_the_values():
-    data = Experiment("uniaxial", [1.1], [0.1], stress_unit="kPa").labelled(name="other")
+    data = Experiment("uniaxial", [1.1], [100], stress_unit="kPa").labelled(name="other")
     assert (data.name, data.stress[0], data.stress_unit) == ("other", 0.1, "kPa")
+
+
+@pytest.mark.parametrize(("unit", "in_mpa"), [("kPa", 1e-3), ("MPa", 1.0), ("psi", 0.006894757293168361), ("Pa", 1e-6)])
+def test_numbers_are_in_the_unit_that_is_said_with_them(unit, in_mpa):
+    data = Experiment("uniaxial", [1.0, 1.1], [0.0, 25.0], stress_unit=unit)
+    np.testing.assert_allclose(data.stress, [0.0, 25.0 * in_mpa], rtol=1e-12)
+    assert data.stress_unit == unit
+
+
+def test_without_a_unit_numbers_are_in_mpa():
+    data = Experiment("uniaxial", [1.1], [0.1])
+    assert (data.stress[0], data.stress_unit) == (0.1, "MPa")
+
+
+def test_a_unit_converts_once_however_often_the_experiment_is_used_again():
+    data = Experiment("biaxial", [[1.1, 1.2]], [[2.0, 4.0]], stress_unit="kPa")
+    again = Experiment.of([data.joined(data), data.labelled(stress_unit="Pa")])
+    for test in again.tests:
+        np.testing.assert_allclose(test.stress[0], [2e-3, 4e-3])
+    assert [test.stress_unit for test in again.tests] == ["kPa", "Pa"]
+
+
+def test_quantities_of_pint_are_taken_in_their_units():
+    pint = pytest.importorskip("pint")
+    units = pint.UnitRegistry()
+    lengths = np.array([20.0, 25.0]) * units.mm
+    data = Experiment("uniaxial", lengths / (2 * units.cm), np.array([0.0, 40.0]) * units.kPa)
+    np.testing.assert_allclose(data.stretch, [1.0, 1.25])
+    np.testing.assert_allclose(data.stress, [0.0, 0.04])
+    assert data.stress_unit == "kPa"
+    shown = Experiment("uniaxial", [1.1], [0.2] * units.newton / units.mm**2, stress_unit="kPa")
+    assert (shown.stress[0], shown.stress_unit) == (0.2, "kPa")
+
+
+@pytest.mark.parametrize(("stretch_unit", "stress_unit"), [("mm", "kPa"), ("", "mm"), ("", "N")])
+def test_quantities_of_another_dimension_are_refused(stretch_unit, stress_unit):
+    units = pytest.importorskip("pint").UnitRegistry()
+    with pytest.raises(InputError, match=r"were given where|is not a unit of stress|is a force"):
+        Experiment("uniaxial", units.Quantity([1.1], stretch_unit), units.Quantity([0.1], stress_unit))
+
+
+@pytest.mark.parametrize("unit", ["N", "mPa", "kilo"])
+def test_what_is_no_unit_of_stress_is_refused(unit):
+    with pytest.raises(InputError, match=unit):
+        Experiment("uniaxial", [1.1], [0.1], stress_unit=unit)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from tissuq.mechanics.user_law import values_within_reach
 TESTS = [
     tq.Experiment(Uniaxial(), [0.8, 1.1, 1.3], [-0.5, 0.2, 0.6], name="first"),
     tq.Experiment(Planar(), [1.05, 1.2], [0.1, 0.4], name="second", source="a file", specimen="heart"),
-    tq.Experiment(Equibiaxial(), [1.1], [0.3], name="third", stress_unit="kPa"),
+    tq.Experiment(Equibiaxial(), [1.1], [300.0], name="third", stress_unit="kPa"),
 ]
 TOGETHER = tq.Experiment.of(TESTS)
 SHEET = tq.Experiment(Biaxial(), [[1.1, 1.0], [1.2, 0.9]], [[0.3, 0.2], [0.5, 0.1]], name="sheet")

@@ -17,7 +17,7 @@ from tissuq.studies.design import DesignSettings, DesignStudy
 @pytest.fixture(scope="module")
 def study():
     data = tq.simulate("gent", {"mu": 1.0, "Jm": 1.2}, np.linspace(0.75, 1.6, 16), 0.02, seed=1)
-    data = tq.Experiment("uniaxial", data.stretch, data.stress, "gent & co", stress_unit="kPa")
+    data = tq.Experiment("uniaxial", data.stretch, data.stress, "gent & co").labelled(stress_unit="kPa")
     posterior = tq.fit(data, material="gent", discrepancy="none", noise_sd=0.02)
     targets = [target_named(each, posterior.model) for each in ("modulus", "Jm")]
     table = posterior.design(points=(8,), target=["modulus", "Jm"])

@@ -24,7 +24,7 @@ from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
 @pytest.fixture(scope="module")
 def posterior():
     data = tq.simulate("yeoh", {"C10": 0.4, "C20": 0.03, "C30": 0.0}, np.linspace(0.8, 1.6, 14), 0.02, seed=1)
-    in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress, "specimen", stress_unit="kPa")
+    in_kpa = tq.Experiment("uniaxial", data.stretch, data.stress, "specimen").labelled(stress_unit="kPa")
     return tq.fit(in_kpa, discrepancy="yeoh", noise_sd=0.02)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
+from tissuq.experiments.reading.units import stress_unit as stress_unit_of
 
 __all__ = ["Curve", "Experiment", "checked_points"]
 
@@ -77,15 +78,16 @@ class Experiment:
     stretch : (n,) or (n, c) array, dimensionless
         What the mode controls: deformed over undeformed length, positive, or an amount of shear of either sign; a
         column for each control where there are several. Any order, repetitions allowed.
-    stress : (n,) or (n, k) array, MPa
+    stress : (n,) or (n, k) array, in ``stress_unit``
         Engineering (nominal) stress, tension positive and compression negative; a column for each stress of the mode
-        where there are several.
+        where there are several. The attribute of this name is in MPa. Quantities of pint are taken in their unit.
     name : str
         A short name for tables and figures.
     source : str
         Where the values come from (a file and its columns, or a citation).
-    stress_unit : str
-        The unit in which people want to read the stresses; the values here are MPa whatever it is.
+    stress_unit : str, optional
+        Unit of the numbers in ``stress``, and the one in which people want to read them; without it that of pint's
+        quantities, or MPa. `labelled` changes only the one to read.
     specimen : str
         Which specimen it was, where several tests are fitted together: those of one specimen share its errors of area
         and length. Without a name every test counts as one of a specimen of its own.
@@ -99,7 +101,7 @@ class Experiment:
     ------
     InputError
         When the arrays differ in length, do not have the columns of the mode, are empty, or hold values that are not
-        finite or not stretches.
+        finite or not stretches, or a unit is none of stress.
 
     Examples
     --------
@@ -107,6 +109,8 @@ class Experiment:
     >>> data = tq.Experiment(mode="uniaxial", stretch=[0.9, 1.0, 1.2], stress=[-0.3, 0.0, 0.5])
     >>> len(data)
     3
+    >>> tq.Experiment("uniaxial", stretch=[1.0, 1.2], stress=[0.0, 2.5], stress_unit="kPa").stress.tolist()
+    [0.0, 0.0025]
     >>> both = tq.Experiment("biaxial", stretch=[[1.1, 1.0], [1.2, 1.1]], stress=[[0.3, 0.2], [0.5, 0.4]])
     >>> len(both), both.mode.stresses
     (2, ('engineering stress of axis 1', 'engineering stress of axis 2'))
@@ -124,18 +128,19 @@ class Experiment:
         stress: ArrayLike,
         name: str = "experiment",
         source: str = "",
-        stress_unit: str = "MPa",
+        stress_unit: str | None = None,
         specimen: str = "",
     ) -> None:
         mode = loading_mode(mode)
-        points, stresses = checked_points(mode, stretch), _checked("stress", stress, mode.stresses)
+        values, unit = _in_mpa(stress, stress_unit)
+        points, stresses = checked_points(mode, stretch), _checked("stress", values, mode.stresses)
         if len(points) != len(stresses):
             raise InputError(
                 f"experiment '{name}': {len(points)} stretches but {len(stresses)} stresses; "
                 "give one stress for every stretch."
             )
         columns = enumerate(stresses.reshape(len(stresses), -1).T)
-        labels = name, source, stress_unit, specimen
+        labels = name, source, unit, specimen
         curves = tuple(Curve(mode, channel, points, column, *labels) for channel, column in columns)
         object.__setattr__(self, "curves", curves)
 
@@ -270,7 +275,7 @@ class Experiment:
         return mode.paths[channel].at(points, next(curves, UNMEASURED))
 
     def labelled(self, **labels: str) -> Experiment:
-        """Return the same measurements with another name, source, stress_unit or specimen."""
+        """Return the same measurements with another name, source, specimen, or stress_unit to read them in."""
         return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
 
     def where(self, selected: NDArray[Any]) -> Experiment:
@@ -309,7 +314,8 @@ class Experiment:
         stretch, stress = (
             np.concatenate(pair) for pair in ((self.stretch, experiment.stretch), (self.stress, experiment.stress))
         )
-        return Experiment(self.mode, stretch, stress, self.name, self.source, self.stress_unit, self.specimen)
+        joined = Experiment(self.mode, stretch, stress, self.name, self.source, specimen=self.specimen)
+        return joined.labelled(stress_unit=self.stress_unit)
 
 
 def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
@@ -320,7 +326,7 @@ def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
     InputError
         When it is not of this shape, or holds what is no value of a control.
     """
-    checked = _checked("stretch", points, [control.name for control in mode.controls])
+    checked = _checked("stretch", _magnitude(points, "dimensionless"), [control.name for control in mode.controls])
     for control, column in zip(mode.controls, checked.reshape(len(checked), -1).T, strict=True):
         low = np.flatnonzero(column <= control.above)
         if len(low):
@@ -331,12 +337,38 @@ def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
     return checked
 
 
-def _checked(name: str, values: Any, columns: Sequence[str]) -> FloatArray:
-    """Return an array of finite numbers, (n,) or with several columns (n, k), that cannot be changed."""
+def _in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
+    """Return stresses in MPa, and the unit in which people want to read them."""
+    if _is_quantity(stress):
+        return _magnitude(stress, "megapascal"), stress_unit_of(unit or f"{stress.units:~C}").name
+    given = stress_unit_of(unit or "MPa")
+    return _numbers("stress", stress) * given.to_mpa, given.name
+
+
+def _magnitude(values: Any, unit: str) -> Any:
+    """Return a quantity of pint as numbers in a unit; anything else as it is."""
+    if not _is_quantity(values):
+        return values
+    if not values.is_compatible_with(unit):
+        raise InputError(f"values in '{values.units}' were given where {unit} was expected.")
+    return values.to(unit).magnitude
+
+
+def _is_quantity(values: Any) -> bool:
+    """Tell whether values are a quantity of pint, of whatever registry."""
+    return hasattr(values, "magnitude") and hasattr(values, "is_compatible_with")
+
+
+def _numbers(name: str, values: Any) -> FloatArray:
     try:
-        array = np.array(values, dtype=np.float64)
+        return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be an array of numbers: {error}.") from error
+
+
+def _checked(name: str, values: Any, columns: Sequence[str]) -> FloatArray:
+    """Return an array of finite numbers, (n,) or with several columns (n, k), that cannot be changed."""
+    array = _numbers(name, values)
     count = len(columns)
     if array.ndim != min(count, 2) or not array.size or array.shape[1:] != (count,)[: array.ndim - 1]:
         form = f"an array with {count} columns ({', '.join(columns)})" if count > 1 else "a one-dimensional array"

@@ -117,7 +117,7 @@ def _recorded_model(
 
 def _test(group: Group) -> Experiment:
     labels = {label: str(group.attrs[label]) for label in LABELS}
-    return Experiment(str(group.attrs["mode"]), group.arrays["stretch"], group.arrays["stress"], **labels)
+    return Experiment(str(group.attrs["mode"]), group.arrays["stretch"], group.arrays["stress"]).labelled(**labels)
 
 
 def _plain_noise(noise: Noise) -> str | float | list[float]:

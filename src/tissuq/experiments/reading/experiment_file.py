@@ -192,8 +192,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[Read
         stress=np.ascontiguousarray(used.stress.T) if len(used.stress) > 1 else used.stress[0],
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
-        stress_unit=loads[0].unit.name,
-    )
+    ).labelled(stress_unit=loads[0].unit.name)
     return Reading(experiment, table, choices, recorded, used, tuple(cycles), dimensions.warnings)
 
 
