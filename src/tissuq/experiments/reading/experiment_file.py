@@ -193,7 +193,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[Read
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
     ).labelled(stress_unit=loads[0].unit.name)
-    return Reading(experiment, table, choices, recorded, used, tuple(cycles), dimensions.warnings)
+    return Reading(experiment, table, choices, recorded, used, tuple(cycles), (*table.notes, *dimensions.warnings))
 
 
 def _checked_mode(**options: Unpack[ReadingOptions]) -> LoadingMode:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from io import StringIO
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.file_format import file_format, sheet_lines
 from tissuq.experiments.reading.layout import WHITESPACE, column_names, find_layout, is_comment, split
+from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.units import NUMBER
 
@@ -49,6 +51,8 @@ class Table:
         The lines above the rows, with their numbers.
     block : (rows, columns) array, optional
         All cells, where they have been read as numbers already.
+    notes : tuple of str
+        What a person should know of how the table was found.
     """
 
     file: str
@@ -59,6 +63,7 @@ class Table:
     lines: Sequence[int]
     head: Sequence[tuple[int, str]] = ()
     block: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
     def label(self, column: int) -> str:
         """Return how messages name a column (counted from 0)."""
@@ -224,7 +229,24 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
         head=[(line, text) for line, text in filled if line < first_line],
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
-    return table
+    return _without_summary(table)
+
+
+def _without_summary(table: Table) -> Table:
+    """Return the table without the rows of a summary at its end."""
+    summary = find_summary(table.rows, table.lines, partial(split, separator=table.separator))
+    if summary is None:
+        return table
+    first, last = table.lines[summary.start], table.lines[-1]
+    where = f"line {first}" if first == last else f"lines {first} to {last}"
+    if summary.statistics is None:
+        raise InputError(
+            f"{table.file}, {where}: set apart at the end of the table, and not going on from line "
+            f"{table.lines[summary.start - 1]}. Delete a summary; put measurements into a file of their own."
+        )
+    what = f" with its {', '.join(summary.statistics)}" if summary.statistics else ""
+    note = f"{where} at the end of the table, a summary{what}, left out: no measurements."
+    return replace(table.taken(np.arange(summary.start)), notes=(note,))
 
 
 def _no_table(file: str, content: Lines) -> InputError:

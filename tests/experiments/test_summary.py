@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import cycles, neo_hookean
+from tissuq.errors import InputError
+
+COLUMNS = "Time (s),Strain (%),Stress (kPa)"
+SUMMARIES = {
+    "maximum": lambda column: column.max(),
+    "minimum": lambda column: column.min(),
+    "mean": lambda column: column.mean(),
+    "standard deviation": lambda column: column.std(ddof=1),
+}
+
+
+def measured(rows=40, turns=False, seed=0):
+    stretch = cycles([1.3], rows=rows // 2)[0] if turns else np.linspace(1, 1.3, rows)
+    noise = np.random.default_rng(seed).normal(0, 0.1, len(stretch))
+    return np.column_stack([0.5 * np.arange(len(stretch)), 100 * (stretch - 1), 1e3 * neo_hookean(stretch) + noise])
+
+
+def written(folder, values, *end, names=COLUMNS):
+    rows = [",".join(f"{value:.4f}" for value in row) for row in values]
+    path = folder / "test.csv"
+    path.write_text("\n".join([names, *rows, *end]) + "\n")
+    return path
+
+
+def summary_row(values, name, time="", digits=4):
+    return ",".join([time, *(f"{SUMMARIES[name](column):.{digits}f}" for column in np.round(values, 4)[:, 1:].T)])
+
+
+@pytest.mark.parametrize("turns", [False, True])
+@pytest.mark.parametrize("digits", [1, 4])
+@pytest.mark.parametrize("gap", ["", ",,"])
+@pytest.mark.parametrize("names", [["maximum"], ["mean", "standard deviation"], [*SUMMARIES]])
+def test_a_summary_beneath_a_blank_line_is_left_out_and_told(tmp_path, turns, digits, gap, names):
+    values = measured(turns=turns)
+    end = [summary_row(values, name, digits=digits) for name in names]
+    inspection = tq.inspect(written(tmp_path, values, gap, *end))
+    assert len(inspection.reading.experiment) == len(values)
+    (note, *_) = inspection.warnings
+    first = len(values) + 3
+    assert note.startswith(f"line {first}" if len(end) == 1 else f"lines {first} to {first + len(end) - 1}")
+    assert all(name in note for name in names)
+
+
+@pytest.mark.parametrize("blank", [True, False])
+def test_a_row_of_means_with_its_name_in_an_unread_column_is_left_out(tmp_path, blank):
+    values = measured()
+    end = [""] * blank + [summary_row(values, "mean", "Mittelwert"), summary_row(values, "maximum", "Max.")]
+    assert len(tq.read_experiment(written(tmp_path, values, *end))) == len(values)
+
+
+@pytest.mark.parametrize("end", [["", ",14.2,33.1"], ["", "0.0,0.31,12.1", "0.5,0.32,12.2"], ["modulus,0.3,55.0"]])
+def test_other_rows_that_stand_apart_are_asked_about(tmp_path, end):
+    with pytest.raises(InputError, match=r"test\.csv, lines? 4.*not going on from line 41"):
+        tq.read_experiment(written(tmp_path, measured(), *end))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("turns", [False, True])
+@pytest.mark.parametrize("last", [1, 3, 8])
+def test_measurements_that_go_on_beneath_a_blank_line_stay(tmp_path, seed, turns, last):
+    values = measured(turns=turns, seed=seed)
+    rows = [",".join(f"{value:.4f}" for value in row) for row in values[-last:]]
+    inspection = tq.inspect(written(tmp_path, values[:-last], "", *rows))
+    assert len(inspection.reading.experiment) == len(values)
+    assert not any("summary" in note for note in inspection.warnings)
+
+
+def test_a_blank_line_after_every_row_is_no_gap(tmp_path):
+    values = measured()
+    path = written(tmp_path, values)
+    path.write_text(path.read_text().replace("\n", "\n\n"))
+    assert len(tq.read_experiment(path)) == len(values)
+
+
+def test_a_summary_of_a_sheet_is_left_out(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    values, book = measured(), openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(COLUMNS.split(","))
+    for row in values.tolist():
+        sheet.append(row)
+    sheet.append([])
+    sheet.append(["Mean", *values[:, 1:].mean(axis=0).tolist()])
+    book.save(tmp_path / "test.xlsx")
+    assert len(tq.read_experiment(tmp_path / "test.xlsx")) == len(values)
