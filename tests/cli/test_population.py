@@ -129,7 +129,7 @@ def write_units(here):
         (here / f"S{k}.csv").write_text("\n".join([f"stretch,stress{unit}", *rows_of(modulus, k)]) + "\n")
 
 
-UNITS_ASSUMED = "S1, S2: the file states no unit of stress, so MPa was assumed"
+UNITS_ASSUMED = "S1, S2: check the unit: the file states no unit of stress, so MPa was assumed"
 
 
 def test_files_say_their_mode_by_a_comment_or_by_their_name(here):

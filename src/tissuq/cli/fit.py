@@ -180,6 +180,8 @@ def _written(
     force: bool,
 ) -> Study:
     """Return what comes of a run, when it is written into its folder."""
+    from tissuq.cli.tables import print_warnings
+    from tissuq.experiments.reading.inspection import DOUBTFUL_UNIT
     from tissuq.report.run_folder import run_folder
 
     with progress() as step:
@@ -187,6 +189,7 @@ def _written(
         step("writing")
         with run_folder(target, force=force) as folder:
             write(study, sources, folder, figures=figures)
+    print_warnings([text for text in study.warnings if DOUBTFUL_UNIT in text])
     return study
 
 

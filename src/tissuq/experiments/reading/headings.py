@@ -69,11 +69,12 @@ DIMENSION_NAMES = {
 
 
 UNIT_IN_HEADING = (
-    re.compile(r"(?P<quantity>.+?)\s*[\[(](?P<unit>[^\])]*)[\])]"),
+    re.compile(r"(?P<quantity>.+?)\s*[\[({<](?P<unit>[^\])}>]*)[\])}>]?"),
+    re.compile(r"(?P<quantity>[^/]+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
     re.compile(r"(?P<quantity>.+?)\s*/\s*(?P<unit>.+)"),
-    re.compile(r"(?P<quantity>.+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
 )
-UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[_\s](?P<unit>\S*[^\W\d_]\S*|%)")
+"""Forms of a name with a unit; brackets are often mistyped, as in ``Stress [kPa}``."""
+UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[-_.:;|\s](?P<unit>\S*[^\W\d_]\S*|%)")
 
 
 @dataclass(frozen=True)
@@ -87,12 +88,14 @@ class Heading:
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
     name = name.strip()
-    match = next(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)), None)
-    if match is None:
-        match = UNIT_AS_SUFFIX.fullmatch(name)
-        if match is None or not looks_like_unit(match["unit"]):
-            return Heading(plain(name))
-    return Heading(plain(match["quantity"]), match["unit"].strip())
+    matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
+    suffix = UNIT_AS_SUFFIX.fullmatch(name)
+    if not matches and suffix is not None and looks_like_unit(suffix["unit"]):
+        matches = [suffix]
+    if not matches:
+        return Heading(plain(name))
+    match = next((match for match in matches if looks_like_unit(match["unit"])), matches[0])
+    return Heading(plain(match["quantity"].rstrip(" ,.:;|_-")), match["unit"].strip())
 
 
 def plain(name: str) -> str:

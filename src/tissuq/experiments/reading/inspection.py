@@ -17,10 +17,11 @@ from tissuq.experiments.reading.cycles import find_cycles
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.units import stress_unit
 
-__all__ = ["Inspection", "data_warnings", "inspect", "noise_between_neighbours"]
+__all__ = ["DOUBTFUL_UNIT", "Inspection", "data_warnings", "inspect", "noise_between_neighbours"]
 
 MIN_TRIPLES = 30
 """Number of triples of neighbouring measurements from which their scatter shows the noise."""
@@ -29,6 +30,8 @@ SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 LABEL_WIDTH, TEXT_WIDTH = 10, 110
 """Characters of the column of labels, and of a line."""
 
+DOUBTFUL_UNIT = "check the unit:"
+"""How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000."""
 MANY_ROWS = 10_000
 """Rows from which thinning is worth a word."""
 MIN_ROWS_PER_CYCLE = 10
@@ -75,12 +78,15 @@ class Inspection:
         return data_warnings(self.reading)
 
     def __str__(self) -> str:
-        lines = [f"{self.reading.table.file}: what was understood", ""]
+        doubts = [text for text in self.warnings if DOUBTFUL_UNIT in text]
+        notes = [text for text in self.warnings if text not in doubts]
+        lines = [*(_wrapped("ATTENTION", text) for text in doubts), *[""] * bool(doubts)]
+        lines += [f"{self.reading.table.file}: what was understood", ""]
         lines += [_wrapped(label, text) for label, text in self._rows()]
         lines += ["", *(_wrapped(f"step {number}", text) for number, text in enumerate(self.steps, start=1))]
         if len(self.reading.cycles) > 1:
             lines += ["", *self._cycle_table()]
-        return "\n".join([*lines, *[""] * bool(self.warnings), *(_wrapped("Note", text) for text in self.warnings)])
+        return "\n".join([*lines, *[""] * bool(notes), *(_wrapped("Note", text) for text in notes)])
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used, unit = self.reading.table, self.reading.used, stress_unit(self.reading.experiment.stress_unit)
@@ -186,13 +192,27 @@ def data_warnings(reading: Reading) -> tuple[str, ...]:
     """Return what a person should look at before a fit, of each stress."""
     labels = reading.used.labels
     texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
-    return (*reading.warnings, *filter(None, chain.from_iterable(texts)))
+    found = [*reading.warnings, *filter(None, chain.from_iterable(texts))]
+    return tuple(sorted(found, key=lambda text: DOUBTFUL_UNIT not in text))
 
 
 def _unit_assumed(reading: Reading, number: int) -> str:
-    if "the file states no unit" not in reading.experiment.source:
+    if "MPa (assumed" not in reading.experiment.source:
         return ""
-    return "the file states no unit of stress, so MPa was assumed; if it is another, give --stress-unit."
+    return (
+        f"{DOUBTFUL_UNIT} the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit kPa, "
+        "or --stress-unit MPa."
+    )
+
+
+def _strain_unit_assumed(reading: Reading, number: int) -> str:
+    if RATIO_ASSUMED not in reading.experiment.source:
+        return ""
+    largest = float(np.abs(reading.used.stretch[number] - 1).max())
+    return (
+        f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which it "
+        "is: --strain-unit % or --strain-unit 1."
+    )
 
 
 def _size(reading: Reading, number: int) -> str:
@@ -302,6 +322,7 @@ def _other_axis(reading: Reading, number: int) -> str:
 
 CHECKS: tuple[Callable[[Reading, int], str], ...] = (
     _unit_assumed,
+    _strain_unit_assumed,
     _size,
     _stretch_size,
     _cycles,

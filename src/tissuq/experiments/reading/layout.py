@@ -102,7 +102,20 @@ def column_names(line: str, width: int, separator: str) -> list[str]:
             return []
     while names and not names[-1]:
         names.pop()
+    if len(names) > width:
+        names = _with_units_joined(names)
     return names if _are_names(names) else []
+
+
+def _with_units_joined(names: Sequence[str]) -> list[str]:
+    """Return names of which some were split from their units by the separator, as in ``Stress, kPa``."""
+    joined: list[str] = []
+    for name in names:
+        if joined and name and looks_like_unit(name):
+            joined[-1] = f"{joined[-1]}, {name}"
+        else:
+            joined.append(name)
+    return joined
 
 
 def _likely_separator(lines: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from tissuq.experiments.reading import units
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimensions, initial_size
 from tissuq.experiments.reading.headings import heading
-from tissuq.experiments.reading.plausibility import check_strain
+from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.units import FORCE, LENGTH, Quantity
 
@@ -19,6 +19,8 @@ __all__ = ["Load", "stress_of", "stretch_of"]
 
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
+LARGEST_ASSUMED_STRESS = 100.0
+"""Largest stress, MPa, of a soft material: numbers beyond it that have no unit are not taken as MPa."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +70,11 @@ def stretch_of(
     label = table.label(choice.deformation)
     scaled = "" if factor == 1 else f" x {factor:g}"
     if is_strain:
-        check_strain(table, choice, values * factor, load, has_unit=bool(declared or strain_unit))
-        return 1 + values * factor, f"stretch = 1 + column {label}{scaled}"
+        has_unit = bool(declared or strain_unit)
+        check_strain(table, choice, values * factor, load, has_unit=has_unit)
+        is_doubtful = not has_unit and np.abs(values).max() > DOUBTFUL_STRAIN
+        assumed = f" {RATIO_ASSUMED}" if is_doubtful else ""
+        return 1 + values * factor, f"stretch = 1 + column {label}{scaled}{assumed}"
     what = "amount of shear" if choice.measure == "shear" else "stretch"
     return values * factor, f"{what} = column {label}{scaled}"
 
@@ -109,7 +114,7 @@ def stress_of(
             f"{table.place(choice.stress)} is read as stress, which needs no {unneeded}. "
             "Leave it out, or name the column of forces: --column force=NAME."
         )
-    unit, unit_source = _stress_unit(table, choice, stress_unit)
+    unit, unit_source = _stress_unit(table, choice, stress_unit, float(np.abs(values).max()))
     return Load(values * unit.to_mpa, unit, f"{stress_type} stress from column {label} in {unit_source}")
 
 
@@ -133,7 +138,7 @@ def _declared_unit(table: Table, column: int) -> str:
         When both state one and they differ.
     """
     in_heading = heading(table.names[column]).unit
-    beneath = table.units[column].strip("[]() ")
+    beneath = table.units[column].strip(f"{units.BRACKETS} ")
     if in_heading and beneath and in_heading != beneath and units.looks_like_unit(in_heading):
         raise InputError(
             f"{table.place(column)}: the name says '{in_heading}' but the row of units beneath it says "
@@ -192,8 +197,10 @@ def _strain_factor(table: Table, choice: ColumnChoice, declared: str, strain_uni
     return factor
 
 
-def _stress_unit(table: Table, choice: ColumnChoice, stress_unit: str | None) -> tuple[units.StressUnit, str]:
-    """Return the unit of the stresses and the words for where it comes from."""
+def _stress_unit(
+    table: Table, choice: ColumnChoice, stress_unit: str | None, largest: float
+) -> tuple[units.StressUnit, str]:
+    """Return the unit of the stresses, the largest of which is given, and the words for where it comes from."""
     declared = _declared_unit(table, choice.stress)
     if stress_unit is not None:
         unit = units.stress_unit(stress_unit)
@@ -205,6 +212,7 @@ def _stress_unit(table: Table, choice: ColumnChoice, stress_unit: str | None) ->
             )
         return unit, f"{unit.name} (as given)"
     if not declared:
+        _check_assumed_mpa(table, choice, largest)
         return units.StressUnit("MPa", 1.0), "MPa (assumed: the file states no unit)"
     try:
         unit = units.stress_unit(declared)
@@ -213,6 +221,24 @@ def _stress_unit(table: Table, choice: ColumnChoice, stress_unit: str | None) ->
             f"{table.place(choice.stress)}: {error} To say it yourself, give stress_unit (--stress-unit)."
         ) from error
     return unit, f"{unit.name} (from the file)"
+
+
+def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> None:
+    """Refuse to take stresses without a unit as MPa where the file speaks of another one, or by their size."""
+    texts = {"the name": table.names[choice.stress], "the row of units": " ".join(table.units)}
+    texts |= {f"line {line}": text for line, text in table.head}
+    mentions = ((where, unit) for where, text in texts.items() for unit in units.stress_units_in(text))
+    where, unit = next((mention for mention in mentions if units.stress_unit(mention[1]).to_mpa != 1.0), ("", ""))
+    if unit:
+        found, likely = f"but {where} speaks of {unit}", unit
+    elif largest > LARGEST_ASSUMED_STRESS:
+        found, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
+    else:
+        return
+    raise InputError(
+        f"{table.place(choice.stress)}: no unit of stress is stated for it, {found}. Give stress_unit={likely!r} "
+        f"(--stress-unit {likely}), or whichever it is."
+    )
 
 
 def _unit_or_none(text: str) -> units.StressUnit | None:

@@ -14,10 +14,20 @@ from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["check_signs", "check_strain", "check_stretches", "with_compression_negative"]
+__all__ = [
+    "DOUBTFUL_STRAIN",
+    "RATIO_ASSUMED",
+    "check_signs",
+    "check_strain",
+    "check_stretches",
+    "with_compression_negative",
+]
 
 PLAIN_STRAIN_LIMIT = 10.0
 """A strain without a unit beyond this (1000 %) is taken for percent and asked about."""
+DOUBTFUL_STRAIN = 1.0
+"""A strain without a unit beyond this (100 %) may be percent; it is taken for a plain ratio with a warning."""
+RATIO_ASSUMED = "(a plain ratio assumed: the file states no unit)"
 COMPRESSED_LIMIT = 0.5
 """Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
 NOTABLE_SHARE = 0.1

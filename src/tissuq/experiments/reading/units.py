@@ -12,6 +12,7 @@ from tissuq.errors import InputError
 
 __all__ = [
     "AREA",
+    "BRACKETS",
     "FORCE",
     "LENGTH",
     "MASSES",
@@ -22,6 +23,7 @@ __all__ = [
     "number_and_unit",
     "strain_factor",
     "stress_unit",
+    "stress_units_in",
 ]
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -65,6 +67,8 @@ SYMBOLS = (
     | {"V", "mV", "deg", "rad", "percent", "pct"}
 )
 
+BRACKETS = "[](){}<>"
+"""What units stand in, not always well matched."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
 MASSES = ("g", "kg")
 """Units of mass that are written where units of force are meant."""
@@ -205,10 +209,22 @@ def number_and_unit(text: str) -> tuple[float | None, str]:
 def looks_like_unit(text: str) -> bool:
     """Tell whether a cell beneath a column name reads as a unit of anything: ``[kPa]``, ``%``, ``s``."""
     text = text.strip()
-    if re.fullmatch(r"\[.*\]|\(.*\)|[%‰°1-]|", text):
+    if re.fullmatch(r"[\[({<].*[\])}>]|[%‰°1-]|", text):
         return True
     symbols = [symbol for symbol in re.split(r"[\s\d·*/.^%°⁻²³-]+", text.replace("µ", "u").replace("μ", "u")) if symbol]
     return bool(symbols) and all(symbol in SYMBOLS for symbol in symbols)
+
+
+def stress_units_in(text: str) -> list[str]:
+    """Return the usual units of stress among the words of a text.
+
+    Examples
+    --------
+    >>> stress_units_in("Stress.kPa of the 2nd cycle"), stress_units_in("P in N/mm2"), stress_units_in("Pascal's test")
+    (['kPa'], ['N/mm2'], [])
+    """
+    words = re.findall(r"[^\W\d_]+(?:/[^\W\d_]+[2²])?", text.replace("^", ""))
+    return [word for word in words if word in COMMON_STRESS_UNITS or word.lower() in PASCALS.keys() - {"pa"}]
 
 
 def _factor_from_pint(name: str) -> float:
