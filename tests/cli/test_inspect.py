@@ -126,3 +126,15 @@ def test_an_inspection_needs_neither_jax_nor_matplotlib(tmp_path):
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert said.splitlines()[-1] == "[]"
+
+
+def test_one_specimen_of_a_table_is_read_as_the_refusal_says(cli, here):
+    rows = [f"{name},{1 + k / 100},{factor * k}" for name, factor in (("a 1", 1), ("b 2", 2)) for k in range(10)]
+    (here / "all.csv").write_text("\n".join(["Specimen,stretch,stress [kPa]", *rows]) + "\n")
+    said = cli("inspect", "all.csv")
+    assert said.status == 2
+    assert "--only 'Specimen=a 1'" in said.err
+    said = cli("inspect", "all.csv", "--only", "Specimen=b 2")
+    assert said.status == 0
+    assert "0 to 18 kPa" in said.out
+    assert cli("inspect", "all.csv", "--only", "Specimen").status == 2

@@ -43,6 +43,10 @@ OPTIONS: dict[str, Any] = {
     ],
     "thickness": Annotated[str | None, typer.Option(help="With --width, instead of --area.")],
     "diameter": Annotated[str | None, typer.Option(help="Of a round specimen, instead of --area.")],
+    "only": Annotated[
+        list[str] | None,
+        typer.Option(help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat."),
+    ],
     "compression_positive": Annotated[
         bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
     ],
@@ -90,8 +94,9 @@ def _settings(values: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of a file's reading for the options' values by name."""
     dimensions = {name: values.pop(name) for name in DIMENSIONS}
     columns = once_each("--column", map(_role, values.pop("column") or []))
+    only = once_each("--only", map(_cell, values.pop("only") or []))
     stated = {name: value for name, value in dimensions.items() if value}
-    return values | {"dimensions": stated or None, "columns": columns or None}
+    return values | {"dimensions": stated or None, "columns": columns or None, "only": only or None}
 
 
 def resolve(file: Path) -> Path:
@@ -108,6 +113,13 @@ def _role(text: str) -> tuple[str, str | int]:
     if not name:
         raise InputError(f"--column needs ROLE=COLUMN, such as stress='Stress (kPa)', not '{text}'.")
     return role.strip(), int(name) if name.strip().isdecimal() else name.strip()
+
+
+def _cell(text: str) -> tuple[str, str]:
+    name, _, value = text.rpartition("=")
+    if not name or not value:
+        raise InputError(f"--only needs COLUMN=VALUE, such as Specimen=S1, not '{text}'.")
+    return name.strip(), value.strip()
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:

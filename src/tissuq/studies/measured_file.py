@@ -32,6 +32,7 @@ class ReadingSettings(BaseModel):
     force_unit: str | None = None
     displacement_unit: str | None = None
     dimensions: dict[str, str] = Field(default_factory=dict)
+    only: dict[str, str | int] = Field(default_factory=dict)
     compression_positive: bool = False
     cycle: str | int | None = None
     branch: str | None = None

@@ -19,6 +19,7 @@ from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dim
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.measures import Load, stress_of, stretch_of
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
+from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
 from tissuq.experiments.reading.table import Column, Table, read_table
 
 __all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file", "read_rows"]
@@ -38,6 +39,7 @@ class ReadingOptions(TypedDict, total=False):
     force_unit: str | None
     displacement_unit: str | None
     dimensions: Mapping[str, str] | None
+    only: Mapping[str, str | int] | None
     compression_positive: bool
     cycle: str | int | None
     branch: str | None
@@ -111,6 +113,9 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
         Without it those in the lines above the table. Only displacements and forces need them. In the mode
         ``biaxial`` length and width are the sizes along the first and the second axis, and the width of one axis is
         the length of the other.
+    only : mapping, optional
+        From the name of a column to what must stand in it, such as ``{"Specimen": "S1"}``: the only rows to read. A
+        table of several specimens is refused without it.
     compression_positive : bool
         Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
         displacements that are positive, too.
@@ -158,7 +163,7 @@ def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -
     """Read a file as :func:`read_experiment` does, and keep what was done on the way."""
     _checked_mode(**options)
     table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
-    return read_rows(table, path, **options)
+    return read_rows(only_rows(table, options.get("only")), path, **options)
 
 
 def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
@@ -170,6 +175,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[Read
     choices = tuple(labelled_choices.values())
     dimensions = dimensions_of(table, options.get("dimensions"))
     measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
+    check_one_specimen(table, choices, measured.course)
     recorded = with_compression_negative(measured, choices, is_positive)
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
@@ -252,6 +258,8 @@ def _measured(
         stress=np.stack([load.stress for load in loads]),
         labels=labels,
     )
+    for name, value in (options.get("only") or {}).items():
+        measured = measured.with_step(f"only rows with '{value}' in column '{name}'")
     return measured.with_step(*stretch_steps).with_step(*(load.source for load in loads)), loads
 
 

@@ -15,6 +15,7 @@ __all__ = [
     "STRESS_NAMES",
     "Heading",
     "heading",
+    "is_of_specimens",
     "on_axis",
     "plain",
     "role_names",
@@ -52,6 +53,12 @@ STRESS_NAMES = {
 CYCLE_NAMES = _names("cycle, cycles, cycle count, cycle number, total cycles, total cycle count, zyklus, zyklen")
 SET_NAMES = _names("setname, set name, set")
 """Names of the column in which parts of a test are named."""
+
+SPECIMEN_NAME = re.compile(
+    r"(specimen|sample|probe|proben?körper|replicate|replikat|donor|subject|patient|animal|tier|éprouvette|échantillon|"
+    r"probeta|muestra|provino|campione)s?( ?(id|no\.?|nr\.?|n°|#|number|nummer|name|label|bezeichnung))?"
+)
+"""Names of a column that tells which specimen a row is of."""
 
 DIMENSION_NAMES = {
     "area": _names(
@@ -106,6 +113,17 @@ def plain(name: str) -> str:
 def role_names(role: str, stress_type: str = "engineering") -> frozenset[str]:
     """Return the names that columns of a role may have."""
     return STRESS_NAMES[stress_type] if role == "stress" else ROLES[role]
+
+
+def is_of_specimens(quantity: str) -> bool:
+    """Tell whether a column of that name tells which specimen a row is of.
+
+    Examples
+    --------
+    >>> is_of_specimens("specimen id"), is_of_specimens("specimen width")
+    (True, False)
+    """
+    return SPECIMEN_NAME.fullmatch(quantity) is not None
 
 
 def on_axis(quantity: str) -> tuple[str, str]:

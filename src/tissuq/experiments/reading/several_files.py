@@ -14,6 +14,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_modes
 from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_rows
+from tissuq.experiments.reading.several_specimens import only_rows
 from tissuq.experiments.reading.table import read_table
 
 __all__ = ["SUFFIXES", "find_mode", "find_tests", "read_column", "stated_mode"]
@@ -63,7 +64,7 @@ def read_column(
     options
         As for `tissuq.read_experiment`.
     """
-    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
+    table = only_rows(read_table(path, options.get("skip_rows", 0), options.get("sheet")), options.get("only"))
     column = find_column(table, "specimen", specimen)
     labels = np.array(table.texts(column))
     if (labels == "").any():

@@ -1,0 +1,98 @@
+"""Columns that part the rows of one table into tests of several specimens, and the rows of one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.columns import ColumnChoice, find_column
+from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading, is_of_specimens
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.units import NUMBER
+
+__all__ = ["check_one_specimen", "only_rows"]
+
+ROWS_OF_TEST = 5
+"""Rows that the tests of a table have on average at least."""
+RESTART, RETURN = 0.1, 0.5
+"""Share of the range of stretches within which all tests begin, and of the longest way that all go."""
+SHOWN = 6
+"""Number of values that a message lists."""
+
+
+def only_rows(table: Table, only: Mapping[str, str | int] | None) -> Table:
+    """Return the rows whose cells in some columns are as given.
+
+    Raises
+    ------
+    InputError
+        When there is no such column, or no such row.
+    """
+    for name, value in (only or {}).items():
+        column = find_column(table, "only", name)
+        texts = table.texts(column)
+        rows = np.flatnonzero([text.lower() == str(value).strip().lower() for text in texts])
+        if not len(rows):
+            raise InputError(f"{table.place(column)}: no row has '{value}' there. There are {_listed(texts)}.")
+        table = table.taken(rows)
+    return table
+
+
+def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Column) -> None:
+    """Refuse a table of several specimens, which would be fitted as one.
+
+    They are in a column that is named so, or in one whose words part the rows into tests that each begin anew.
+
+    Raises
+    ------
+    InputError
+        When there are several, with what reads one of them, or all.
+    """
+    if table.block is not None and not any(is_of_specimens(heading(name).quantity) for name in table.names):
+        return
+    used = {column for choice in choices for column in (choice.deformation, choice.stress)}
+    for column in sorted(set(range(len(table.names))) - used):
+        quantity = heading(table.names[column]).quantity
+        if quantity in CYCLE_NAMES | SET_NAMES:
+            continue
+        labels = table.texts(column)
+        distinct = list(dict.fromkeys(labels))
+        if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
+            continue
+        if is_of_specimens(quantity) or (_are_words(distinct) and _begin_anew(labels, distinct, course)):
+            raise _several(table, column, labels)
+
+
+def _several(table: Table, column: int, labels: Sequence[str]) -> InputError:
+    name = table.names[column] or str(column + 1)
+    return InputError(
+        f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
+        f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}}); to fit each of them and the "
+        f"population that they are from: tissuq population FILE --specimen '{name}'."
+    )
+
+
+def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) -> bool:
+    """Tell whether each label has its own rows, one after another, in which the same way is gone again."""
+    starts = [0, *(row for row in range(1, len(labels)) if labels[row] != labels[row - 1]), len(labels)]
+    if len(starts) != len(distinct) + 1:
+        return False
+    tests = [course[start:stop] for start, stop in pairwise(starts)]
+    begins = np.array([test[0] for test in tests])
+    furthest = np.array([test[np.argmax(np.abs(test - test[0]))] for test in tests])
+    ways = furthest - begins
+    is_same_way = bool((ways > 0).all() or (ways < 0).all()) and np.abs(ways).min() >= RETURN * np.abs(ways).max()
+    return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
+
+
+def _are_words(labels: Sequence[str]) -> bool:
+    return not any(NUMBER.fullmatch(label) for label in labels)
+
+
+def _listed(texts: Sequence[str]) -> str:
+    values = [f"'{text}'" for text in dict.fromkeys(texts)]
+    more = f" and {len(values) - SHOWN} more" if len(values) > SHOWN else ""
+    return ", ".join(values[:SHOWN]) + more

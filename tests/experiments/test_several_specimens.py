@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import neo_hookean
+from tissuq.errors import InputError
+
+STIFFNESS = {"A": 1.0, "B": 1.1, "C": 1.2}
+
+
+def written(folder, names, labels, rows=20, unloads=False, interleaved=False):
+    """Tests of three specimens, one after another or row by row, with a column of labels."""
+    up = np.linspace(1, 1.3, rows)
+    stretch = np.concatenate([up, up[-2::-1]]) if unloads else up
+    lines = [
+        (label, value, 1e3 * factor * neo_hookean(np.array(value)))
+        for label, factor in zip(labels, STIFFNESS.values(), strict=True)
+        for value in stretch
+    ]
+    if interleaved:
+        lines.sort(key=lambda line: line[1])
+    path = folder / "test.csv"
+    text = "\n".join(f"{label},{value:.6f},{stress:.6f}" for label, value, stress in lines)
+    path.write_text(f"{names},stretch,stress [kPa]\n{text}\n")
+    return path
+
+
+@pytest.mark.parametrize("unloads", [False, True])
+@pytest.mark.parametrize("interleaved", [False, True])
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("Specimen", "ABC"),
+        ("specimen_id", "123"),
+        ("Sample No.", "123"),
+        ("Probe", "456"),
+        ("Patient", ["x", "y", "z"]),
+    ],
+)
+def test_specimens_of_a_column_are_not_pooled_and_the_advice_reads_one(tmp_path, name, labels, unloads, interleaved):
+    path = written(tmp_path, name, labels, unloads=unloads, interleaved=interleaved)
+    with pytest.raises(InputError, match=rf"names several tests.*--only '{name}={labels[0]}'.*--specimen '{name}'"):
+        tq.read_experiment(path)
+    data = tq.read_experiment(path, only={name: labels[1]})
+    np.testing.assert_allclose(data.stress, 1.1 * neo_hookean(data.stretch), atol=1e-6)
+    assert len(data) == (39 if unloads else 20)
+    assert f"only rows with '{labels[1]}' in column '{name}'" in data.source
+
+
+@pytest.mark.parametrize("name", ["Region", "ID", "Probe 3 Ort", "x"])
+def test_words_that_part_the_rows_into_tests_that_begin_anew_are_specimens_too(tmp_path, name):
+    with pytest.raises(InputError, match="names several tests: 'cortex', 'corona', 'stem'"):
+        tq.read_experiment(written(tmp_path, name, ["cortex", "corona", "stem"]))
+
+
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [("Specimen", "AAA"), ("Cycle", "123"), ("cycle number", "123"), ("Step", "123"), ("Temperature", "123")],
+)
+def test_cycles_and_one_specimen_are_read_as_before(tmp_path, name, labels):
+    assert len(tq.read_experiment(written(tmp_path, name, labels))) == 60
+
+
+def test_phases_of_one_test_are_no_specimens(tmp_path):
+    stretch = np.concatenate([np.linspace(1, 1.3, 30), np.full(10, 1.3), np.linspace(1.3, 1, 30)])  # up, held, down
+    phases = ["Stretch"] * 30 + ["Hold"] * 10 + ["Recover"] * 30
+    rows = "\n".join(f"{p},{s:.5f},{neo_hookean(s):.6f}" for p, s in zip(phases, stretch, strict=True))
+    path = tmp_path / "test.csv"
+    path.write_text(f"Phase,stretch,stress [MPa]\n{rows}\n")
+    assert len(tq.read_experiment(path)) == 70
+
+
+def test_tension_and_compression_of_one_specimen_are_one_test(tmp_path):
+    stretch = np.concatenate([np.linspace(1, 1.3, 30), np.linspace(1, 0.7, 30)])
+    names = ["tension"] * 30 + ["compression"] * 30
+    rows = "\n".join(f"{n},{s:.5f},{neo_hookean(s):.6f}" for n, s in zip(names, stretch, strict=True))
+    path = tmp_path / "test.csv"
+    path.write_text(f"direction,stretch,stress [MPa]\n{rows}\n")
+    assert len(tq.read_experiment(path)) == 60
+
+
+@pytest.mark.parametrize("name", ["sample", "Sample no", "probe temperature", "specimen width [mm]"])
+def test_running_numbers_and_measured_values_are_no_specimens(tmp_path, name):
+    path = tmp_path / "test.csv"
+    path.write_text(f"{name},stretch,stress [kPa]\n" + "".join(f"{k},{1 + k / 100},{k}\n" for k in range(40)))
+    assert len(tq.read_experiment(path)) == 40
+
+
+def test_a_value_that_is_not_there_is_refused_with_those_that_are(tmp_path):
+    path = written(tmp_path, "Specimen", "ABC")
+    with pytest.raises(InputError, match=r"column 'Specimen': no row has 'D' there. There are 'A', 'B', 'C'"):
+        tq.read_experiment(path, only={"Specimen": "D"})
+    with pytest.raises(InputError, match="no column 'Speciman'"):
+        tq.read_experiment(path, only={"Speciman": "A"})
