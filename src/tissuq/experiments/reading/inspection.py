@@ -18,6 +18,7 @@ from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, 
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
+from tissuq.experiments.reading.slack import find_slack
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.units import stress_unit
 
@@ -42,8 +43,6 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
-SLACK_STRESS, SLACK_STRETCH = 0.01, 0.2
-"""Share of the largest stress that a slack specimen stays below, over what share of the range of stretches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,17 +278,29 @@ def _reference(reading: Reading, number: int) -> str:
 
 
 def _slack(reading: Reading, number: int) -> str:
-    course, size = reading.used.course, np.abs(reading.used.stress[number])
-    if any("the preload" in step for step in reading.used.steps):
+    used, mode = reading.used, reading.experiment.mode
+    if any("the preload" in step for step in used.steps):
         return ""
-    row = int(np.argmax(size > SLACK_STRESS * size.max()))
-    share = abs(float(course[row] - course[0])) / max(float(np.ptp(course)), 1e-12)
-    if share < SLACK_STRETCH:
+    loading = find_cycles(used.table, used.course)[0].rows("loading")
+    slack = find_slack(used.stretch[number][loading], used.stress[number][loading])
+    if slack is None:
         return ""
+    unit = stress_unit(reading.experiment.stress_unit)
+    if len(mode.stresses) == 1 or mode.machine_axes:
+        preload = f"{_rounded_up(slack.preload / unit.to_mpa):g} {unit.name}"
+        advice = f'to count from where it is taut give --preload "{preload}", which drops these rows.'
+    else:
+        advice = "count stretches in the file from where it is taut."
     return (
-        f"over the first {share:.0%} of the stretches there is less than {SLACK_STRESS:.0%} of the largest stress: a "
-        "soft toe, or slack; if the specimen hung slack, give --preload."
+        f"the first {slack.rows} rows carry no load that shows, up to {mode.controls[0].name} {slack.stretch:.4g}: "
+        f"slack, or a toe too soft to measure; {advice}"
     )
+
+
+def _rounded_up(value: float) -> float:
+    """Return a positive number with two digits that is not smaller."""
+    digit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(np.ceil(1.02 * value / digit) * digit)
 
 
 def _many(reading: Reading, number: int) -> str:
