@@ -22,8 +22,8 @@ OPTIONS: dict[str, Any] = {
     "column": Annotated[
         list[str] | None,
         typer.Option(
-            help="ROLE=COLUMN for stretch, strain or displacement, and stress or force, such as stretch=Strain; "
-            "repeat. Of a second axis or stress: stretch2 ... force2."
+            help="ROLE=COLUMN for stretch, strain, displacement or length, and stress or force, such as "
+            "stretch=Strain; repeat. Of a second axis or stress: stretch2 ... force2."
         ),
     ],
     "stress_unit": Annotated[
@@ -34,6 +34,10 @@ OPTIONS: dict[str, Any] = {
     "strain_unit": Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")],
     "force_unit": Annotated[str | None, typer.Option(help="Unit of a force column that states none, such as mN.")],
     "displacement_unit": Annotated[str | None, typer.Option(help="Unit of a displacement column that states none.")],
+    "zero": Annotated[
+        str | None,
+        typer.Option(help="Value from which displacements are counted ('35.2 mm'), or first: that of the first row."),
+    ],
     "length": Annotated[
         str | None, typer.Option(help="Undeformed length, such as '20 mm' [the file's]; in mode biaxial that along x.")
     ],

@@ -31,6 +31,7 @@ class ReadingSettings(BaseModel):
     strain_unit: str | None = None
     force_unit: str | None = None
     displacement_unit: str | None = None
+    zero: str | None = None
     dimensions: dict[str, str] = Field(default_factory=dict)
     only: dict[str, str | int] = Field(default_factory=dict)
     compression_positive: bool = False

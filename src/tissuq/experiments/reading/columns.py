@@ -15,7 +15,7 @@ from tissuq.experiments.reading.table import Table
 
 __all__ = ["DEFORMATIONS", "LOADS", "ColumnChoice", "about_stress", "choose_columns", "find_column"]
 
-DEFORMATIONS = ("stretch", "strain", "displacement", "shear")
+DEFORMATIONS = ("stretch", "strain", "displacement", "length", "shear")
 LOADS = ("stress", "force")
 
 
@@ -28,7 +28,7 @@ class ColumnChoice:
     deformation, stress : int
         The columns.
     measure : str
-        What the deformation is: stretch, strain, displacement or (amount of) shear.
+        What the deformation is: stretch, strain, displacement, (current) length or (amount of) shear.
     load : str
         What the other column holds: stress or force.
     """
@@ -54,8 +54,8 @@ def choose_columns(
         The table to choose from.
     mode : LoadingMode
     mapping : mapping or None
-        From a role (stretch, strain, displacement or shear; stress or force) to the name or the number, from 1, of a
-        column.
+        From a role (stretch, strain, displacement, length or shear; stress or force) to the name of a column, or its
+        number from 1.
     stress_type : str
         ``engineering`` or ``cauchy``: what a stress column may be called.
     axis : str or None
@@ -163,7 +163,7 @@ def _choice(
         measures = ["shear"] if is_shear else ["stretch", "strain"]
         role, what = ("shear", "amount of shear") if is_shear else ("stretch", "stretch, strain or displacement")
         if not is_shear and not _fitting(quantities, measures):
-            measures = ["displacement"]
+            measures = ["displacement"] if _fitting(quantities, ["displacement"]) else ["length"]
         deformation = _recognise(table, quantities, role, measures, stress_type, what)
         measure = next(name for name in measures if quantities[deformation] in role_names(name))
     if deformation == stress:
@@ -197,8 +197,8 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
     unknown = [role for role in mapping if role not in DEFORMATIONS + LOADS]
     if unknown:
         raise InputError(
-            f"{table.file}: a column cannot be given as '{unknown[0]}'. Give stretch, strain or displacement, and "
-            'stress or force, as in columns={"strain": "Strain"} or --column strain=Strain.'
+            f"{table.file}: a column cannot be given as '{unknown[0]}'. Give stretch, strain, displacement or length, "
+            'and stress or force, as in columns={"strain": "Strain"} or --column strain=Strain.'
         )
     for roles in (DEFORMATIONS, LOADS):
         chosen_roles = [role for role in roles if role in mapping]
@@ -321,7 +321,7 @@ def _check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnCho
         return
     for choice in choices:
         for column, content in ((choice.deformation, choice.measure), (choice.stress, choice.load)):
-            if content in ("displacement", "force"):
+            if content in ("displacement", "length", "force"):
                 raise InputError(
                     f"{table.place(column)} holds a {content}, and in loading mode '{mode.name}' columns are read as "
                     "stretch, strain or shear, and as stress. Convert it, and give its column as one of them."

@@ -38,6 +38,7 @@ class ReadingOptions(TypedDict, total=False):
     strain_unit: str | None
     force_unit: str | None
     displacement_unit: str | None
+    zero: str | None
     dimensions: Mapping[str, str] | None
     only: Mapping[str, str | int] | None
     compression_positive: bool
@@ -94,7 +95,8 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     mode : str or LoadingMode
         How the specimen was loaded; uniaxial unless given.
     columns : mapping, optional
-        From ``stretch``, ``strain``, ``displacement`` or ``shear`` (the amount of shear), and ``stress`` or ``force``,
+        From ``stretch``, ``strain``, ``displacement``, ``length`` (the current one, or the height) or ``shear`` (the
+        amount of shear), and ``stress`` or ``force``,
         to the name of a column or its number from 1. Columns with usual names (with a unit or not) need none. The
         second axis or stress of a loading mode that has two is ``stretch2`` ... ``force2``; columns with x and y in
         their names need none in the mode ``biaxial``.
@@ -108,6 +110,10 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
         ``%`` or ``1``, for a column of strains; without it the file's own, and 1 when it states none.
     force_unit, displacement_unit : str, optional
         Such as ``mN`` and ``um``, for columns of which the file states no unit.
+    zero : str, optional
+        From which value displacements are counted, such as ``35.2 mm``, or ``first`` for that of the first row: there
+        the specimen has its undeformed length. Without it from 0, or, where they begin far from it without load, from
+        the first row.
     dimensions : mapping, optional
         Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
         Without it those in the lines above the table. Only displacements and forces need them. In the mode
@@ -241,7 +247,7 @@ def _measured(
     labels, columns = tuple(choices), list(choices.values())
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
-    units = options.get("strain_unit"), options.get("displacement_unit")
+    units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
     stress_type, stress_unit = options.get("stress_type", "engineering"), options.get("stress_unit")
     stretches, loads, stretch_steps = [], [], []
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):

@@ -34,11 +34,16 @@ ROLES = {
     "shear": _names("shear, amount of shear, shear strain, gamma, γ"),
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
-        "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg"
+        "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
+        "axial position, crosshead position, stroke"
+    ),
+    "length": _names(
+        "gap, gap width, gap height, height, sample height, specimen height, current length, current height, spalt, "
+        "spaltweite, höhe, probenhöhe"
     ),
     "force": _names(
         "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
-        "kraft, standardkraft, prüfkraft, druckkraft"
+        "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft"
     ),
 }
 """Names of columns by their role, as :func:`plain` writes them; those of stresses depend on the kind of stress."""

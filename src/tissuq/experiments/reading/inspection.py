@@ -18,6 +18,7 @@ from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, 
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
+from tissuq.experiments.reading.positions import ZERO_ASSUMED
 from tissuq.experiments.reading.slack import find_slack
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.units import stress_unit
@@ -214,6 +215,18 @@ def _strain_unit_assumed(reading: Reading, number: int) -> str:
     )
 
 
+def _zero_assumed(reading: Reading, number: int) -> str:
+    if ZERO_ASSUMED not in reading.experiment.source:
+        return ""
+    table, column = reading.table, reading.choices[number].deformation
+    name = table.names[column] or str(column + 1)
+    return (
+        f"column {table.label(column)} does not begin at 0, where there is no load: it was taken for positions, and "
+        f"counted from its first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it "
+        f"holds the length or height of the specimen, --column 'length={name}'."
+    )
+
+
 def _size(reading: Reading, number: int) -> str:
     largest, low, high = float(np.abs(reading.used.stress[number]).max()), *PLAUSIBLE_STRESS
     if low <= largest <= high:
@@ -264,9 +277,7 @@ def _reference(reading: Reading, number: int) -> str:
     nearest = int(np.argmin(change))
     gap, furthest = float(change[nearest]), float(change.max())
     if gap > NOTABLE_SHARE * furthest:
-        position = " If the file gives positions, not displacements, --preload sets their zero."
-        begin = f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
-        return begin + position * (reading.choices[number].measure == "displacement")
+        return f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
     at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
     if abs(at_reference) <= NOTABLE_SHARE * largest:
         return ""
@@ -334,6 +345,7 @@ def _other_axis(reading: Reading, number: int) -> str:
 CHECKS: tuple[Callable[[Reading, int], str], ...] = (
     _unit_assumed,
     _strain_unit_assumed,
+    _zero_assumed,
     _size,
     _stretch_size,
     _cycles,

@@ -9,11 +9,12 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.reading import units
 from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.dimensions import Dimensions, initial_size
+from tissuq.experiments.reading.dimensions import Dimension, Dimensions, initial_size
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
+from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_lengths, check_positions
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.units import FORCE, LENGTH, Quantity
+from tissuq.experiments.reading.units import FORCE, LENGTH, Quantity, number_and_unit
 
 __all__ = ["Load", "stress_of", "stretch_of"]
 
@@ -44,8 +45,9 @@ def stretch_of(
     dimensions: Dimensions,
     strain_unit: str | None,
     displacement_unit: str | None,
+    zero: str | None,
 ) -> tuple[Column, str]:
-    """Return the stretches and how they were obtained.
+    """Return the stretches and how they were obtained; `zero` is where displacements are counted from.
 
     Raises
     ------
@@ -53,7 +55,14 @@ def stretch_of(
         When units contradict each other or are missing, or the length of the specimen is not known.
     """
     if choice.measure == "displacement":
-        return _from_displacement(table, choice, values, dimensions, displacement_unit)
+        return _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
+    if zero is not None:
+        raise InputError(
+            f"{table.place(choice.deformation)} is read as {choice.measure}, but zero='{zero}' is given, which is for "
+            "displacements. Leave zero (--zero) out, or give the column as displacement."
+        )
+    if choice.measure == "length":
+        return _from_length(table, choice, values, dimensions, displacement_unit)
     _refuse(table, choice, "displacement_unit", displacement_unit)
     if "length" in dimensions.set_by_user:
         raise InputError(
@@ -119,14 +128,50 @@ def stress_of(
 
 
 def _from_displacement(
-    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
+    table: Table,
+    choice: ColumnChoice,
+    values: Column,
+    load: Column,
+    dimensions: Dimensions,
+    unit: str | None,
+    zero: str | None,
 ) -> tuple[Column, str]:
     factor, unit_source = _factor(table, choice.deformation, LENGTH, "displacement_unit", unit)
     in_column = initial_size(table, choice, values) if "length" not in dimensions.sizes else None
     length = in_column or dimensions.length
+    displacement, label = values * factor, table.label(choice.deformation)
+    start, counted = 0.0, ""
+    if zero is not None:
+        start = float(displacement[0]) if zero == FIRST_ROW else _zero(zero)
+        counted = f", counted from {start:g} mm ({'its first row' if zero == FIRST_ROW else 'as given'})"
+    elif in_column is None and check_positions(table, choice, displacement, load, length.value):
+        start = float(displacement[0])
+        counted = f", counted from {start:g} mm {ZERO_ASSUMED}"
+    source = f"column {label} in {unit_source}{counted} / {length.value:g} mm (length {length.source})"
+    return 1 + (displacement - start) / length.value, f"stretch = 1 + {source}"
+
+
+def _from_length(
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
+) -> tuple[Column, str]:
+    """Return current lengths or heights over the undeformed one, or that of the first row, and how that was done."""
+    factor, unit_source = _factor(table, choice.deformation, LENGTH, "displacement_unit", unit)
+    current = values * factor
+    length = dimensions.length if "length" in dimensions.sizes else Dimension(float(current[0]), "in its first row")
+    check_lengths(table, choice, current)
     label = table.label(choice.deformation)
-    source = f"stretch = 1 + column {label} in {unit_source} / {length.value:g} mm (length {length.source})"
-    return 1 + values * factor / length.value, source
+    return (
+        current / length.value,
+        f"stretch = column {label} in {unit_source} / {length.value:g} mm (length {length.source})",
+    )
+
+
+def _zero(text: str) -> float:
+    """Return the position from which displacements are counted, mm."""
+    number, unit = number_and_unit(text)
+    if number is None or not unit:
+        raise InputError(f"zero must be 'first', or a position with its unit such as '35.2 mm', not '{text}'.")
+    return number * LENGTH.factor(unit)
 
 
 def _declared_unit(table: Table, column: int) -> str:

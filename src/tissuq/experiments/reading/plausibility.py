@@ -60,12 +60,13 @@ def with_compression_negative(
         _check_names(measured, choices)
         return measured
     strain = measured.stretch - 1
-    if choice.measure == "stretch" and (strain >= 0).all():
+    says_direction = choice.measure in ("stretch", "length")
+    if says_direction and (strain >= 0).all():
         raise InputError(
             f"{measured.table.place(choice.deformation)}: compression_positive=True (--compression-positive) is given, "
             "but no stretch is below 1, so nothing would change; a stretch below 1 is compression. Leave it out."
         )
-    if choice.measure != "stretch" and strain.min() > -NEGLIGIBLE_STRAIN * strain.max():
+    if not says_direction and strain.min() > -NEGLIGIBLE_STRAIN * strain.max():
         is_positive = float((measured.stress * strain).sum()) > 0
         stress = -measured.stress if is_positive else measured.stress
         what = f"signs of {choice.measure} and {choice.load}" if is_positive else f"sign of {choice.measure}"

@@ -1,0 +1,68 @@
+"""Columns of positions or lengths where displacements are expected: told by where they begin, and by the load there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.table import Column, Table
+
+__all__ = ["FIRST_ROW", "ZERO_ASSUMED", "check_lengths", "check_positions"]
+
+FIRST_ROW = "first"
+"""What is given for a zero at the first row."""
+ZERO_ASSUMED = "(its first row, assumed: there is no load)"
+OFFSET = 0.05
+"""Share of their range by which displacements may begin away from 0."""
+LITTLE_LOAD = 0.1
+"""Share of the largest load up to which a specimen may be undeformed."""
+LEAST_CHANGE = 1e-3
+"""Relative change of the length of a specimen in a test of tension or compression."""
+
+
+def check_positions(table: Table, choice: ColumnChoice, displacement: Column, load: Column, length: float) -> bool:
+    """Return whether displacements (mm) are positions, to be counted from their first row.
+
+    They are where the first row is far from 0 and carries little load. Displacements carry little load at 0.
+
+    Raises
+    ------
+    InputError
+        When neither does, so that nothing shows where to count from.
+    """
+    span = float(np.ptp(displacement))
+    if abs(displacement[0]) <= OFFSET * span or not span:
+        return False
+    size = np.abs(load) / max(float(np.abs(load).max()), np.finfo(float).tiny)
+    if size[0] <= LITTLE_LOAD:
+        return True
+    nearest = int(np.argmin(np.abs(displacement)))
+    if abs(displacement[nearest]) <= OFFSET * span and size[nearest] <= LITTLE_LOAD:
+        return False
+    name = table.names[choice.deformation] or str(choice.deformation + 1)
+    first, ends = float(displacement[0]), np.array([displacement.min(), displacement.max()]) / length
+    from_first, from_zero, of_length = (
+        f"(stretch {low:.4g} to {high:.4g})" for low, high in (ends + 1 - first / length, ends + 1, ends)
+    )
+    raise InputError(
+        f"{table.place(choice.deformation, 0)}: begins at {first:g} mm with {size[0]:.0%} of the largest load, so that "
+        f"nothing shows where the specimen is undeformed. If it is there, give --zero first {from_first}; if at 0, "
+        f"--zero '0 mm' {from_zero}; if the column holds the length or height of the specimen, --column "
+        f"'length={name}' {of_length}."
+    )
+
+
+def check_lengths(table: Table, choice: ColumnChoice, length: Column) -> None:
+    """Refuse current lengths that are not positive, or do not change."""
+    row = int(np.argmin(length))
+    if length[row] <= 0:
+        raise InputError(
+            f"{table.place(choice.deformation, row)}: a specimen cannot be {length[row]:g} mm long. If these are "
+            "displacements, give the column so: --column displacement=NAME."
+        )
+    if np.ptp(length) < LEAST_CHANGE * length.max():
+        raise InputError(
+            f"{table.place(choice.deformation)}: the specimen stays {length[0]:g} mm long, so this is no test of "
+            "tension or compression. Give the columns of the deformation and of its load, and --mode."
+        )

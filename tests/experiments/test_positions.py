@@ -1,0 +1,130 @@
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import neo_hookean
+from tissuq.errors import InputError
+
+LENGTH, AREA = 20.0, 10.0
+SPECIMEN = {"length": "20 mm", "area": "10 mm2"}
+
+
+def written(folder, stretch, start, name="Displacement (mm)", unit=1.0, sign=1.0, noise=0.0, load="Load (N)", seed=0):
+    """A test whose column of displacements begins at a position (mm)."""
+    force = AREA * neo_hookean(stretch)
+    force = force + noise * np.abs(force).max() * np.random.default_rng(seed).standard_normal(len(force))
+    position = (start + LENGTH * (stretch - 1)) / unit
+    path = folder / "test.csv"
+    rows = "".join(f"{p:.6f},{sign * f:.7f}\n" for p, f in zip(position, force, strict=True))
+    path.write_text(f"{name},{load}\n{rows}")
+    return path
+
+
+def ramp(top, rows=60, unloads=False):
+    up = np.linspace(1, top, rows)
+    return np.concatenate([up, up[-2::-1]]) if unloads else up
+
+
+@pytest.mark.parametrize("name", ["Displacement (mm)", "Position (mm)", "Stroke (mm)"])
+@pytest.mark.parametrize("start", [35.2, -5.0, 0.5, 120.0, -60.0, 20.0])
+@pytest.mark.parametrize("top", [1.3, 0.7])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_positions_are_counted_from_their_first_row_with_a_note(tmp_path, name, start, top, noise):
+    stretch = ramp(top, unloads=start > 0)
+    inspection = tq.inspect(written(tmp_path, stretch, start, name, noise=noise), dimensions=SPECIMEN)
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
+    assert any("does not begin at 0, where there is no load" in note for note in inspection.warnings)
+
+
+@pytest.mark.parametrize("zero", ["first", "35.2 mm", "3.52 cm"])
+def test_the_zero_is_said_and_then_raises_no_note(tmp_path, zero):
+    path = written(tmp_path, ramp(1.3), 35.2)
+    inspection = tq.inspect(path, dimensions=SPECIMEN, zero=zero)
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, ramp(1.3), atol=1e-6)
+    assert not inspection.warnings
+    assert "counted from 35.2 mm" in inspection.reading.experiment.source
+
+
+def test_displacements_of_a_specimen_stretched_before_are_read_so_when_said(tmp_path):
+    data = tq.read_experiment(written(tmp_path, ramp(1.3), 2.0), dimensions=SPECIMEN, zero="0 mm")
+    np.testing.assert_allclose(data.stretch, ramp(1.3) + 0.1, atol=1e-6)
+
+
+def test_a_start_away_from_0_under_load_is_asked_about_with_every_answer(tmp_path):
+    stretch = ramp(1.3)[20:]
+    path = written(tmp_path, stretch, 35.2 - 3)
+    with pytest.raises(InputError) as caught:
+        tq.read_experiment(path, dimensions=SPECIMEN)
+    text = str(caught.value)
+    for words in (
+        "--zero first (stretch 1 to 1.198)",
+        "--zero '0 mm' (stretch 2.",
+        "--column 'length=Displacement (mm)'",
+    ):
+        assert words in text
+    data = tq.read_experiment(path, dimensions=SPECIMEN, zero="32.2 mm")
+    np.testing.assert_allclose(data.stretch, stretch, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("kind", ["tension", "compression", "both", "both from one end", "unloading", "taut at once"])
+def test_displacements_are_read_as_before(tmp_path, kind, noise, seed):
+    stretch = {
+        "tension": ramp(1.3),
+        "compression": ramp(0.6),
+        "both": np.concatenate([ramp(1.2, unloads=True), ramp(0.8, unloads=True)]),
+        "both from one end": np.linspace(0.8, 1.2, 80),
+        "unloading": ramp(1.4)[::-1],
+        "taut at once": ramp(1.5)[1:],
+    }[kind]
+    inspection = tq.inspect(written(tmp_path, stretch, 0.0, noise=noise, seed=seed), dimensions=SPECIMEN)
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
+    assert not any("begin at 0" in note for note in inspection.warnings)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Gap (um)", 1e-3), ("Height [mm]", 1.0), ("Sample height / mm", 1.0)])
+@pytest.mark.parametrize("start", [10.2, 20.0])
+def test_heights_are_read_over_that_of_the_first_row(tmp_path, name, unit, start):
+    height = np.linspace(start, start / 2, 60)
+    path = tmp_path / "test.csv"
+    force = -AREA * neo_hookean(height / start)
+    path.write_text(
+        f"{name},Normal force (N)\n" + "".join(f"{h / unit:.5f},{f:.7f}\n" for h, f in zip(height, force, strict=True))
+    )
+    with pytest.raises(InputError, match="--compression-positive"):
+        tq.read_experiment(path, dimensions={"area": "10 mm2"})
+    data = tq.read_experiment(path, dimensions={"area": "10 mm2"}, compression_positive=True)
+    np.testing.assert_allclose(data.stretch, height / start, atol=1e-6)
+    np.testing.assert_allclose(data.stress, neo_hookean(height / start), atol=1e-6)
+    dimensions = {"area": "10 mm2", "length": f"{start} mm"}
+    same = tq.read_experiment(path, dimensions=dimensions, compression_positive=True)
+    np.testing.assert_allclose(same.stretch, data.stretch, rtol=1e-9)
+    as_positions = tq.read_experiment(
+        path, columns={"displacement": 1}, dimensions=dimensions, compression_positive=True
+    )
+    np.testing.assert_allclose(as_positions.stretch, data.stretch, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [("10.2,1\n10.2,2\n", "stays 10.2 mm long"), ("10.2,1\n-5,2\n", "cannot be -5 mm long")],
+)
+def test_what_cannot_be_a_height_is_refused(tmp_path, rows, words):
+    path = tmp_path / "test.csv"
+    path.write_text("Gap (mm),Normal force (N)\n" + rows)
+    with pytest.raises(InputError, match=words):
+        tq.read_experiment(path, dimensions={"area": "10 mm2"})
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"zero": "35.2"}, "zero must be 'first', or a position with its unit"),
+        ({"zero": "1 N"}, "'N' is not a unit of length"),
+        ({"zero": "first", "columns": {"length": 1}}, "read as length, but zero='first' is given"),
+    ],
+)
+def test_a_zero_that_cannot_be_meant_is_refused(tmp_path, options, words):
+    with pytest.raises(InputError, match=words):
+        tq.read_experiment(written(tmp_path, ramp(1.3), 35.2), dimensions=SPECIMEN, **options)
