@@ -138,3 +138,18 @@ def test_one_specimen_of_a_table_is_read_as_the_refusal_says(cli, here):
     assert said.status == 0
     assert "0 to 18 kPa" in said.out
     assert cli("inspect", "all.csv", "--only", "Specimen").status == 2
+
+
+def test_positions_and_a_rupture_are_read_by_options(cli, here):
+    force = [*(0.1 * k for k in range(20)), *[0.01] * 5]
+    rows = [f"{30 + 0.2 * k},{load}" for k, load in enumerate(force)]
+    (here / "torn.csv").write_text("\n".join(["Position (mm),Load (N)", *rows]) + "\n")
+    options = ["--length", "10 mm", "--area", "5 mm2"]
+    said = cli("inspect", "torn.csv", *options)
+    assert (said.status, said.err) == (0, "")
+    text = " ".join(said.out.split())
+    assert "--zero first" in text
+    assert "--until-peak" in text
+    said = cli("inspect", "torn.csv", *options, "--zero", "first", "--until-peak")
+    assert "stretch   1 to 1.38" in said.out
+    assert "Note" not in said.out

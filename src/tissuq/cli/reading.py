@@ -59,6 +59,9 @@ OPTIONS: dict[str, Any] = {
     "preload": Annotated[
         str | None, typer.Option(help="Force or stress at which the specimen is taut ('0.05 N'): stretch 1 is there.")
     ],
+    "until_peak": Annotated[
+        bool | None, typer.Option("--until-peak", help="Leave out the rows after the largest stress.")
+    ],
     "every": Annotated[int | None, typer.Option(help="Use only every N-th row [1].")],
     "axis": Annotated[str | None, typer.Option(help="x or y: the only axis to read from a biaxial machine's file.")],
     "sheet": Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")],

@@ -38,6 +38,7 @@ class ReadingSettings(BaseModel):
     cycle: str | int | None = None
     branch: str | None = None
     preload: str | None = None
+    until_peak: bool = False
     every: int = Field(1, ge=1)
     axis: str | None = None
     sheet: str | int | None = None

@@ -14,7 +14,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.inspection import data_warnings
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.several_files import find_mode, find_tests, read_column
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named

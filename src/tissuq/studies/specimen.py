@@ -15,7 +15,7 @@ from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.inspection import data_warnings
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import (

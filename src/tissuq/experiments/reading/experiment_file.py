@@ -45,6 +45,7 @@ class ReadingOptions(TypedDict, total=False):
     cycle: str | int | None
     branch: str | None
     preload: str | None
+    until_peak: bool
     every: int
     axis: str | None
     sheet: str | int | None
@@ -132,6 +133,8 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     preload : str, optional
         Force or stress with its unit (``0.05 N``, ``1 kPa``) at which the specimen counts as taut: stretches are
         counted from there, and rows that carry less are dropped.
+    until_peak : bool
+        Leave out the rows after the largest stress of those that are left: rupture, relaxation, unloading.
     every : int
         Use only every second (2), third (3) ... of these rows.
     axis : str, optional
@@ -188,6 +191,8 @@ def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[Read
     if (preload := options.get("preload")) is not None:
         thresholds = [preload_stress(preload, load.area) for load in loads]
         used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak)
+    if options.get("until_peak"):
+        used = used.until_peak()
     check_stretches(used, choices)
     if stress_type == "cauchy" and choices[0].measure != "shear":
         recorded, used = _from_cauchy(mode, recorded), _from_cauchy(mode, used)

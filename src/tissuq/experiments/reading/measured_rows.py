@@ -86,6 +86,13 @@ class MeasuredRows:
         counts = (count,) * len(self.labels)
         return replace(self.taken(rows), dropped=(*self.dropped, Dropped(counts, reason)))
 
+    def until_peak(self) -> MeasuredRows:
+        """Return the rows up to the largest stress; of several, to where they are largest together."""
+        size = np.abs(self.stress)
+        peak = int(np.argmax((size / np.maximum(size.max(axis=1, keepdims=True), np.finfo(float).tiny)).sum(axis=0)))
+        kept = self.kept(np.arange(peak + 1), "after the largest stress")
+        return kept.with_step(f"only rows up to the largest stress, in line {self.table.lines[peak]}")
+
     def taut(self, preload: str, thresholds: Sequence[float], peak: int) -> MeasuredRows:
         """Return the rows in which every axis carries the preload, with stretches counted from where it first does.
 

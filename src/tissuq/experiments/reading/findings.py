@@ -1,0 +1,242 @@
+"""What is strange about the measurements of a file, a check each, with what is proposed and the option that does it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import chain
+
+import numpy as np
+
+from tissuq.experiments.modes import Uniaxial
+from tissuq.experiments.modes.mode import STRETCH
+from tissuq.experiments.reading.cycles import find_cycles
+from tissuq.experiments.reading.events import find_holds, find_rupture
+from tissuq.experiments.reading.experiment_file import Reading
+from tissuq.experiments.reading.headings import ROLES, heading, on_axis
+from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
+from tissuq.experiments.reading.positions import ZERO_ASSUMED
+from tissuq.experiments.reading.slack import find_slack
+from tissuq.experiments.reading.units import stress_unit
+
+__all__ = ["DOUBTFUL_UNIT", "data_warnings"]
+
+DOUBTFUL_UNIT = "check the unit:"
+"""How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000."""
+MANY_ROWS = 10_000
+"""Rows from which thinning is worth a word."""
+MIN_ROWS_PER_CYCLE = 10
+"""Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
+NOTABLE_SHARE = 0.05
+"""Share of the largest stress, or of the range of stretches, that is worth a word."""
+PLAUSIBLE_STRESS = (1e-6, 1e3)
+"""Largest stresses, MPa, between which units are hardly mistaken."""
+LARGE_STRETCH = 10.0
+"""Stretch beyond which lengths are likely mistaken."""
+
+
+def data_warnings(reading: Reading) -> tuple[str, ...]:
+    """Return what a person should look at before a fit, of each stress."""
+    labels = reading.used.labels
+    texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
+    found = [*reading.warnings, *filter(None, chain.from_iterable(texts))]
+    return tuple(sorted(found, key=lambda text: DOUBTFUL_UNIT not in text))
+
+
+def _unit_assumed(reading: Reading, number: int) -> str:
+    if "MPa (assumed" not in reading.experiment.source:
+        return ""
+    return (
+        f"{DOUBTFUL_UNIT} the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit kPa, "
+        "or --stress-unit MPa."
+    )
+
+
+def _strain_unit_assumed(reading: Reading, number: int) -> str:
+    if RATIO_ASSUMED not in reading.experiment.source:
+        return ""
+    largest = float(np.abs(reading.used.stretch[number] - 1).max())
+    return (
+        f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which it "
+        "is: --strain-unit % or --strain-unit 1."
+    )
+
+
+def _zero_assumed(reading: Reading, number: int) -> str:
+    if ZERO_ASSUMED not in reading.experiment.source:
+        return ""
+    table, column = reading.table, reading.choices[number].deformation
+    name = table.names[column] or str(column + 1)
+    return (
+        f"column {table.label(column)} does not begin at 0, where there is no load: it was taken for positions, and "
+        f"counted from its first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it "
+        f"holds the length or height of the specimen, --column 'length={name}'."
+    )
+
+
+def _size(reading: Reading, number: int) -> str:
+    largest, low, high = float(np.abs(reading.used.stress[number]).max()), *PLAUSIBLE_STRESS
+    if low <= largest <= high:
+        return ""
+    return f"the largest stress is {largest:.3g} MPa: check the units of force and area, or of stress."
+
+
+def _stretch_size(reading: Reading, number: int) -> str:
+    largest = float(reading.used.stretch[number].max())
+    if largest <= LARGE_STRETCH:
+        return ""
+    return f"the largest stretch is {largest:.4g}: check the length of the specimen and the unit of the displacement."
+
+
+def _cycles(reading: Reading, number: int) -> str:
+    count = len(find_cycles(reading.used.table, reading.used.course))
+    if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count:
+        return ""
+    return f"all {count} cycles are used; to fit one, give --cycle last, first or a number."
+
+
+def _rupture(reading: Reading, number: int) -> str:
+    used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
+    controls = reading.experiment.mode.controls
+    control = controls[0] if len(controls) == 1 else STRETCH
+    for cycle in find_cycles(used.table, course):
+        rows = cycle.rows("loading")
+        if rupture := find_rupture(course[rows], stress[rows], control.reference):
+            row = rows[rupture.start - 1]
+            where = f"after line {used.table.lines[row]} ({control.name} {course[row]:.4g})"
+            return (
+                f"{where} the stress falls by {rupture.fall:.0%} of the largest while the test goes on: the specimen "
+                "tore, or slipped. To leave out what follows the largest stress give --until-peak."
+            )
+    return ""
+
+
+def _holds(reading: Reading, number: int) -> str:
+    used, stress = reading.used, reading.used.stress[number]
+    holds = find_holds(used.course, stress)
+    if not holds or _rupture(reading, number):
+        return ""
+    lines, peak = used.table.lines, int(np.argmax(np.abs(stress)))
+    where = " and ".join(f"{lines[hold.start]} to {lines[hold.stop - 1]}" for hold in holds[:3])
+    more = f" and {len(holds) - 3} more" if len(holds) > 3 else ""
+    is_before_peak = any(hold.stop <= peak for hold in holds)
+    advice = "to leave out what follows the largest stress give --until-peak."
+    advice = "delete these rows." if is_before_peak else advice
+    return (
+        f"in lines {where}{more} the stretch rests while the stress falls by up to "
+        f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; {advice}"
+    )
+
+
+def _hysteresis(reading: Reading, number: int) -> str:
+    if _rupture(reading, number) or _holds(reading, number):
+        return ""
+    used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
+    cycle = find_cycles(used.table, course)[-1]
+    branches = [cycle.rows("loading"), cycle.rows("unloading")]
+    if min(map(len, branches)) < MIN_ROWS_PER_CYCLE / 2:
+        return ""
+    ordered = [rows[np.argsort(course[rows])] for rows in branches]
+    low = max(course[rows[0]] for rows in ordered)
+    high = min(course[rows[-1]] for rows in ordered)
+    grid = np.linspace(low, high, 50)
+    loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
+    share = float(np.abs(loading - unloading).max() / np.abs(stress).max())
+    if share < NOTABLE_SHARE:
+        return ""
+    return (
+        f"loading and unloading differ by up to {share:.0%} of the largest stress, and an elastic material has one "
+        "curve; to fit one of them, give --branch loading or unloading."
+    )
+
+
+def _reference(reading: Reading, number: int) -> str:
+    stretch, stress = reading.used.stretch[number], reading.used.stress[number]
+    unit = stress_unit(reading.experiment.stress_unit)
+    mode, points = reading.experiment.mode, reading.experiment.stretch
+    control = mode.controls[0] if len(mode.controls) == 1 else STRETCH
+    change = np.abs((points - mode.reference).reshape(len(stress), -1)).max(axis=1)
+    nearest = int(np.argmin(change))
+    gap, furthest = float(change[nearest]), float(change.max())
+    if gap > NOTABLE_SHARE * furthest:
+        return f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
+    at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
+    if abs(at_reference) <= NOTABLE_SHARE * largest:
+        return ""
+    return (
+        f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
+        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell. "
+        f"A hyperelastic material has no stress at {control.name} {control.reference:g}."
+    )
+
+
+def _slack(reading: Reading, number: int) -> str:
+    used, mode = reading.used, reading.experiment.mode
+    if any("the preload" in step for step in used.steps):
+        return ""
+    loading = find_cycles(used.table, used.course)[0].rows("loading")
+    loading = loading[: int(np.argmax(np.abs(used.stress[number][loading]))) + 1]
+    slack = find_slack(used.stretch[number][loading], used.stress[number][loading])
+    if slack is None:
+        return ""
+    unit = stress_unit(reading.experiment.stress_unit)
+    if len(mode.stresses) == 1 or mode.machine_axes:
+        preload = f"{_rounded_up(slack.preload / unit.to_mpa):g} {unit.name}"
+        advice = f'to count from where it is taut give --preload "{preload}", which drops these rows.'
+    else:
+        advice = "count stretches in the file from where it is taut."
+    return (
+        f"the first {slack.rows} rows carry no load that shows, up to {mode.controls[0].name} {slack.stretch:.4g}: "
+        f"slack, or a toe too soft to measure; {advice}"
+    )
+
+
+def _rounded_up(value: float) -> float:
+    """Return a positive number with two digits that is not smaller."""
+    digit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(np.ceil(1.02 * value / digit) * digit)
+
+
+def _many(reading: Reading, number: int) -> str:
+    count = len(reading.used)
+    if count < MANY_ROWS:
+        return ""
+    return f"all {count} rows would be fitted; --every {count // 1000} would leave about a thousand."
+
+
+def _other_axis(reading: Reading, number: int) -> str:
+    """Return a sentence about a biaxial test that is read as uniaxial."""
+    table = reading.table
+    choice = reading.choices[number]
+    axis, _ = on_axis(heading(table.names[choice.deformation]).quantity)
+    if not axis or not isinstance(reading.experiment.mode, Uniaxial):
+        return ""
+    names = [on_axis(heading(name).quantity) for name in table.names]
+    is_across = [name_axis not in ("", axis) and name in ROLES["force"] for name_axis, name in names]
+    if not any(is_across):
+        return ""
+    column = is_across.index(True)
+    along, across = (float(np.abs(numbers).max()) for numbers in table.numbers([choice.stress, column]))
+    if across < NOTABLE_SHARE * along:
+        return ""
+    return (
+        f"column {table.label(column)} carries force, too, so the test is not uniaxial: give --mode biaxial to read "
+        "both axes, or equibiaxial with one of them if both were stretched alike."
+    )
+
+
+CHECKS: tuple[Callable[[Reading, int], str], ...] = (
+    _unit_assumed,
+    _strain_unit_assumed,
+    _zero_assumed,
+    _size,
+    _stretch_size,
+    _cycles,
+    _rupture,
+    _holds,
+    _hysteresis,
+    _reference,
+    _slack,
+    _many,
+    _other_axis,
+)

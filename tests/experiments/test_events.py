@@ -1,0 +1,152 @@
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import neo_hookean
+from tissuq.experiments import datasets
+from tissuq.experiments.reading.events import find_holds, find_rupture
+
+LAWS = {
+    "neo-hookean": lambda share: 1.4 * share - (1.4 * share) ** 2 / 3,
+    "straight": lambda share: share,
+    "softening": lambda share: -np.expm1(-3 * share),
+    "stiffening": lambda share: np.expm1(5 * share),
+}
+
+
+def loading(random, law):
+    """A branch of loading in tension or compression with noise up to 1 %: stretches, stresses, standard deviation."""
+    share = np.linspace(0, 1, int(random.choice([40, 100, 200, 1000])))
+    sign, noise = random.choice([1, -1]), random.choice([0, 1e-3, 1e-2])
+    stress = LAWS[law](share) / LAWS[law](1.0)
+    stretch = 1 + sign * random.uniform(0.1, 0.45) * share
+    return stretch, sign * (stress + noise * random.standard_normal(len(share))), noise
+
+
+def torn(random, law):
+    """Loading, at whose end the specimen tears at once, slowly, or by a half."""
+    stretch, stress, noise = loading(random, law)
+    count = max(4, int(len(stretch) * random.uniform(0.05, 0.4)))
+    further = stretch[-1] + (stretch[1] - stretch[0]) * np.arange(1, count + 1)
+    left = {"at once": 0.02, "slowly": 0.1, "by a half": 0.5}[how := random.choice(["at once", "slowly", "by a half"])]
+    course = np.clip(np.arange(1, count + 1) / (count / 2 if how == "slowly" else 1), 0, 1)
+    after = stress[-1] * (1 - (1 - left) * course) + noise * random.standard_normal(count)
+    return np.concatenate([stretch, further]), np.concatenate([stress, after])
+
+
+def held(random, law, then_back):
+    """Loading, a hold in which the stress relaxes by 12 to 50 %, and perhaps the way back."""
+    stretch, stress, noise = loading(random, law)
+    count, loss = max(12, int(len(stretch) * random.uniform(0.2, 2))), random.uniform(0.12, 0.5)
+    rest = stretch[-1] + random.choice([0, 1e-3]) * np.ptp(stretch) * random.standard_normal(count)
+    relaxing = stress[-1] * (1 - loss * -np.expm1(-np.linspace(0, 5, count)))
+    relaxing = relaxing + noise * random.standard_normal(count)
+    back = slice(-2, None if then_back else -2, -1)
+    return np.concatenate([stretch, rest, stretch[back]]), np.concatenate([stress, relaxing, (1 - loss) * stress[back]])
+
+
+def returning(random, law):
+    """Triangles or waves with hysteresis, or a branch alone."""
+    stretch, stress, _ = loading(random, law)
+    how = random.choice(["branch", "triangles", "waves"])
+    if how == "triangles":
+        stretch, stress = (np.tile(np.concatenate([v, w * v[-2:0:-1]]), 2) for v, w in ((stretch, 1), (stress, 0.8)))
+    if how == "waves":
+        phase = np.linspace(0, 2 * np.pi * random.integers(1, 5), 400)
+        stretch = 1.2 - 0.2 * np.cos(phase)
+        stress = LAWS[law]((stretch - 1) / 0.4) / LAWS[law](1.0) + 0.05 * np.sin(phase)
+    return stretch, stress
+
+
+def test_rupture_is_found_in_95_of_100_planted_cases():
+    """All of 600 are found."""
+    random = np.random.default_rng(1)
+    assert np.mean([find_rupture(*torn(random, law)) is not None for law in list(LAWS) * 50]) >= 0.95
+
+
+def test_holds_are_found_in_95_of_100_planted_cases():
+    """Of 600 with relaxation by 10 to 50 % 99 % are found."""
+    random = np.random.default_rng(2)
+    planted = [held(random, law, then_back) for law in list(LAWS) * 25 for then_back in (False, True)]
+    assert np.mean([bool(find_holds(*curve)) for curve in planted]) >= 0.95
+
+
+def test_clean_curves_raise_no_more_than_5_of_100_false_alarms():
+    random = np.random.default_rng(3)
+    curves = [returning(random, law) for law in list(LAWS) * 50]
+    branches = [loading(random, law)[:2] for law in list(LAWS) * 50]
+    assert np.mean([bool(find_holds(*curve)) for curve in curves]) <= 0.05
+    assert np.mean([find_rupture(*branch) is not None for branch in branches]) <= 0.05
+
+
+@pytest.mark.parametrize("name", datasets.names())
+def test_the_data_sets_show_neither(name):
+    notes = tq.inspect(datasets.path(name), mode=datasets.load(name).mode).warnings
+    assert not any("--until-peak" in note or "relaxes" in note for note in notes)
+
+
+def test_a_single_outlier_is_no_rupture():
+    stretch = np.linspace(1, 1.4, 50)
+    stress = neo_hookean(stretch)
+    stress[30] = 0.0
+    assert find_rupture(stretch, stress) is None
+
+
+@pytest.fixture
+def inspected(tmp_path):
+    def inspect(stretch, stress, **options):
+        path = tmp_path / "test.csv"
+        rows = "".join(f"{a:.6f},{b:.6f}\n" for a, b in zip(stretch, stress, strict=True))
+        path.write_text("stretch,stress [MPa]\n" + rows)
+        return tq.inspect(path, **options)
+
+    return inspect
+
+
+def up(rows=60, top=1.4):
+    stretch = np.linspace(1, top, rows)
+    return stretch, neo_hookean(stretch)
+
+
+def test_a_rupture_is_said_and_the_advice_leaves_it_out(inspected):
+    (stretch, stress), more = up(), np.linspace(1.41, 1.6, 20)
+    curve = np.concatenate([stretch, more]), np.concatenate([stress, np.full(20, 0.001)])
+    (note,) = inspected(*curve).warnings
+    assert note.startswith("after line 61 (stretch 1.4) the stress falls by 97% of the largest while the test goes on")
+    assert "--until-peak" in note
+    inspection = inspected(*curve, until_peak=True)
+    assert inspection.warnings == ()
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
+    assert "only rows up to the largest stress, in line 61" in inspection.steps
+    assert "20 dropped: after the largest stress" in str(inspection)
+
+
+def test_a_hold_is_said_and_the_advice_leaves_it_out(inspected):
+    (stretch, stress), left = up(), 1 - 0.3 * -np.expm1(-np.linspace(0, 5, 41)[1:])
+    curve = np.concatenate([stretch, np.full(40, 1.4)]), np.concatenate([stress, left * stress[-1]])
+    (note,) = inspected(*curve).warnings
+    assert note.startswith("in lines 61 to 101 the stretch rests while the stress falls by up to 28% of the largest")
+    assert "--until-peak" in note
+    inspection = inspected(*curve, until_peak=True)
+    assert inspection.warnings == ()
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
+
+
+def test_holds_before_the_largest_stress_are_said_with_their_lines(inspected):
+    left, steps = 1 - 0.3 * -np.expm1(-np.linspace(0, 5, 40)), [1.1, 1.2, 1.3, 1.4]
+    starts = [1.0, *steps[:-1]]
+    stretch = np.concatenate([[*np.linspace(a, b, 10), *[b] * 40] for a, b in zip(starts, steps, strict=True)])
+    stress = np.concatenate([[*np.linspace(neo_hookean(a), neo_hookean(b), 10), *neo_hookean(b) * left]
+                             for a, b in zip(starts, steps, strict=True)])  # fmt: skip
+    (note,) = inspected(stretch, stress).warnings
+    assert " and 1 more the stretch rests" in note
+    assert "delete these rows" in note
+
+
+def test_until_peak_goes_with_a_cycle_and_a_preload(inspected):
+    stretch, stress = up()
+    curve = np.concatenate([stretch, stretch[-2::-1]]), np.concatenate([stress, 0.9 * stress[-2::-1]])
+    experiment = inspected(*curve, until_peak=True, cycle=1, preload="1 kPa").reading.experiment
+    assert experiment.stretch.min() >= 1.0
+    assert experiment.stress.argmax() == len(experiment) - 1
+    assert experiment.stress.min() >= 0.001
