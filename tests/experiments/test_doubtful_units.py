@@ -4,7 +4,7 @@ import pytest
 import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
-from tissuq.experiments.reading.findings import DOUBTFUL_UNIT
+from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 from tissuq.experiments.reading.units import stress_units_in
 
 ROWS = "0,0\n0.1,2\n0.2,5\n"
@@ -96,6 +96,12 @@ def test_an_assumed_unit_of_stress_is_said_on_the_first_line(written):
     path = written("Strain,Stress")
     assert str(tq.inspect(path)).startswith(f"ATTENTION {DOUBTFUL_UNIT} the file states no unit of stress")
     assert not doubts(tq.inspect(path, stress_unit="MPa"))
+
+
+@pytest.mark.parametrize("names", ["Strain,Stress", "Strain,Stress (kPa)"])
+def test_reading_in_python_warns_of_an_assumed_unit(written, names):
+    with pytest.warns(UserWarning, match=DOUBTFUL_UNIT):
+        tq.read_experiment(written(names, "0,0\n0.7,2\n1.5,5\n"))
 
 
 @pytest.mark.parametrize("names", ["Strain,Stress [kPa]", "Strain (%),Stress / MPa", "Strain [mm/mm],stress_Pa"])

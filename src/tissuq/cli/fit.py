@@ -181,7 +181,7 @@ def _written(
 ) -> Study:
     """Return what comes of a run, when it is written into its folder."""
     from tissuq.cli.tables import print_warnings
-    from tissuq.experiments.reading.findings import DOUBTFUL_UNIT
+    from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
     from tissuq.report.run_folder import run_folder
 
     with progress() as step:

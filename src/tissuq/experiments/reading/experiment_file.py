@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
@@ -153,6 +155,11 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
         axis where the loading mode has two; its ``source``
         tells the file, columns, units and every step. :func:`tissuq.inspect` shows them.
 
+    Warns
+    -----
+    UserWarning
+        Of a unit or a zero of displacements that was assumed.
+
     Raises
     ------
     InputError
@@ -165,7 +172,10 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     >>> data.stress_unit, len(data)
     ('MPa', 21)
     """
-    return read_file(path, **options).experiment
+    reading = read_file(path, **options)
+    for text in assumptions(reading.used, reading.choices):
+        warnings.warn(text, stacklevel=2)
+    return reading.experiment
 
 
 def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:

@@ -9,20 +9,17 @@ import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import STRETCH
+from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.cycles import find_cycles
 from tissuq.experiments.reading.events import find_holds, find_rupture
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
-from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
-from tissuq.experiments.reading.positions import ZERO_ASSUMED
 from tissuq.experiments.reading.slack import find_slack
 from tissuq.experiments.reading.units import stress_unit
 
-__all__ = ["DOUBTFUL_UNIT", "data_warnings"]
+__all__ = ["data_warnings"]
 
-DOUBTFUL_UNIT = "check the unit:"
-"""How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000."""
 MANY_ROWS = 10_000
 """Rows from which thinning is worth a word."""
 MIN_ROWS_PER_CYCLE = 10
@@ -36,42 +33,11 @@ LARGE_STRETCH = 10.0
 
 
 def data_warnings(reading: Reading) -> tuple[str, ...]:
-    """Return what a person should look at before a fit, of each stress."""
+    """Return what a person should look at before a fit, of each stress: what was assumed comes first."""
     labels = reading.used.labels
     texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
-    found = [*reading.warnings, *filter(None, chain.from_iterable(texts))]
-    return tuple(sorted(found, key=lambda text: DOUBTFUL_UNIT not in text))
-
-
-def _unit_assumed(reading: Reading, number: int) -> str:
-    if "MPa (assumed" not in reading.experiment.source:
-        return ""
-    return (
-        f"{DOUBTFUL_UNIT} the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit kPa, "
-        "or --stress-unit MPa."
-    )
-
-
-def _strain_unit_assumed(reading: Reading, number: int) -> str:
-    if RATIO_ASSUMED not in reading.experiment.source:
-        return ""
-    largest = float(np.abs(reading.used.stretch[number] - 1).max())
-    return (
-        f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which it "
-        "is: --strain-unit % or --strain-unit 1."
-    )
-
-
-def _zero_assumed(reading: Reading, number: int) -> str:
-    if ZERO_ASSUMED not in reading.experiment.source:
-        return ""
-    table, column = reading.table, reading.choices[number].deformation
-    name = table.names[column] or str(column + 1)
-    return (
-        f"column {table.label(column)} does not begin at 0, where there is no load: it was taken for positions, and "
-        f"counted from its first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it "
-        f"holds the length or height of the specimen, --column 'length={name}'."
-    )
+    assumed = assumptions(reading.used, reading.choices)
+    return (*assumed, *reading.warnings, *filter(None, chain.from_iterable(texts)))
 
 
 def _size(reading: Reading, number: int) -> str:
@@ -226,9 +192,6 @@ def _other_axis(reading: Reading, number: int) -> str:
 
 
 CHECKS: tuple[Callable[[Reading, int], str], ...] = (
-    _unit_assumed,
-    _strain_unit_assumed,
-    _zero_assumed,
     _size,
     _stretch_size,
     _cycles,

@@ -10,8 +10,9 @@ from typing import Unpack
 
 import numpy as np
 
+from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
-from tissuq.experiments.reading.findings import DOUBTFUL_UNIT, data_warnings
+from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.units import stress_unit

@@ -16,10 +16,11 @@ from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.units import FORCE, LENGTH, Quantity, number_and_unit
 
-__all__ = ["Load", "stress_of", "stretch_of"]
+__all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of"]
 
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
+MPA_ASSUMED = "MPa (assumed: the file states no unit)"
 LARGEST_ASSUMED_STRESS = 100.0
 """Largest stress, MPa, of a soft material: numbers beyond it that have no unit are not taken as MPa."""
 
@@ -258,7 +259,7 @@ def _stress_unit(
         return unit, f"{unit.name} (as given)"
     if not declared:
         _check_assumed_mpa(table, choice, largest)
-        return units.StressUnit("MPa", 1.0), "MPa (assumed: the file states no unit)"
+        return units.StressUnit("MPa", 1.0), MPA_ASSUMED
     try:
         unit = units.stress_unit(declared)
     except InputError as error:

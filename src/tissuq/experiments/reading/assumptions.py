@@ -1,0 +1,48 @@
+"""What was assumed where a file does not say it, and the options that say it: units, and the zero of displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
+from tissuq.experiments.reading.measures import MPA_ASSUMED
+from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
+from tissuq.experiments.reading.positions import ZERO_ASSUMED
+
+__all__ = ["DOUBTFUL_UNIT", "assumptions"]
+
+DOUBTFUL_UNIT = "check the unit:"
+"""How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000."""
+
+
+def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> tuple[str, ...]:
+    """Return a sentence about everything that the steps of reading say was assumed, units first."""
+    source = "; ".join(measured.steps)
+    found = []
+    if MPA_ASSUMED in source:
+        found.append(
+            f"{DOUBTFUL_UNIT} the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit "
+            "kPa, or --stress-unit MPa."
+        )
+    if RATIO_ASSUMED in source:
+        largest = float(np.abs(measured.stretch - 1).max())
+        found.append(
+            f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which "
+            "it is: --strain-unit % or --strain-unit 1."
+        )
+    if ZERO_ASSUMED in source:
+        found += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
+    return tuple(found)
+
+
+def _about_zero(measured: MeasuredRows, choice: ColumnChoice) -> str:
+    label, number = measured.table.label(choice.deformation), choice.deformation + 1
+    name = measured.table.names[choice.deformation] or number
+    return (
+        f"column {label} does not begin at 0, where there is no load: it was taken for positions, and counted from its "
+        "first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it holds the length or "
+        f"height of the specimen, --column 'length={name}'."
+    )
