@@ -61,6 +61,22 @@ def test_cycles_and_one_specimen_are_read_as_before(tmp_path, name, labels):
     assert len(tq.read_experiment(written(tmp_path, name, labels))) == 60
 
 
+def test_numbers_that_may_be_of_cycles_or_of_specimens_are_said(tmp_path):
+    path = written(tmp_path, "No", "123")
+    (note,) = tq.inspect(path).warnings
+    assert "all 3 cycles are used" in note
+    assert "if column 'No' numbers specimens, give --only 'No=1'" in note
+    assert len(tq.read_experiment(path, only={"No": 1})) == 20
+
+
+def test_two_specimens_are_no_population(tmp_path):
+    path = written(tmp_path, "Specimen", "AAB")
+    with pytest.raises(InputError) as caught:
+        tq.read_experiment(path)
+    assert "--only 'Specimen=A'" in str(caught.value)
+    assert "population" not in str(caught.value)
+
+
 def test_phases_of_one_test_are_no_specimens(tmp_path):
     stretch = np.concatenate([np.linspace(1, 1.3, 30), np.full(10, 1.3), np.linspace(1.3, 1, 30)])  # up, held, down
     phases = ["Stretch"] * 30 + ["Hold"] * 10 + ["Recover"] * 30

@@ -15,6 +15,7 @@ from tissuq.experiments.reading.events import find_holds, find_rupture
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
 from tissuq.experiments.reading.slack import find_slack
 from tissuq.experiments.reading.units import stress_unit
 
@@ -58,7 +59,9 @@ def _cycles(reading: Reading, number: int) -> str:
     count = len(find_cycles(reading.used.table, reading.used.course))
     if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count:
         return ""
-    return f"all {count} cycles are used; to fit one, give --cycle last, first or a number."
+    numbered = advice_on_numbered_tests(reading.table, reading.choices, reading.recorded.course)
+    advice = "; ".join(filter(None, ("to fit one, give --cycle last, first or a number", numbered)))
+    return f"all {count} cycles are used; {advice}."
 
 
 def _rupture(reading: Reading, number: int) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,12 +13,14 @@ from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading,
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.units import NUMBER
 
-__all__ = ["check_one_specimen", "only_rows"]
+__all__ = ["advice_on_numbered_tests", "check_one_specimen", "only_rows"]
 
 ROWS_OF_TEST = 5
 """Rows that the tests of a table have on average at least."""
 RESTART, RETURN = 0.1, 0.5
 """Share of the range of stretches within which all tests begin, and of the longest way that all go."""
+SPECIMENS_OF_POPULATION = 3
+"""Fewest specimens that show a population."""
 SHOWN = 6
 """Number of values that a message lists."""
 
@@ -51,28 +53,38 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
     InputError
         When there are several, with what reads one of them, or all.
     """
-    if table.block is not None and not any(is_of_specimens(heading(name).quantity) for name in table.names):
-        return
+    for column, labels in _parting_columns(table, choices, course):
+        if not is_of_specimens(_quantity(table, column)) and not _are_words(labels):
+            continue
+        name, distinct = _name(table, column), list(dict.fromkeys(labels))
+        fit_all = f"; to fit each and the population that they are from: tissuq population FILE --specimen '{name}'"
+        raise InputError(
+            f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
+            f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}})"
+            f"{fit_all if len(distinct) >= SPECIMENS_OF_POPULATION else ''}."
+        )
+
+
+def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], course: Column) -> str:
+    """Return how to read one test where numbers in a column part the rows into tests that each begin anew."""
+    for column, labels in _parting_columns(table, choices, course):
+        return f"if column {table.label(column)} numbers specimens, give --only '{_name(table, column)}={labels[0]}'"
+    return ""
+
+
+def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
+    """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
     for column in sorted(set(range(len(table.names))) - used):
-        quantity = heading(table.names[column]).quantity
-        if quantity in CYCLE_NAMES | SET_NAMES:
+        quantity = _quantity(table, column)
+        if quantity in CYCLE_NAMES | SET_NAMES or (table.block is not None and not is_of_specimens(quantity)):
             continue
         labels = table.texts(column)
         distinct = list(dict.fromkeys(labels))
         if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
             continue
-        if is_of_specimens(quantity) or (_are_words(distinct) and _begin_anew(labels, distinct, course)):
-            raise _several(table, column, labels)
-
-
-def _several(table: Table, column: int, labels: Sequence[str]) -> InputError:
-    name = table.names[column] or str(column + 1)
-    return InputError(
-        f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
-        f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}}); to fit each of them and the "
-        f"population that they are from: tissuq population FILE --specimen '{name}'."
-    )
+        if is_of_specimens(quantity) or _begin_anew(labels, distinct, course):
+            yield column, labels
 
 
 def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) -> bool:
@@ -86,6 +98,14 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
     ways = furthest - begins
     is_same_way = bool((ways > 0).all() or (ways < 0).all()) and np.abs(ways).min() >= RETURN * np.abs(ways).max()
     return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
+
+
+def _quantity(table: Table, column: int) -> str:
+    return heading(table.names[column]).quantity
+
+
+def _name(table: Table, column: int) -> str:
+    return table.names[column] or str(column + 1)
 
 
 def _are_words(labels: Sequence[str]) -> bool:
