@@ -85,6 +85,18 @@ def test_the_data_sets_show_neither(name):
     assert not any("--until-peak" in note or "relaxes" in note for note in notes)
 
 
+@pytest.mark.parametrize("rows", [200, 50_000])
+def test_strong_noise_is_neither_and_hides_no_rupture(rows):
+    random, share = np.random.default_rng(4), np.linspace(0, 1.2, rows)
+    noise = 0.05 * random.standard_normal(rows)
+    whole, torn_at_end = share + noise, np.where(share < 1, share, 0.05) + noise
+    assert find_rupture(1 + share, whole) is None
+    assert find_holds(1 + share, whole) == []
+    rupture = find_rupture(1 + share, torn_at_end)
+    assert rupture is not None
+    assert share[rupture.start] == pytest.approx(1.0, abs=0.1)
+
+
 def test_a_single_outlier_is_no_rupture():
     stretch = np.linspace(1, 1.4, 50)
     stress = neo_hookean(stretch)

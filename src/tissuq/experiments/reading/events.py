@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.experiments.reading.table import Column
 
@@ -14,6 +15,8 @@ RUPTURE_FALL, SUDDEN_FALL = 0.2, 0.5
 """Shares of the largest stress by which it falls at a rupture: while the test goes on, and within a few rows."""
 SUDDEN_ROWS, LASTING_ROWS = 3, 2
 """Rows within which a fall is sudden, and for which it lasts at least, so that an outlier is none."""
+SCATTERS_OF_RUPTURE = 8.0
+"""Times the median step between points by which the stress must fall in a rupture."""
 FURTHER = 0.01
 """Share of the range of stretches by which a test has gone on."""
 REST, BEND = 0.01, 0.2
@@ -23,7 +26,7 @@ HOLD_FALL, HOLD_ROWS, HOLD_SHARE = 0.04, 8, 0.04
 SCATTERS = 4.0
 """Times the median step between rows by which the stress must fall in a hold."""
 MOST_POINTS = 400
-"""Points into which the rows are averaged at most in the search for holds."""
+"""Points into which the rows are averaged at most."""
 
 
 @dataclass(frozen=True)
@@ -42,27 +45,28 @@ def find_rupture(stretch: Column, stress: Column, reference: float = 1.0) -> Eve
     """
     if len(stretch) <= LASTING_ROWS or not np.abs(stress).max() > 0:
         return None
-    span, load = float(np.ptp(stretch)), stress / stress[np.argmax(np.abs(stress))]
+    ends, course, load = _averaged(stretch, stress)
+    span, load = float(np.ptp(course)), load / load[np.argmax(np.abs(load))]
+    least = max(RUPTURE_FALL, SCATTERS_OF_RUPTURE * float(np.median(np.abs(np.diff(load)))))
     peaks = np.maximum.accumulate(load)
     at_peak = np.maximum.accumulate(np.where(load == peaks, np.arange(len(load)), 0))
-    fall, way = peaks - load, stretch - reference
+    fall, way = peaks - load, course - reference
     further = (way - way[at_peak]) * np.sign(way[at_peak])
-    goes_on = (fall > RUPTURE_FALL) & (further > FURTHER * span)
+    goes_on = (fall > least) & (further > FURTHER * span)
     before = np.concatenate([np.full(SUDDEN_ROWS, load[0]), load[:-SUDDEN_ROWS]])[: len(load)]
-    is_sudden = (fall > SUDDEN_FALL) & (before - load > SUDDEN_FALL) & (further > -FURTHER * span)
+    sudden = max(SUDDEN_FALL, least)
+    is_sudden = (fall > sudden) & (before - load > sudden) & (further > -FURTHER * span)
     for row in np.flatnonzero(goes_on | is_sudden).tolist():
         lasting = fall[row : row + LASTING_ROWS]
         if len(lasting) == LASTING_ROWS and (lasting > RUPTURE_FALL).all():
-            return Event(int(at_peak[row]) + 1, len(load), float(fall[row:].max()))
+            return Event(int(ends[at_peak[row] + 1]), len(stretch), float(fall[row:].max()))
     return None
 
 
 def find_holds(stretch: Column, stress: Column) -> list[Event]:
     """Return the rows in which the stretch rests while the size of the stress falls: relaxation."""
-    count = min(len(stretch), MOST_POINTS)
-    ends = np.linspace(0, len(stretch), count + 1).astype(int)
-    averaged = [np.add.reduceat(values, ends[:-1]) / np.diff(ends) for values in (stretch, np.abs(stress))]
-    course, load = averaged[0], averaged[1] / max(float(averaged[1].max()), np.finfo(float).tiny)
+    ends, course, load = _averaged(stretch, np.abs(stress))
+    count, load = len(course), load / max(float(load.max()), np.finfo(float).tiny)
     rest, least = REST * float(np.ptp(course)), max(HOLD_ROWS, int(np.ceil(HOLD_SHARE * count)))
     holds, start = [], 0
     while start + least <= count:
@@ -73,6 +77,13 @@ def find_holds(stretch: Column, stress: Column) -> list[Event]:
             holds.append(Event(int(ends[start]), int(ends[start + length]), fall))
         start += length if fall else 1
     return holds
+
+
+def _averaged(stretch: Column, stress: Column) -> tuple[NDArray[np.intp], Column, Column]:
+    """Return neighbouring rows averaged to no more than `MOST_POINTS`, and where each begins."""
+    ends = np.linspace(0, len(stretch), min(len(stretch), MOST_POINTS) + 1).astype(np.intp)
+    course, load = (np.add.reduceat(values, ends[:-1]) / np.diff(ends) for values in (stretch, stress))
+    return ends, course, load
 
 
 def _fall(course: Column, load: Column, rest: float) -> float:

@@ -19,6 +19,8 @@ ROWS_OF_TEST = 5
 """Rows that the tests of a table have on average at least."""
 RESTART, RETURN = 0.1, 0.5
 """Share of the range of stretches within which all tests begin, and of the longest way that all go."""
+SAMPLED_ROWS = 500
+"""Rows in which a column of measured values shows as such."""
 SPECIMENS_OF_POPULATION = 3
 """Fewest specimens that show a population."""
 SHOWN = 6
@@ -75,9 +77,13 @@ def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], cour
 def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
     """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
+    some_rows = table.taken(np.arange(0, len(table.rows), max(1, len(table.rows) // SAMPLED_ROWS)))
     for column in sorted(set(range(len(table.names))) - used):
         quantity = _quantity(table, column)
         if quantity in CYCLE_NAMES | SET_NAMES or (table.block is not None and not is_of_specimens(quantity)):
+            continue
+        sample = some_rows.texts(column)
+        if len(set(sample)) > len(sample) / 2:
             continue
         labels = table.texts(column)
         distinct = list(dict.fromkeys(labels))
