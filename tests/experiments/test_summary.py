@@ -1,3 +1,5 @@
+from statistics import fmean, stdev
+
 import numpy as np
 import pytest
 
@@ -28,7 +30,7 @@ def written(folder, values, *end, names=COLUMNS):
 
 
 def summary_row(values, name, time="", digits=4):
-    return ",".join([time, *(f"{SUMMARIES[name](column):.{digits}f}" for column in np.round(values, 4)[:, 1:].T)])
+    return ",".join([time, *(f"{SUMMARIES[name](column):.{digits}f}" for column in values[:, 1:].T)])
 
 
 @pytest.mark.parametrize("turns", [False, True])
@@ -46,11 +48,32 @@ def test_a_summary_beneath_a_blank_line_is_left_out_and_told(tmp_path, turns, di
     assert all(name in note for name in names)
 
 
+def test_statistics_of_measurements_that_were_rounded_afterwards_are_known(tmp_path):
+    stretch = np.linspace(1, 1.3, 12)
+    values = np.column_stack([np.arange(12), stretch, 100 * (stretch - stretch**-2)])
+    end = ["", summary_row(values, "mean"), summary_row(values, "standard deviation")]
+    assert len(tq.read_experiment(written(tmp_path, values, *end, names="Time (s),Stretch,Stress (kPa)"))) == 12
+
+
 @pytest.mark.parametrize("blank", [True, False])
 def test_a_row_of_means_with_its_name_in_an_unread_column_is_left_out(tmp_path, blank):
     values = measured()
     end = [""] * blank + [summary_row(values, "mean", "Mittelwert"), summary_row(values, "maximum", "Max.")]
     assert len(tq.read_experiment(written(tmp_path, values, *end))) == len(values)
+
+
+@pytest.mark.parametrize("names", [["mean", "standard deviation"], ["maximum", "mean"], [*SUMMARIES]])
+def test_statistics_right_beneath_the_measurements_are_left_out(tmp_path, names):
+    values = measured(rows=12)
+    inspection = tq.inspect(written(tmp_path, values, *(summary_row(values, name) for name in names)))
+    assert len(inspection.reading.experiment) == len(values)
+    assert all(name in inspection.warnings[0] for name in names)
+
+
+def test_a_last_row_that_repeats_the_largest_values_is_measured(tmp_path):
+    values = measured(turns=True)
+    values[-1] = [values[-2, 0], *values[:, 1:].max(axis=0)]
+    assert len(tq.read_experiment(written(tmp_path, values))) == len(values)
 
 
 @pytest.mark.parametrize("end", [["", ",14.2,33.1"], ["", "0.0,0.31,12.1", "0.5,0.32,12.2"], ["modulus,0.3,55.0"]])
@@ -77,7 +100,8 @@ def test_a_blank_line_after_every_row_is_no_gap(tmp_path):
     assert len(tq.read_experiment(path)) == len(values)
 
 
-def test_a_summary_of_a_sheet_is_left_out(tmp_path):
+@pytest.mark.parametrize("label", ["Mean", None])
+def test_a_summary_of_a_sheet_is_left_out(tmp_path, label):
     openpyxl = pytest.importorskip("openpyxl")
     values, book = measured(), openpyxl.Workbook()
     sheet = book.active
@@ -85,6 +109,7 @@ def test_a_summary_of_a_sheet_is_left_out(tmp_path):
     for row in values.tolist():
         sheet.append(row)
     sheet.append([])
-    sheet.append(["Mean", *values[:, 1:].mean(axis=0).tolist()])
+    for statistic in (fmean, stdev):
+        sheet.append([label, *map(statistic, values[:, 1:].T.tolist())])
     book.save(tmp_path / "test.xlsx")
     assert len(tq.read_experiment(tmp_path / "test.xlsx")) == len(values)

@@ -33,6 +33,12 @@ STATISTICS: dict[str, Callable[[NDArray[np.float64]], Any]] = {
     "coefficient of variation": lambda values: np.std(values, ddof=1) / np.mean(values) if np.mean(values) else np.nan,
 }
 """What a summary tells of the columns above it."""
+ROUNDED = 1.01
+"""Units of its last digit by which a statistic may differ: it and the measurements were rounded, half a unit each."""
+FLOATING = 1e-9
+"""Share of a statistic by which it may differ where all digits of a computer are written."""
+OF_ONE_ROW = {"maximum", "minimum"}
+"""Statistics that the last measurement, too, may be."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,8 @@ def find_summary(rows: Sequence[str], lines: Sequence[int], split: Callable[[str
     """Return the rows at the end of a table that are no measurements; None where all are, or may be.
 
     They stand beneath a blank line, or have a word where the rows above have numbers. They are a summary where each
-    is a statistic of the columns above, or has such a word beneath a blank line.
+    is a statistic of the columns above, or has such a word beneath a blank line. Rows right beneath the measurements
+    are a summary where all are statistics.
 
     Parameters
     ----------
@@ -64,17 +71,39 @@ def find_summary(rows: Sequence[str], lines: Sequence[int], split: Callable[[str
     is_apart = start is not None
     if start is None:
         start = _start_of_labels(rows, split)
-    if start is None or start < max(FEWEST_MEASUREMENTS, len(rows) - start):
+    if start is None:
+        return _summary_right_beneath(rows, split)
+    if start < max(FEWEST_MEASUREMENTS, len(rows) - start):
         return None
-    above = np.array(_same_width([[_number(cell) for cell in split(row)] for row in rows[:start]]))
-    of_numbers = np.isfinite(above).all(axis=0)
-    cells = [(split(row) + [""] * above.shape[1])[: above.shape[1]] for row in rows[start:]]
-    names = [_statistic(row, above, of_numbers) for row in cells]
-    has_word = [_has_word(row, of_numbers) for row in cells]
+    above, beneath, of_numbers = _parted(rows, start, split)
+    names = [_statistic(row, above, of_numbers) for row in beneath]
+    has_word = [_has_word(row, of_numbers) for row in beneath]
     if all(name or (is_apart and word) for name, word in zip(names, has_word, strict=True)):
         return Summary(start, tuple(dict.fromkeys(filter(None, names))))
-    values = np.array([[_number(cell) for cell in row] for row in cells])
-    return Summary(start, None) if _jumps(above, values, of_numbers) else None
+    return Summary(start, None) if _jumps(above, beneath, of_numbers) else None
+
+
+def _summary_right_beneath(rows: Sequence[str], split: Callable[[str], list[str]]) -> Summary | None:
+    """Return the last rows that are statistics of those above, and not only what a last measurement may be."""
+    first = max(FEWEST_MEASUREMENTS, len(rows) - MOST_ROWS)
+    last = rows[-3 * MOST_ROWS :]
+    if first >= len(rows) or not _jumps(*_parted(last, len(last) - (len(rows) - first), split)):
+        return None
+    for start in range(first, len(rows)):
+        above, beneath, of_numbers = _parted(rows, start, split)
+        names = [_statistic(row, above, of_numbers) for row in beneath]
+        if all(names) and not OF_ONE_ROW.issuperset(names):
+            return Summary(start, tuple(dict.fromkeys(names)))
+    return None
+
+
+def _parted(
+    rows: Sequence[str], start: int, split: Callable[[str], list[str]]
+) -> tuple[NDArray[np.float64], list[list[str]], NDArray[np.bool_]]:
+    """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
+    above = np.array(_same_width([[_number(cell) for cell in split(row)] for row in rows[:start]]))
+    beneath = [(split(row) + [""] * above.shape[1])[: above.shape[1]] for row in rows[start:]]
+    return above, beneath, np.isfinite(above).all(axis=0)
 
 
 def _start_beneath_gap(lines: Sequence[int]) -> int | None:
@@ -103,14 +132,15 @@ def _statistic(row: Sequence[str], above: NDArray[np.float64], of_numbers: NDArr
     if len(columns) < 2 and not (columns and _has_word(row, of_numbers)):
         return ""
     for name, statistic in STATISTICS.items():
-        if all(abs(_number(row[k]) - statistic(above[:, k])) <= _last_digit(row[k]) for k in columns):
+        if all(abs(_number(row[k]) - statistic(above[:, k])) <= _rounding(row[k]) for k in columns):
             return name
     return ""
 
 
-def _jumps(above: NDArray[np.float64], rows: NDArray[np.float64], of_numbers: NDArray[np.bool_]) -> bool:
+def _jumps(above: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_numbers: NDArray[np.bool_]) -> bool:
     """Tell whether rows do not go on from the ones above as those do among themselves."""
-    above, steps = above[:, of_numbers], np.abs(np.diff(np.vstack([above[-1:], rows])[:, of_numbers], axis=0))
+    values = np.array([[_number(cell) for cell in row] for row in beneath])
+    above, steps = above[:, of_numbers], np.abs(np.diff(np.vstack([above[-1:], values])[:, of_numbers], axis=0))
     allowed = JUMP * np.abs(np.diff(above, axis=0)).max(axis=0) + JUMP_OF_RANGE * np.ptp(above, axis=0)
     return bool((np.nan_to_num(steps) > allowed).any())
 
@@ -127,11 +157,11 @@ def _number(cell: str) -> float:
     return float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
 
 
-def _last_digit(cell: str) -> float:
-    """Return by how much a number may differ from what it was rounded from."""
+def _rounding(cell: str) -> float:
+    """Return by how much a number may differ from the statistic that it was rounded from."""
     mantissa, _, exponent = cell.lower().replace(",", ".").partition("e")
     decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
-    return 0.501 * 10.0**-decimals
+    return float(ROUNDED * 10.0**-decimals + FLOATING * abs(_number(cell)))
 
 
 def _same_width(rows: list[list[float]]) -> list[list[float]]:
