@@ -53,9 +53,35 @@ def test_words_that_part_the_rows_into_tests_that_begin_anew_are_specimens_too(t
         tq.read_experiment(written(tmp_path, name, ["cortex", "corona", "stem"]))
 
 
+@pytest.mark.parametrize("name", ["Specimen", "Region"])
+def test_a_name_that_stands_only_in_the_first_row_of_its_test_is_of_all(tmp_path, name):
+    path = written(tmp_path, name, ["cortex", "corona", "stem"])
+    lines = path.read_text().splitlines()
+    rows = [line if row % 20 == 0 else line[line.find(",") :] for row, line in enumerate(lines[1:])]
+    path.write_text("\n".join([lines[0], *rows]) + "\n")
+    with pytest.raises(InputError, match="names several tests: 'cortex', 'corona', 'stem'"):
+        tq.read_experiment(path)
+    data = tq.read_experiment(path, only={name: "corona"})
+    assert len(data) == 20
+    np.testing.assert_allclose(data.stress, 1.1 * neo_hookean(data.stretch), atol=1e-6)
+
+
+def test_a_specimen_named_once_is_one_specimen(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text("Specimen,stretch,stress [kPa]\nA,1,0\n" + "".join(f",{1 + k / 20},{k}\n" for k in range(1, 20)))
+    assert len(tq.read_experiment(path)) == 20
+
+
 @pytest.mark.parametrize(
     ("name", "labels"),
-    [("Specimen", "AAA"), ("Cycle", "123"), ("cycle number", "123"), ("Step", "123"), ("Temperature", "123")],
+    [
+        ("Specimen", "AAA"),
+        ("Segment", ["Cycle 1", "Cycle 2", "Cycle 3"]),
+        ("Cycle", "123"),
+        ("cycle number", "123"),
+        ("Step", "123"),
+        ("Temperature", "123"),
+    ],
 )
 def test_cycles_and_one_specimen_are_read_as_before(tmp_path, name, labels):
     assert len(tq.read_experiment(written(tmp_path, name, labels))) == 60

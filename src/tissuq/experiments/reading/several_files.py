@@ -14,7 +14,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_modes
 from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_rows
-from tissuq.experiments.reading.several_specimens import only_rows
+from tissuq.experiments.reading.several_specimens import only_rows, row_names
 from tissuq.experiments.reading.table import read_table
 
 __all__ = ["SUFFIXES", "find_mode", "find_tests", "read_column", "stated_mode"]
@@ -66,7 +66,7 @@ def read_column(
     """
     table = only_rows(read_table(path, options.get("skip_rows", 0), options.get("sheet")), options.get("only"))
     column = find_column(table, "specimen", specimen)
-    labels = np.array(table.texts(column))
+    labels = np.array(row_names(table, column))
     if (labels == "").any():
         row = int(np.argmax(labels == ""))
         raise InputError(f"{table.place(column, row)}: the name of the specimen is missing.")

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading, is_of_specimens
+from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading, is_of_specimens, plain
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.units import NUMBER
 
-__all__ = ["advice_on_numbered_tests", "check_one_specimen", "only_rows"]
+__all__ = ["advice_on_numbered_tests", "check_one_specimen", "only_rows", "row_names"]
 
 ROWS_OF_TEST = 5
 """Rows that the tests of a table have on average at least."""
@@ -37,12 +37,20 @@ def only_rows(table: Table, only: Mapping[str, str | int] | None) -> Table:
     """
     for name, value in (only or {}).items():
         column = find_column(table, "only", name)
-        texts = table.texts(column)
+        texts = row_names(table, column)
         rows = np.flatnonzero([text.lower() == str(value).strip().lower() for text in texts])
         if not len(rows):
             raise InputError(f"{table.place(column)}: no row has '{value}' there. There are {_listed(texts)}.")
         table = table.taken(rows)
     return table
+
+
+def row_names(table: Table, column: int) -> list[str]:
+    """Return the cells of a column, of which each goes for the empty ones beneath it where most are empty."""
+    cells = table.texts(column)
+    if cells.count("") <= len(cells) / 2:
+        return cells
+    return list(accumulate(cells, _cell_or_above))
 
 
 def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Column) -> None:
@@ -85,11 +93,12 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
         sample = some_rows.texts(column)
         if len(set(sample)) > len(sample) / 2:
             continue
-        labels = table.texts(column)
+        labels = row_names(table, column)
         distinct = list(dict.fromkeys(labels))
         if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
             continue
-        if is_of_specimens(quantity) or _begin_anew(labels, distinct, course):
+        is_of_tests = _begin_anew(labels, distinct, course) and not all(map(_is_cycle, distinct))
+        if is_of_specimens(quantity) or is_of_tests:
             yield column, labels
 
 
@@ -104,6 +113,14 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
     ways = furthest - begins
     is_same_way = bool((ways > 0).all() or (ways < 0).all()) and np.abs(ways).min() >= RETURN * np.abs(ways).max()
     return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
+
+
+def _cell_or_above(above: str, cell: str) -> str:
+    return cell or above
+
+
+def _is_cycle(label: str) -> bool:
+    return plain(label).rstrip("0123456789 .#") in CYCLE_NAMES
 
 
 def _quantity(table: Table, column: int) -> str:
