@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.modes.mode import STRETCH
+from tissuq.experiments.modes.mode import STRETCH, Control
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.cycles import find_cycles
 from tissuq.experiments.reading.events import find_holds, find_rupture
@@ -31,6 +31,9 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
+SHOWN = 20
+"""Number of holds whose lines are said."""
+UNTIL_PEAK = "to leave out what follows the largest stress give --until-peak."
 
 
 def data_warnings(reading: Reading) -> tuple[str, ...]:
@@ -66,16 +69,16 @@ def _cycles(reading: Reading, number: int) -> str:
 
 def _rupture(reading: Reading, number: int) -> str:
     used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
-    controls = reading.experiment.mode.controls
-    control = controls[0] if len(controls) == 1 else STRETCH
+    control, peak = _control(reading), int(np.argmax(np.abs(stress)))
     for cycle in find_cycles(used.table, course):
         rows = cycle.rows("loading")
         if rupture := find_rupture(course[rows], stress[rows], control.reference):
-            row = rows[rupture.start - 1]
-            where = f"after line {used.table.lines[row]} ({control.name} {course[row]:.4g})"
+            row, rows = rows[rupture.start - 1], rows[rows <= peak]
+            is_before_peak = find_rupture(course[rows], stress[rows], control.reference) is not None
             return (
-                f"{where} the stress falls by {rupture.fall:.0%} of the largest while the test goes on: the specimen "
-                "tore, or slipped. To leave out what follows the largest stress give --until-peak."
+                f"after line {used.table.lines[row]} ({control.name} {course[row]:.4g}) the stress falls by "
+                f"{rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
+                f"{'delete the rows from there on.' if is_before_peak else UNTIL_PEAK}"
             )
     return ""
 
@@ -86,14 +89,13 @@ def _holds(reading: Reading, number: int) -> str:
     if not holds or _rupture(reading, number):
         return ""
     lines, peak = used.table.lines, int(np.argmax(np.abs(stress)))
-    where = " and ".join(f"{lines[hold.start]} to {lines[hold.stop - 1]}" for hold in holds[:3])
-    more = f" and {len(holds) - 3} more" if len(holds) > 3 else ""
+    where = ", ".join(f"{lines[hold.start]} to {lines[hold.stop - 1]}" for hold in holds[:SHOWN])
+    more = f" and {len(holds) - SHOWN} more" if len(holds) > SHOWN else ""
     is_before_peak = any(hold.stop <= peak for hold in holds)
-    advice = "to leave out what follows the largest stress give --until-peak."
-    advice = "delete these rows." if is_before_peak else advice
     return (
         f"in lines {where}{more} the stretch rests while the stress falls by up to "
-        f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; {advice}"
+        f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; "
+        f"{'delete these rows.' if is_before_peak else UNTIL_PEAK}"
     )
 
 
@@ -121,9 +123,8 @@ def _hysteresis(reading: Reading, number: int) -> str:
 
 def _reference(reading: Reading, number: int) -> str:
     stretch, stress = reading.used.stretch[number], reading.used.stress[number]
-    unit = stress_unit(reading.experiment.stress_unit)
+    unit, control = stress_unit(reading.experiment.stress_unit), _control(reading)
     mode, points = reading.experiment.mode, reading.experiment.stretch
-    control = mode.controls[0] if len(mode.controls) == 1 else STRETCH
     change = np.abs((points - mode.reference).reshape(len(stress), -1)).max(axis=1)
     nearest = int(np.argmin(change))
     gap, furthest = float(change[nearest]), float(change.max())
@@ -144,6 +145,8 @@ def _slack(reading: Reading, number: int) -> str:
     if any("the preload" in step for step in used.steps):
         return ""
     loading = find_cycles(used.table, used.course)[0].rows("loading")
+    rupture = find_rupture(used.course[loading], used.stress[number][loading], _control(reading).reference)
+    loading = loading[: rupture.start if rupture else None]
     loading = loading[: int(np.argmax(np.abs(used.stress[number][loading]))) + 1]
     slack = find_slack(used.stretch[number][loading], used.stress[number][loading])
     if slack is None:
@@ -158,6 +161,12 @@ def _slack(reading: Reading, number: int) -> str:
         f"the first {slack.rows} rows carry no load that shows, up to {mode.controls[0].name} {slack.stretch:.4g}: "
         f"slack, or a toe too soft to measure; {advice}"
     )
+
+
+def _control(reading: Reading) -> Control:
+    """Return what the course of a test is of: the mode's control, or the mean stretch where there are several."""
+    controls = reading.experiment.mode.controls
+    return controls[0] if len(controls) == 1 else STRETCH
 
 
 def _rounded_up(value: float) -> float:
