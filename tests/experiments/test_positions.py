@@ -33,7 +33,17 @@ def test_positions_are_counted_from_their_first_row_with_a_note(tmp_path, name, 
     stretch = ramp(top, unloads=start > 0)
     inspection = tq.inspect(written(tmp_path, stretch, start, name, noise=noise), dimensions=SPECIMEN)
     np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
-    assert any("does not begin at 0, where there is no load" in note for note in inspection.warnings)
+    assert any("does not begin at 0, and the load there is small" in note for note in inspection.warnings)
+
+
+@pytest.mark.parametrize("start", [0.1, 0.3, -0.3])
+@pytest.mark.parametrize("top", [1.3, 0.7])
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_a_small_offset_shows_by_a_load_that_begins_there(tmp_path, start, top, noise):
+    stretch = ramp(top, rows=200)
+    inspection = tq.inspect(written(tmp_path, stretch, start, noise=noise), dimensions=SPECIMEN)
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
+    assert any("does not begin at 0" in note for note in inspection.warnings)
 
 
 @pytest.mark.parametrize("zero", ["first", "35.2 mm", "3.52 cm"])
@@ -68,7 +78,9 @@ def test_a_start_away_from_0_under_load_is_asked_about_with_every_answer(tmp_pat
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-@pytest.mark.parametrize("kind", ["tension", "compression", "both", "both from one end", "unloading", "taut at once"])
+@pytest.mark.parametrize(
+    "kind", ["tension", "compression", "both", "both from one end", "unloading", "taut at once", "cut"]
+)
 def test_displacements_are_read_as_before(tmp_path, kind, noise, seed):
     stretch = {
         "tension": ramp(1.3),
@@ -77,6 +89,7 @@ def test_displacements_are_read_as_before(tmp_path, kind, noise, seed):
         "both from one end": np.linspace(0.8, 1.2, 80),
         "unloading": ramp(1.4)[::-1],
         "taut at once": ramp(1.5)[1:],
+        "cut": ramp(1.3, rows=200)[8:],
     }[kind]
     inspection = tq.inspect(written(tmp_path, stretch, 0.0, noise=noise, seed=seed), dimensions=SPECIMEN)
     np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch, atol=1e-6)
@@ -101,7 +114,7 @@ def test_heights_are_read_over_that_of_the_first_row(tmp_path, name, unit, start
     same = tq.read_experiment(path, dimensions=dimensions, compression_positive=True)
     np.testing.assert_allclose(same.stretch, data.stretch, rtol=1e-9)
     as_positions = tq.read_experiment(
-        path, columns={"displacement": 1}, dimensions=dimensions, compression_positive=True
+        path, columns={"displacement": 1}, dimensions=dimensions, compression_positive=True, zero="first"
     )
     np.testing.assert_allclose(as_positions.stretch, data.stretch, rtol=1e-6)
 

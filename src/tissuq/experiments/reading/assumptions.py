@@ -39,10 +39,9 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> tupl
 
 
 def _about_zero(measured: MeasuredRows, choice: ColumnChoice) -> str:
-    label, number = measured.table.label(choice.deformation), choice.deformation + 1
-    name = measured.table.names[choice.deformation] or number
+    column, table = choice.deformation, measured.table
     return (
-        f"column {label} does not begin at 0, where there is no load: it was taken for positions, and counted from its "
-        "first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it holds the length or "
-        f"height of the specimen, --column 'length={name}'."
+        f"column {table.label(column)} does not begin at 0, and the load there is small: it was taken for positions, "
+        "and counted from its first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it "
+        f"holds the length or height of the specimen, --column 'length={table.key(column)}'."
     )

@@ -115,8 +115,8 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
         Such as ``mN`` and ``um``, for columns of which the file states no unit.
     zero : str, optional
         From which value displacements are counted, such as ``35.2 mm``, or ``first`` for that of the first row: there
-        the specimen has its undeformed length. Without it from 0, or, where they begin far from it without load, from
-        the first row.
+        the specimen has its undeformed length. Without it from 0, or from the first row where
+        they begin away from 0 with little load.
     dimensions : mapping, optional
         Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
         Without it those in the lines above the table. Only displacements and forces need them. In the mode

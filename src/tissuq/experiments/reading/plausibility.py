@@ -113,7 +113,7 @@ def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Col
     start = int(np.argmin(np.abs(strain - 1.0)))
     starts_at_one = abs(strain[start] - 1.0) < 0.02 and abs(stress[start]) <= 0.02 * np.abs(stress).max()
     if starts_at_one and np.abs(strain).min() > 0.2:
-        name = table.names[column] or str(column + 1)
+        name = table.key(column)
         raise InputError(
             f"{table.place(column, start)}: at strain {strain[start]:g} there is no stress, and the column "
             f'never comes near 0: it looks like a stretch. Say so: columns={{"stretch": "{name}"}} or '
@@ -125,7 +125,7 @@ def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
     is_positive, is_strain = bool(stretch.min() > 0), choice.measure == "strain"
     if is_positive and (is_strain or stretch.max() >= COMPRESSED_LIMIT):
         return
-    name = table.names[choice.deformation] or str(choice.deformation + 1)
+    name = table.key(choice.deformation)
     if is_strain:
         advice = "A strain must be larger than -1 (-100 %); correct its values or its unit."
     else:

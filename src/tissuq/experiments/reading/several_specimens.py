@@ -66,7 +66,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
     for column, labels in _parting_columns(table, choices, course):
         if not is_of_specimens(_quantity(table, column)) and not _are_words(labels):
             continue
-        name, distinct = _name(table, column), list(dict.fromkeys(labels))
+        name, distinct = table.key(column), list(dict.fromkeys(labels))
         fit_all = f"; to fit each and the population that they are from: tissuq population FILE --specimen '{name}'"
         raise InputError(
             f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
@@ -78,7 +78,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], course: Column) -> str:
     """Return how to read one test where numbers in a column part the rows into tests that each begin anew."""
     for column, labels in _parting_columns(table, choices, course):
-        return f"if column {table.label(column)} numbers specimens, give --only '{_name(table, column)}={labels[0]}'"
+        return f"if column {table.label(column)} numbers specimens, give --only '{table.key(column)}={labels[0]}'"
     return ""
 
 
@@ -125,10 +125,6 @@ def _is_cycle(label: str) -> bool:
 
 def _quantity(table: Table, column: int) -> str:
     return heading(table.names[column]).quantity
-
-
-def _name(table: Table, column: int) -> str:
-    return table.names[column] or str(column + 1)
 
 
 def _are_words(labels: Sequence[str]) -> bool:

@@ -69,6 +69,10 @@ class Table:
         """Return how messages name a column (counted from 0)."""
         return f"'{self.names[column]}'" if self.names[column] else f"number {column + 1}"
 
+    def key(self, column: int) -> str:
+        """Return how options name a column: by its name, or by its number from 1."""
+        return self.names[column] or str(column + 1)
+
     def place(self, column: int, row: int | None = None) -> str:
         """Return the place of a column, or of its cell in a row, as an editor shows it."""
         line = "" if row is None else f", line {self.lines[row]}"
