@@ -12,7 +12,7 @@ from tissuq.experiments.reading.experiment_file import read_experiment, read_fil
 def written(tmp_path):
     def write(stretch, **columns):
         path = tmp_path / "test.csv"
-        columns = {"stretch": stretch, "stress": neo_hookean(np.asarray(stretch)), **columns}
+        columns = {"stretch": stretch, "stress_MPa": neo_hookean(np.asarray(stretch)), **columns}
         rows = "\n".join(",".join(map(str, row)) for row in zip(*columns.values(), strict=True))
         path.write_text(",".join(columns) + "\n" + rows + "\n")
         return path
@@ -109,5 +109,5 @@ def test_dropped_rows_are_counted_with_their_reasons(written):
 def test_messages_after_a_choice_name_the_lines_of_the_file(written):
     stretch, _ = made([1.2, 1.2], rows=21)
     path = written(np.where(np.arange(len(stretch)) < 45, stretch, 2 - stretch))
-    with pytest.raises(InputError, match=r"line \d\d, column 'stress'"):
-        read_experiment(path, cycle=2, columns={"stress": "stress"}, compression_positive=True)
+    with pytest.raises(InputError, match=r"line \d\d, column 'stress_MPa'"):
+        read_experiment(path, cycle=2, columns={"stress": "stress_MPa"}, compression_positive=True)

@@ -8,6 +8,8 @@ from marks import slow_but
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.reading.experiment_file import read_experiment
 
+pytestmark = pytest.mark.filterwarnings("ignore:check the unit:UserWarning")  # many headings here state no unit
+
 LAB_FILES = Path(__file__).parent / "lab_files"
 BAD_FILES = Path(__file__).parent / "bad_files"
 

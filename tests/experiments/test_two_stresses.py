@@ -98,7 +98,7 @@ def test_sizes_that_only_one_kind_of_column_needs_are_not_refused(tmp_path):
     data = read_experiment(path, mode="biaxial", dimensions={"length": "10 mm", "width": "20 mm", "thickness": "2 mm"})
     np.testing.assert_allclose(data.stress, STRESS, rtol=1e-10, atol=1e-15)
     moved = (STRETCH - 1) * [10, 20]
-    path = written(tmp_path, "disp x [mm],disp y [mm],stress x,stress y", *moved.T, *STRESS.T)
+    path = written(tmp_path, "disp x [mm],disp y [mm],stress x [MPa],stress y [MPa]", *moved.T, *STRESS.T)
     data = read_experiment(path, mode="biaxial", dimensions={"length": "10 mm", "width": "20 mm"})
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-10)
 
