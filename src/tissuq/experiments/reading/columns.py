@@ -15,7 +15,8 @@ from tissuq.experiments.reading.table import Table
 
 __all__ = ["DEFORMATIONS", "LOADS", "ColumnChoice", "about_stress", "choose_columns", "find_column"]
 
-DEFORMATIONS = ("stretch", "strain", "displacement", "length", "shear")
+LENGTHENINGS = ("stretch", "strain", "displacement", "length")
+DEFORMATIONS = (*LENGTHENINGS, "shear")
 LOADS = ("stress", "force")
 
 
@@ -155,16 +156,16 @@ def _choice(
         stress = find_column(table, load, mapping[load])
     else:
         load = "stress" if _fitting(quantities, ["stress"], stress_type) else "force"
-        stress = _recognise(table, quantities, "stress", [load], stress_type, "stress or force")
+        stress = _recognise(table, quantities, [load], stress_type, LOADS)
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
     else:
         measures = ["shear"] if is_shear else ["stretch", "strain"]
-        role, what = ("shear", "amount of shear") if is_shear else ("stretch", "stretch, strain or displacement")
+        roles = ("shear",) if is_shear else LENGTHENINGS
         if not is_shear and not _fitting(quantities, measures):
             measures = ["displacement"] if _fitting(quantities, ["displacement"]) else ["length"]
-        deformation = _recognise(table, quantities, role, measures, stress_type, what)
+        deformation = _recognise(table, quantities, measures, stress_type, roles)
         measure = next(name for name in measures if quantities[deformation] in role_names(name))
     if deformation == stress:
         raise InputError(
@@ -208,7 +209,7 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
             )
     unfit = (set(DEFORMATIONS) - {"shear"} if is_shear else {"shear"}) & set(mapping)
     if unfit:
-        deformation = "an amount of shear" if is_shear else "a stretch, strain or displacement"
+        deformation = "an amount of shear" if is_shear else "a stretch, strain, displacement or length"
         raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
 
 
@@ -220,20 +221,20 @@ def _fitting(quantities: Sequence[str], roles: Sequence[str], stress_type: str =
 def _recognise(
     table: Table,
     quantities: Sequence[str],
-    role: str,
     candidates: Sequence[str],
     stress_type: str,
-    what: str,
+    roles: Sequence[str],
 ) -> int:
-    """Return the one column whose name says that it has one of the candidate roles."""
+    """Return the one column whose name says that it has one of the candidate roles, of those that it may have."""
     columns = _fitting(quantities, candidates, stress_type)
     if len(columns) > 1:
-        raise _ambiguous(table, candidates[0], columns)
+        raise _ambiguous(table, candidates, columns)
     if not columns:
-        hint = _stress_hint(table, stress_type) if role == "stress" else ""
+        hint = _stress_hint(table, stress_type) if "stress" in roles else ""
+        what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
-            f"{_columns_there_are(table)} {_how_to_say(table, role)}"
+            f"{_columns_there_are(table)} {_how_to_say(table, roles)}"
         )
     return columns[0]
 
@@ -249,9 +250,11 @@ def _stress_hint(table: Table, stress_type: str) -> str:
     return ""
 
 
-def _ambiguous(table: Table, role: str, columns: Sequence[int]) -> InputError:
+def _ambiguous(table: Table, roles: Sequence[str], columns: Sequence[int]) -> InputError:
     fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in columns)
-    return InputError(f"{table.file}: several columns may be the {role}: {fitting}. {_how_to_say(table, role)}")
+    return InputError(
+        f"{table.file}: several columns may be the {roles[0]}: {fitting}. {_how_to_say(table, roles[:1])}"
+    )
 
 
 def _columns_there_are(table: Table) -> str:
@@ -262,12 +265,13 @@ def _columns_there_are(table: Table) -> str:
     return f"The columns are: {names}."
 
 
-def _how_to_say(table: Table, role: str) -> str:
+def _how_to_say(table: Table, roles: Sequence[str]) -> str:
     if not any(table.names):
         return (
             'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
         )
-    return f'Say which it is by name or number: columns={{"{role}": "NAME"}} or --column {role}=NAME.'
+    others = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
+    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{others}.'
 
 
 def _check_measures(table: Table, choice: ColumnChoice, stress_type: str) -> None:
