@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tissuq.experiments.reading.averages import averaged
 from tissuq.experiments.reading.table import Column
 
 __all__ = ["Event", "find_holds", "find_rupture"]
@@ -45,7 +45,7 @@ def find_rupture(stretch: Column, stress: Column, reference: float = 1.0) -> Eve
     """
     if len(stretch) <= LASTING_ROWS or not np.abs(stress).max() > 0:
         return None
-    ends, course, load = _averaged(stretch, stress)
+    ends, (course, load) = averaged(MOST_POINTS, stretch, stress)
     span, load = float(np.ptp(course)), load / load[np.argmax(np.abs(load))]
     least = max(RUPTURE_FALL, SCATTERS_OF_RUPTURE * float(np.median(np.abs(np.diff(load)))))
     peaks = np.maximum.accumulate(load)
@@ -65,7 +65,7 @@ def find_rupture(stretch: Column, stress: Column, reference: float = 1.0) -> Eve
 
 def find_holds(stretch: Column, stress: Column) -> list[Event]:
     """Return the rows in which the stretch rests while the size of the stress falls: relaxation."""
-    ends, course, load = _averaged(stretch, np.abs(stress))
+    ends, (course, load) = averaged(MOST_POINTS, stretch, np.abs(stress))
     count, load = len(course), load / max(float(load.max()), np.finfo(float).tiny)
     rest, least = REST * float(np.ptp(course)), max(HOLD_ROWS, int(np.ceil(HOLD_SHARE * count)))
     holds, start = [], 0
@@ -77,13 +77,6 @@ def find_holds(stretch: Column, stress: Column) -> list[Event]:
             holds.append(Event(int(ends[start]), int(ends[start + length]), fall))
         start += length if fall else 1
     return holds
-
-
-def _averaged(stretch: Column, stress: Column) -> tuple[NDArray[np.intp], Column, Column]:
-    """Return neighbouring rows averaged to no more than `MOST_POINTS`, and where each begins."""
-    ends = np.linspace(0, len(stretch), min(len(stretch), MOST_POINTS) + 1).astype(np.intp)
-    course, load = (np.add.reduceat(values, ends[:-1]) / np.diff(ends) for values in (stretch, stress))
-    return ends, course, load
 
 
 def _fall(course: Column, load: Column, rest: float) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tissuq.experiments.reading.averages import averaged
 from tissuq.experiments.reading.table import Column
 
 __all__ = ["Slack", "find_slack"]
@@ -49,7 +50,7 @@ def find_slack(stretch: Column, stress: Column) -> Slack | None:
     way, load = way[order], stress[order] / stress[np.argmax(np.abs(stress))]
     if load.min() < -ALREADY_LOADED:
         return None
-    share, mean_load = _averaged(way / way[-1]), _averaged(load)
+    _, (share, mean_load) = averaged(MOST_POINTS, way / way[-1], load)
     misfits = [_misfit(share, mean_load, start) for start in STARTS]
     best = int(np.argmin(misfits))
     gain = len(share) * float(np.log(misfits[0] / misfits[best]))
@@ -79,9 +80,3 @@ def _curves(share: Column) -> Column:
     curves += [-np.expm1(-rate * share) for rate in (2, 6, 20)]
     curves += [(1 - limit) * share / (1 - limit * share) for limit in (0.8, 0.95, 0.99)]
     return np.column_stack(curves)
-
-
-def _averaged(values: Column) -> Column:
-    """Return neighbouring values averaged to no more than `MOST_POINTS`."""
-    count = min(len(values), MOST_POINTS)
-    return np.array([part.mean() for part in np.array_split(values, count)])

@@ -1,0 +1,17 @@
+"""Neighbouring rows averaged to fewer points, so that long files take no longer and noise weighs less."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.reading.table import Column
+
+__all__ = ["averaged"]
+
+
+def averaged(most: int, *columns: Column) -> tuple[NDArray[np.intp], list[Column]]:
+    """Return the rows at which the points begin and the last one ends, and each column averaged to so many at most."""
+    count = len(columns[0])
+    ends = np.linspace(0, count, min(count, most) + 1).astype(np.intp)
+    return ends, [np.add.reduceat(values, ends[:-1]) / np.diff(ends) for values in columns]
