@@ -110,6 +110,7 @@ def test_priors_go_to_the_laws_that_have_them():
         (["neo-hookean", "neo-hookean"], {}, "named twice"),
         (["no-law"], {}, "no-law"),
         (["neo-hookean"], {"priors": {"Jm": tq.Uniform(1, 2)}}, "Jm"),
+        (["neo-hookean"], {"method": "nuts"}, "'nuts' gives no evidence"),
     ],
 )
 def test_what_cannot_be_compared_is_said(laws, options, message):

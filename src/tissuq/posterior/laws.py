@@ -35,6 +35,8 @@ FloatArray = NDArray[np.float64]
 
 ALL_LAWS = "all"
 """In place of names: every law that is the same in all directions."""
+WITHOUT_EVIDENCE = ("nuts", "joint")
+"""Methods that do not say how probable the data are under a law."""
 BEYOND_FACTOR = 1.5
 """Of the largest measured I1 - 3 and I2 - 3, up to which stability is looked at beyond the measurements."""
 NEGLIGIBLE_PROBABILITY = 1e-4
@@ -211,6 +213,8 @@ def fit_laws(
     >>> bool(low < 1.2 < high)
     True
     """
+    if (method := options.get("method")) in WITHOUT_EVIDENCE:
+        raise InputError(f"the method '{method}' gives no evidence, by which laws are weighted: use 'auto' or 'exact'.")
     data = Experiment.of(experiment)
     candidates, is_all = laws_named(laws), laws == ALL_LAWS
     fits, alone, seconds = dict[str, Posterior](), dict[str, Posterior](), dict[str, float]()

@@ -80,12 +80,16 @@ def law_lead(study: LawStudy) -> str:
         else f"{len(close)} of {len(table)} laws, with the discrepancy '{study.settings.discrepancies[0]}', predict "
         f"left-out measurements equally well: the data do not tell these apart"
     )
-    alone, median = str(table.nrmse.idxmin()), significant(float(modulus.quantile(0.5)) / unit.to_mpa)
+    nearest = table.nrmse.dropna().nsmallest(1)
+    alone = [
+        f" Alone, without discrepancy, {name} comes nearest to the measurements (error {100 * error:.1f} %)."
+        for name, error in nearest.items()
+    ]
+    median = significant(float(modulus.quantile(0.5)) / unit.to_mpa)
     return (
         f"The initial shear modulus, averaged over the laws, is {median} {unit.name}, 95 % HPD {low} to {high} "
         f"{unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
-        f"{told[0].upper()}{told[1:]}. Alone, without discrepancy, {alone} comes nearest to the measurements "
-        f"(error {100 * table.nrmse[alone]:.1f} %)."
+        f"{told[0].upper()}{told[1:]}." + "".join(alone)
     )
 
 
