@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,14 +11,29 @@ from difflib import get_close_matches
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.headings import STRESS_NAMES, heading, on_axis, plain, role_names
+from tissuq.experiments.reading.headings import (
+    CYCLE_NAMES,
+    DIMENSION_NAMES,
+    STRESS_NAMES,
+    heading,
+    on_axis,
+    plain,
+    role_names,
+)
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.units import BRACKETS, measured_in
 
 __all__ = ["DEFORMATIONS", "LOADS", "ColumnChoice", "about_stress", "choose_columns", "find_column"]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 DEFORMATIONS = (*LENGTHENINGS, "shear")
 LOADS = ("stress", "force")
+DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement"}
+"""What a column is that alone has such a unit."""
+NOT_ENGINEERING = re.compile(r"^(sigma|σ)(?!.*(eng|nom))|true|cauchy|piola|kirchhoff")
+"""Names of a stress that is, or may be, over another area than the undeformed one."""
+NEITHER_LOAD_NOR_DEFORMATION = re.compile(r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$")
+"""Names of columns that are no rivals, whatever their unit."""
 
 
 @dataclass(frozen=True)
@@ -155,8 +171,9 @@ def _choice(
     if load:
         stress = find_column(table, load, mapping[load])
     else:
-        load = "stress" if _fitting(quantities, ["stress"], stress_type) else "force"
-        stress = _recognise(table, quantities, [load], stress_type, LOADS)
+        load = next((role for role in LOADS if _fitting(quantities, [role], stress_type)), "")
+        by_unit = None if load else _told_by_unit(table, quantities, LOADS)
+        load, stress = by_unit or (load, _recognise(table, quantities, [load or "force"], stress_type, LOADS))
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
@@ -165,8 +182,13 @@ def _choice(
         roles = ("shear",) if is_shear else LENGTHENINGS
         if not is_shear and not _fitting(quantities, measures):
             measures = ["displacement"] if _fitting(quantities, ["displacement"]) else ["length"]
-        deformation = _recognise(table, quantities, measures, stress_type, roles)
-        measure = next(name for name in measures if quantities[deformation] in role_names(name))
+        is_named = is_shear or bool(_fitting(quantities, measures))
+        by_unit = None if is_named else _told_by_unit(table, quantities, tuple(DEFORMATIONS_OF_UNITS), stress)
+        if by_unit:
+            measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
+        else:
+            deformation = _recognise(table, quantities, measures, stress_type, roles)
+            measure = next(name for name in measures if quantities[deformation] in role_names(name))
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
@@ -218,6 +240,38 @@ def _fitting(quantities: Sequence[str], roles: Sequence[str], stress_type: str =
     return [column for column, quantity in enumerate(quantities) if quantity in names]
 
 
+def _told_by_unit(
+    table: Table, quantities: Sequence[str], kinds: Sequence[str], load: int | None = None
+) -> tuple[str, int] | None:
+    """Return the first kind of unit (stress, force, length, strain) that one column alone has, and that column.
+
+    None where columns are left that could be meant as well: of a deformation, all that are neither of a load nor of
+    time nor of a known dimension of the specimen. A stress that may be of another kind (sigma, true stress) is not
+    taken, and nothing that is called shear.
+    """
+    columns_of: dict[str, list[int]] = {}
+    for column, quantity in enumerate(quantities):
+        kind = measured_in(heading(table.names[column]).unit or table.units[column].strip(f"{BRACKETS} "))
+        is_rival = column != load and bool(quantity) and kind != "time" and not _is_of_something_else(quantity)
+        if is_rival and not table.is_constant(column):
+            columns_of.setdefault(kind, []).append(column)
+    rivals = [column for kind, columns in columns_of.items() if kind not in LOADS for column in columns]
+    for kind in kinds:
+        columns = columns_of.get(kind, [])
+        if len(columns) == 1 and (load is None or rivals == columns):
+            name = quantities[columns[0]]
+            is_open = kind == "stress" and NOT_ENGINEERING.search(name)
+            return None if is_open or name in role_names("shear") else (kind, columns[0])
+    return None
+
+
+def _is_of_something_else(quantity: str) -> bool:
+    """Tell whether a name is of a dimension of the specimen, a count, a time or a modulus."""
+    return any(quantity in names for names in (*DIMENSION_NAMES.values(), CYCLE_NAMES)) or bool(
+        NEITHER_LOAD_NOR_DEFORMATION.search(quantity)
+    )
+
+
 def _recognise(
     table: Table,
     quantities: Sequence[str],
@@ -230,7 +284,7 @@ def _recognise(
     if len(columns) > 1:
         raise _ambiguous(table, candidates, columns)
     if not columns:
-        hint = _stress_hint(table, stress_type) if "stress" in roles else ""
+        hint = _stress_hint(table, stress_type) if "stress" in roles else _shear_hint(table, quantities, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
@@ -248,6 +302,13 @@ def _stress_hint(table: Table, stress_type: str) -> str:
                 f'to read it give stress_type="{kind}" (--stress-type {kind}).'
             )
     return ""
+
+
+def _shear_hint(table: Table, quantities: Sequence[str], roles: Sequence[str]) -> str:
+    columns = [] if "shear" in roles else _fitting(quantities, ["shear"])
+    if not columns:
+        return ""
+    return f" Column {table.label(columns[0])} is an amount of shear; if it is simple shear, give --mode simple-shear."
 
 
 def _ambiguous(table: Table, roles: Sequence[str], columns: Sequence[int]) -> InputError:

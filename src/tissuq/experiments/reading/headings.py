@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from tissuq.experiments.reading.units import looks_like_unit
+from tissuq.experiments.reading.units import BRACKETS, looks_like_unit
 
 __all__ = [
     "CYCLE_NAMES",
@@ -29,7 +29,8 @@ def _names(text: str) -> frozenset[str]:
 ROLES = {
     "stretch": _names("stretch, stretch ratio, lambda, λ"),
     "strain": _names(
-        "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung"
+        "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung, eps, "
+        "epsilon, ε"
     ),
     "shear": _names("shear, amount of shear, shear strain, gamma, γ"),
     "displacement": _names(
@@ -80,12 +81,17 @@ DIMENSION_NAMES = {
 }
 
 
+AXES = {"x": "x", "y": "y", "1": "x", "2": "y"}
+"""Axes of a biaxial machine, by how columns name them."""
+
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[({<](?P<unit>[^\])}>]*)[\])}>]?"),
     re.compile(r"(?P<quantity>[^/]+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
     re.compile(r"(?P<quantity>.+?)\s*/\s*(?P<unit>.+)"),
 )
 """Forms of a name with a unit; brackets are often mistyped, as in ``Stress [kPa}``."""
+QUOTIENT = re.compile(rf"[^{re.escape(BRACKETS)}/]+/[^{re.escape(BRACKETS)}/]+")
+"""A unit without brackets, as in ``Stress N/mm^2``."""
 UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[-_.:;|\s](?P<unit>\S*[^\W\d_]\S*|%)")
 
 
@@ -102,7 +108,8 @@ def heading(name: str) -> Heading:
     name = name.strip()
     matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
     suffix = UNIT_AS_SUFFIX.fullmatch(name)
-    if not matches and suffix is not None and looks_like_unit(suffix["unit"]):
+    is_unit = suffix is not None and looks_like_unit(suffix["unit"])
+    if suffix is not None and is_unit and (not matches or QUOTIENT.fullmatch(suffix["unit"])):
         matches = [suffix]
     if not matches:
         return Heading(plain(name))
@@ -134,13 +141,15 @@ def is_of_specimens(quantity: str) -> bool:
 def on_axis(quantity: str) -> tuple[str, str]:
     """Return the axis (x, y, or nothing) that a column of a biaxial machine belongs to, and its name without it.
 
+    Axes that are numbered 1 and 2 are x and y.
+
     Examples
     --------
-    >>> on_axis("xforce"), on_axis("stress y"), on_axis("load")
-    (('x', 'force'), ('y', 'stress'), ('', 'load'))
+    >>> on_axis("xforce"), on_axis("stress y"), on_axis("stretch 1"), on_axis("load")
+    (('x', 'force'), ('y', 'stress'), ('x', 'stretch'), ('', 'load'))
     """
     names = frozenset().union(*ROLES.values(), *STRESS_NAMES.values(), ["size"])
     for axis, name in ((quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())):
-        if axis in ("x", "y") and name in names:
-            return axis, name
+        if axis in AXES and name in names:
+            return AXES[axis], name
     return "", quantity

@@ -68,10 +68,11 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
         return None
     first_row = _with_faulty_rows_above(lines, cells, confirmed)
     units_row = first_row - 1
-    has_units = units_row > 0 and _is_units_row(cells(lines[units_row])) and _are_names(cells(lines[units_row - 1]))
+    has_units = units_row > 0 and _is_units_row(cells(lines[units_row]))
+    has_units = has_units and _are_names(_without_number(cells(lines[units_row - 1])))
     names_row = units_row - has_units
     width = len(cells(lines[confirmed]))
-    has_names = names_row >= 0 and bool(column_names(lines[names_row], width, separator))
+    has_names = names_row >= 0 and bool(column_names(lines[names_row], width, separator, has_units=has_units))
     return Layout(separator, first_row, width, names_row if has_names else None, units_row if has_units else None)
 
 
@@ -90,8 +91,10 @@ def split(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
 
 
-def column_names(line: str, width: int, separator: str) -> list[str]:
+def column_names(line: str, width: int, separator: str, *, has_units: bool = False) -> list[str]:
     """Return the column names in a line above ``width`` columns of data; none when it holds no names.
+
+    Above a row of units the first may be the number of a table.
 
     Columns separated by blanks may have blanks in their names when two or more stand between names.
     """
@@ -104,7 +107,12 @@ def column_names(line: str, width: int, separator: str) -> list[str]:
         names.pop()
     if len(names) > width:
         names = _with_units_joined(names)
-    return names if _are_names(names) else []
+    return names if _are_names(_without_number(names) if has_units else names) else []
+
+
+def _without_number(names: Sequence[str]) -> Sequence[str]:
+    """Return names without a number that stands before them."""
+    return names[1:] if names and NUMBER.fullmatch(names[0]) else names
 
 
 def _with_units_joined(names: Sequence[str]) -> list[str]:

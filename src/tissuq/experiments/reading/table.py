@@ -25,6 +25,8 @@ Lines = list[tuple[int, str]]
 
 LONG_FILE = 10_000
 """Lines from which a file is first tried on a fast parser."""
+FEW_ROWS = 200
+"""Rows that show whether a column is constant."""
 HEAD_LINES = 1000
 """Lines of a long file that show its layout."""
 
@@ -85,6 +87,12 @@ class Table:
         return replace(
             self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions], block=block
         )
+
+    def is_constant(self, column: int) -> bool:
+        """Tell whether a column (counted from 0) has the same cell, or no number, in some rows all along."""
+        few = self.taken(np.linspace(0, len(self.rows) - 1, min(len(self.rows), FEW_ROWS)).astype(np.intp))
+        cells = set(few.texts(column))
+        return len(cells) < 2 or not any(NUMBER.fullmatch(cell) for cell in cells)
 
     def texts(self, column: int) -> list[str]:
         """Return the cells of a column (counted from 0) as text, empty ones where a row ends before it."""
@@ -220,7 +228,7 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
         header_line, header = _comment_above(filled, first_line)
     else:
         header_line, header = content[layout.names]
-    names = column_names(header, layout.width, layout.separator)
+    names = column_names(header, layout.width, layout.separator, has_units=layout.units is not None)
     width = len(names) or layout.width
     units = [] if layout.units is None else split(texts[layout.units], layout.separator)
     table = Table(

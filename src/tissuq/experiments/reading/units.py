@@ -20,6 +20,7 @@ __all__ = [
     "Quantity",
     "StressUnit",
     "looks_like_unit",
+    "measured_in",
     "number_and_unit",
     "strain_factor",
     "stress_unit",
@@ -70,6 +71,7 @@ SYMBOLS = (
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
+TIMES = ("s", "sec", "ms", "min", "h")
 MASSES = ("g", "kg")
 """Units of mass that are written where units of force are meant."""
 
@@ -198,6 +200,23 @@ FORCE = Quantity(
     "N",
     {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
 )
+
+
+def measured_in(unit: str) -> str:
+    """Return what a usual unit is one of: stress, force, length, strain or time; nothing for others, and for none.
+
+    Examples
+    --------
+    >>> [measured_in(unit) for unit in ("kPa", "N", "mm", "%", "s", "V", "")]
+    ['stress', 'force', 'length', 'strain', 'time', '', '']
+    """
+    compact = re.sub(r"\s+|\^|\*\*", "", unit).replace("²", "2")
+    if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
+        return "stress"
+    for quantity in (FORCE, LENGTH):
+        if quantity.factor_or_none(compact) is not None:
+            return quantity.name
+    return "strain" if compact and compact.lower() in STRAIN_UNITS else "time" if compact.lower() in TIMES else ""
 
 
 def number_and_unit(text: str) -> tuple[float | None, str]:
