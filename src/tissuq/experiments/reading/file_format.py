@@ -1,4 +1,4 @@
-"""Files with sheets of cells: a class for each format, known by the first bytes of its files; Excel workbooks."""
+"""Files with sheets of cells: a class for each format, known by the first bytes of its files; workbooks of Excel."""
 
 from __future__ import annotations
 
@@ -117,19 +117,49 @@ class Workbook(FileFormat):
         return sheets
 
 
+class OldWorkbook(FileFormat):
+    """Sheets of a workbook of the old kind, as rheometers write it; a percentage is the ratio that is stored."""
+
+    name = "xls"
+    signature = bytes.fromhex("d0cf11e0a1b11ae1")
+
+    def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
+        try:
+            from python_calamine import CalamineWorkbook
+        except ImportError as error:
+            raise InputError(
+                f"{path} is an Excel workbook of the old kind; reading it needs python-calamine: pip install "
+                "'tissuq[excel]'. Or save it as .xlsx or CSV and give that file."
+            ) from error
+        try:
+            book = CalamineWorkbook.from_path(os.fspath(path))
+            rows = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
+        except Exception as error:  # of several kinds, from Rust
+            raise InputError(
+                f"{path} seems to be an Excel workbook of the old kind, but it cannot be opened: {error}. Save it as "
+                ".xlsx or CSV and give that file."
+            ) from error
+        return {name: ["\t".join(map(_text, row)).rstrip("\t") for row in page] for name, page in rows.items()}
+
+
 def _sheet_rows(sheet: Any) -> list[str]:
     sheet.reset_dimensions()  # else one stray cell far to the right makes every row that long
     return ["\t".join(map(_cell_text, row)).rstrip("\t") for row in sheet.iter_rows()]
 
 
 def _cell_text(cell: Any) -> str:
-    """Return a cell as text, numbers to the last digit; one shown as a percentage says so."""
+    """Return a cell as text; a number that is shown as a percentage says so."""
     value = cell.value
+    is_percentage = isinstance(value, int | float) and "%" in str(cell.number_format)
+    return f"{100 * value!r} %" if is_percentage else _text(value)
+
+
+def _text(value: Any) -> str:
+    """Return the value of a cell as text, numbers to the last digit."""
     if value is None:
         return ""
     if isinstance(value, date | time):
         return value.isoformat()
     if isinstance(value, int | float):
-        is_percentage = "%" in str(cell.number_format)
-        return f"{100 * value!r} %" if is_percentage else repr(value)
+        return repr(value)
     return " ".join(str(value).replace('"', "'").split())

@@ -19,7 +19,7 @@ from tissuq.experiments.reading.table import read_table
 
 __all__ = ["SUFFIXES", "find_mode", "find_tests", "read_column", "stated_mode"]
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls")
 """Of files in a folder that may hold measurements."""
 MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "shear": "simple-shear"}
 """Words for loading modes beside their names."""

@@ -13,7 +13,6 @@ __all__ = ["read_lines"]
 
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_TEXT = {
-    b"\xd0\xcf\x11\xe0": "an Excel workbook of the old kind",
     b"%PDF": "a PDF document",
     b"\x89HDF": "an HDF5 file",
 }
