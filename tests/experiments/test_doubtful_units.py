@@ -5,7 +5,7 @@ import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments import datasets
 from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
-from tissuq.experiments.reading.units import stress_units_in
+from tissuq.experiments.units import stress_units_in
 
 ROWS = "0,0\n0.1,2\n0.2,5\n"
 

@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.units import looks_like_unit, strain_factor, stress_unit
+from tissuq.experiments.units import looks_like_unit, strain_factor, stress_unit
 
 MPA = {
     "MPa": 1.0,
@@ -113,7 +113,7 @@ def test_names_and_values_do_not_look_like_units(text):
 
 def test_common_units_need_no_units_library():
     code = (
-        "import sys; from tissuq.experiments.reading.units import stress_unit\n"
+        "import sys; from tissuq.experiments.units import stress_unit\n"
         "for unit in ['MPa', 'kPa', 'Pa', 'KPa', 'N/mm2', 'N/mm²', 'psi']: stress_unit(unit)\n"
         "sys.exit('pint' in sys.modules)"
     )
@@ -122,6 +122,6 @@ def test_common_units_need_no_units_library():
 
 @pytest.mark.parametrize("unit", ["9**9**9*Pa", "Pa**9**9", "9^9^9^9 Pa", "(9**9)**9*Pa", "Pa*99**99999999"])
 def test_arithmetic_of_numbers_in_a_unit_is_not_carried_out(unit, monkeypatch):
-    monkeypatch.setattr("tissuq.experiments.reading.units._pint_registry", lambda: pytest.fail("it was evaluated"))
+    monkeypatch.setattr("tissuq.experiments.units._pint_registry", lambda: pytest.fail("it was evaluated"))
     with pytest.raises(InputError, match="is not known"):
         stress_unit(unit)

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import halfcauchy, multivariate_normal
 
 import tissuq as tq
+from autoregression import autoregressive_errors
 from marks import slow_but
 from tissuq.experiments.reading.experiment_file import STRESS_TYPES
 from tissuq.prediction.densities import leave_one_out
@@ -219,11 +220,8 @@ def test_a_prediction_says_its_mode():
 
 
 def autoregressive(seed, lag, count=80, sd=0.05):
-    stretch, score = np.linspace(0.7, 1.8, count), np.random.default_rng(seed).standard_normal(count)
-    error = [score[0]]
-    for new in score[1:]:
-        error.append(lag * error[-1] + np.sqrt(1 - lag**2) * new)
-    return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * np.array(error))
+    stretch, errors = np.linspace(0.7, 1.8, count), autoregressive_errors(count, lag, seed)
+    return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * errors)
 
 
 def test_correlated_noise_is_generalised_least_squares_at_the_likeliest_lag():

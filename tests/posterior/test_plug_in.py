@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from autoregression import autoregressive_errors
 from tissuq.experiments.modes import loading_mode
 from tissuq.model.tolerances import CONTRADICTION_SPREAD
 from tissuq.posterior.plug_in import FACTORS
@@ -167,11 +168,8 @@ def test_each_contradictory_test_is_predicted_by_the_model_of_all(monkeypatch):
 
 def drifting(lag, count=80, sd=0.02, seed=4):
     """One test whose errors are those of first-order autoregression."""
-    stretch, score = np.linspace(0.8, 1.5, count), np.random.default_rng(seed).standard_normal(count)
-    errors = [score[0]]
-    for new in score[1:]:
-        errors.append(lag * errors[-1] + np.sqrt(1 - lag**2) * new)
-    return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * np.array(errors))
+    stretch, errors = np.linspace(0.8, 1.5, count), autoregressive_errors(count, lag, seed)
+    return tq.Experiment("uniaxial", stretch, 1.2 * (stretch - stretch**-2) + sd * errors)
 
 
 def test_unknown_noise_is_autoregressive_where_the_data_are_more_probable_so():

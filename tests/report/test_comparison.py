@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.report.comparison import comparison_figure, readable_comparison, write_comparison
 
 KPA = StressUnit("kPa", 1e-3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.report.figures import marginal_figure, predictive_figure, save_figure
 
 KPA = StressUnit("kPa", 1e-3)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import tissuq as tq
-from tissuq.experiments.reading.units import stress_unit
+from tissuq.experiments.units import stress_unit
 from tissuq.report.laws import law_lead
 
 

@@ -3,7 +3,7 @@ from math import nan
 
 import pytest
 
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.report.tables import interval, readable_stability, readable_summary, significant, write_csv, write_json
 
 ROW = {

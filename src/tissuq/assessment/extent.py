@@ -22,7 +22,7 @@ from tissuq.assessment.sensitivity import (
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.experiments.modes import States
-from tissuq.experiments.reading.units import stress_unit
+from tissuq.experiments.units import stress_unit
 from tissuq.inference.enumerators.noise_grid import at_level
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.quasi_monte_carlo import systematic

@@ -245,7 +245,7 @@ def compare(
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits
     from tissuq.cli.tables import print_explanations, print_rows, print_warnings
-    from tissuq.experiments.reading.units import stress_unit
+    from tissuq.experiments.units import stress_unit
     from tissuq.report.comparison import (
         EXPLANATIONS,
         HEADERS,

@@ -115,7 +115,7 @@ def _print_held_out(path: Path, headline: str, unit: str) -> None:
     """Print how each test is predicted from the others, if requested."""
     if not path.exists():
         return
-    from tissuq.experiments.reading.units import stress_unit
+    from tissuq.experiments.units import stress_unit
     from tissuq.report.tables import HELD_OUT, readable_held_out
 
     with damage_reported(path):
@@ -142,7 +142,7 @@ def _read_run(
     """Return the rows of the summary, the same for people, the unit of stress and a title."""
     import tomllib
 
-    from tissuq.experiments.reading.units import stress_unit
+    from tissuq.experiments.units import stress_unit
     from tissuq.report.tables import readable_summary
     from tissuq.studies.specimen import SpecimenSettings
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
-from tissuq.experiments.reading.units import stress_unit as stress_unit_of
+from tissuq.experiments.units import stress_unit as stress_unit_of
 
 __all__ = ["Curve", "Experiment", "checked_points"]
 

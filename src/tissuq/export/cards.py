@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.units import stress_unit
+from tissuq.experiments.units import stress_unit
 from tissuq.export.states import SeenStates
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.registry import find, variants

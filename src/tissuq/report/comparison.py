@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import write_figures, write_page
 from tissuq.report.tables import interval

@@ -15,7 +15,7 @@ from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
 from tissuq.experiments.experiment import Curve
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 

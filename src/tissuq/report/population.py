@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import (
     INPUT,

@@ -12,7 +12,7 @@ from tissuq.assessment import Assessment
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
-from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.posterior.posterior import Posterior
 from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import (

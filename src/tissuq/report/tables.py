@@ -13,7 +13,7 @@ from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
 from tissuq.posterior.labelled import summaries
 
 if TYPE_CHECKING:
-    from tissuq.experiments.reading.units import StressUnit
+    from tissuq.experiments.units import StressUnit
     from tissuq.model.tolerances import Tolerances
     from tissuq.posterior.posterior import Posterior
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Yeoh, engineering_stress
 from tissuq.report.coverage_figures import COLORS, campaign_figures
 from tissuq.report.figures import new_figure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.next_test.candidates import MODULUS, Candidate, Target, candidate_named, target_named
 from tissuq.next_test.next_test import NextTest

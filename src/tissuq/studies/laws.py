@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from tissuq.assessment.measurements import measurement_warnings
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws, laws_named

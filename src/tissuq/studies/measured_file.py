@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
-from tissuq.experiments.reading.units import StressUnit
+from tissuq.experiments.units import StressUnit
 from tissuq.model.noise import Noise, noise_named
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.solver import Method

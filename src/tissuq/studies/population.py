@@ -16,7 +16,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.several_files import find_mode, find_tests, read_column
-from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
 from tissuq.studies.measured_file import FittedSettings, MeasuredTest, ReadingSettings

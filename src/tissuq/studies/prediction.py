@@ -16,7 +16,7 @@ from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN

@@ -21,7 +21,7 @@ from tissuq.experiments.reading.headings import (
     role_names,
 )
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.units import BRACKETS, measured_in
+from tissuq.experiments.units import measured_in
 
 __all__ = ["DEFORMATIONS", "LOADS", "ColumnChoice", "about_stress", "choose_columns", "find_column"]
 
@@ -251,7 +251,8 @@ def _told_by_unit(
     """
     columns_of: dict[str, list[int]] = {}
     for column, quantity in enumerate(quantities):
-        kind = measured_in(heading(table.names[column]).unit or table.units[column].strip(f"{BRACKETS} "))
+        in_heading, beneath = table.stated_units(column)
+        kind = measured_in(beneath or in_heading)
         is_rival = column != load and bool(quantity) and kind != "time" and not _is_of_something_else(quantity)
         if is_rival and not table.is_constant(column):
             columns_of.setdefault(kind, []).append(column)

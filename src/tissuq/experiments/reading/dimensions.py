@@ -15,7 +15,7 @@ from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import DIMENSION_NAMES, heading, on_axis
 from tissuq.experiments.reading.layout import WHITESPACE, split
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.units import AREA, LENGTH, Quantity, number_and_unit
+from tissuq.experiments.units import AREA, LENGTH, Quantity, number_and_unit
 
 __all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
 

@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TypedDict, Unpack
 
@@ -82,6 +83,11 @@ class Reading:
     used: MeasuredRows
     cycles: tuple[Cycle, ...]
     warnings: tuple[str, ...]
+
+    @cached_property
+    def used_cycles(self) -> list[Cycle]:
+        """The cycles of the rows of the experiment."""
+        return find_cycles(self.used.table, self.used.course)
 
 
 def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Experiment:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import warnings
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import date, time
 from typing import Any, ClassVar
 
@@ -96,24 +98,13 @@ class Workbook(FileFormat):
     signature = b"PK\x03\x04"
 
     def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
-        try:
+        with _explained(path, "an Excel workbook", "openpyxl", "export the table as CSV"), warnings.catch_warnings():
             import openpyxl
-        except ImportError as error:
-            raise InputError(
-                f"{path} is an Excel workbook; reading it needs openpyxl: pip install 'tissuq[excel]'. "
-                "Or export the table as CSV and give that file."
-            ) from error
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of features such as drop-down lists, which are not read
-                book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-                sheets = {page.title: _sheet_rows(page) for page in book.worksheets}
-                book.close()
-        except Exception as error:  # openpyxl raises whatever zipfile and its parsers do
-            raise InputError(
-                f"{path} seems to be an Excel workbook, but it cannot be opened: {error}. Export the table as CSV and "
-                "give that file."
-            ) from error
+
+            warnings.simplefilter("ignore")  # of features such as drop-down lists, which are not read
+            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+            sheets = {page.title: _sheet_rows(page) for page in book.worksheets}
+            book.close()
         return sheets
 
 
@@ -124,22 +115,29 @@ class OldWorkbook(FileFormat):
     signature = bytes.fromhex("d0cf11e0a1b11ae1")
 
     def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
-        try:
+        kind, cure = "an Excel workbook of the old kind", "save it as .xlsx or CSV"
+        with _explained(path, kind, "python-calamine", cure):
             from python_calamine import CalamineWorkbook
-        except ImportError as error:
-            raise InputError(
-                f"{path} is an Excel workbook of the old kind; reading it needs python-calamine: pip install "
-                "'tissuq[excel]'. Or save it as .xlsx or CSV and give that file."
-            ) from error
-        try:
+
             book = CalamineWorkbook.from_path(os.fspath(path))
             rows = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
-        except Exception as error:  # of several kinds, from Rust
-            raise InputError(
-                f"{path} seems to be an Excel workbook of the old kind, but it cannot be opened: {error}. Save it as "
-                ".xlsx or CSV and give that file."
-            ) from error
         return {name: ["\t".join(map(_text, row)).rstrip("\t") for row in page] for name, page in rows.items()}
+
+
+@contextmanager
+def _explained(path: str | os.PathLike[str], kind: str, library: str, cure: str) -> Iterator[None]:
+    """Turn whatever a library raises, or that it is missing, into what to do instead."""
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(
+            f"{path} is {kind}; reading it needs {library}: pip install 'tissuq[excel]'. Or {cure} and give that file."
+        ) from error
+    except Exception as error:  # openpyxl raises whatever zipfile and its parsers do, python-calamine what Rust does
+        raise InputError(
+            f"{path} seems to be {kind}, but it cannot be opened: {error}. {cure[0].upper()}{cure[1:]} and give that "
+            "file."
+        ) from error
 
 
 def _sheet_rows(sheet: Any) -> list[str]:

@@ -10,14 +10,13 @@ import numpy as np
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import STRETCH, Control
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.cycles import find_cycles
 from tissuq.experiments.reading.events import find_holds, find_rupture
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
 from tissuq.experiments.reading.slack import find_slack
-from tissuq.experiments.reading.units import stress_unit
+from tissuq.experiments.units import stress_unit
 
 __all__ = ["data_warnings"]
 
@@ -59,7 +58,7 @@ def _stretch_size(reading: Reading, number: int) -> str:
 
 
 def _cycles(reading: Reading, number: int) -> str:
-    count = len(find_cycles(reading.used.table, reading.used.course))
+    count = len(reading.used_cycles)
     if count < 2 or len(reading.used) < MIN_ROWS_PER_CYCLE * count:
         return ""
     numbered = advice_on_numbered_tests(reading.table, reading.choices, reading.recorded.course)
@@ -70,7 +69,7 @@ def _cycles(reading: Reading, number: int) -> str:
 def _rupture(reading: Reading, number: int) -> str:
     used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
     control, peak = _control(reading), int(np.argmax(np.abs(stress)))
-    for cycle in find_cycles(used.table, course):
+    for cycle in reading.used_cycles:
         rows = cycle.rows("loading")
         if rupture := find_rupture(course[rows], stress[rows], control.reference):
             row, rows = rows[rupture.start - 1], rows[rows <= peak]
@@ -102,8 +101,8 @@ def _holds(reading: Reading, number: int) -> str:
 def _hysteresis(reading: Reading, number: int) -> str:
     if _rupture(reading, number) or _holds(reading, number):
         return ""
-    used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
-    cycle = find_cycles(used.table, course)[-1]
+    course, stress = reading.used.course, reading.used.stress[number]
+    cycle = reading.used_cycles[-1]
     branches = [cycle.rows("loading"), cycle.rows("unloading")]
     if min(map(len, branches)) < MIN_ROWS_PER_CYCLE / 2:
         return ""
@@ -144,7 +143,7 @@ def _slack(reading: Reading, number: int) -> str:
     used, mode = reading.used, reading.experiment.mode
     if any("the preload" in step for step in used.steps):
         return ""
-    loading = find_cycles(used.table, used.course)[0].rows("loading")
+    loading = reading.used_cycles[0].rows("loading")
     rupture = find_rupture(used.course[loading], used.stress[number][loading], _control(reading).reference)
     loading = loading[: rupture.start if rupture else None]
     loading = loading[: int(np.argmax(np.abs(used.stress[number][loading]))) + 1]

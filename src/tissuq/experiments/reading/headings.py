@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from tissuq.experiments.reading.units import BRACKETS, looks_like_unit
+from tissuq.experiments.units import BRACKETS, looks_like_unit
 
 __all__ = [
     "CYCLE_NAMES",

@@ -15,7 +15,7 @@ from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, 
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
-from tissuq.experiments.reading.units import stress_unit
+from tissuq.experiments.units import stress_unit
 
 __all__ = ["Inspection", "inspect", "noise_between_neighbours"]
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tissuq.experiments.reading.units import NUMBER, looks_like_unit
+from tissuq.experiments.units import NUMBER, looks_like_unit
 
 __all__ = ["WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
 

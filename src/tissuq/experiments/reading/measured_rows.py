@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.units import FORCE, MASSES, number_and_unit, stress_unit
+from tissuq.experiments.units import FORCE, MASSES, number_and_unit, stress_unit
 
 __all__ = ["Dropped", "MeasuredRows", "labelled", "preload_stress"]
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading import units
+from tissuq.experiments import units
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, initial_size
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
 from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_lengths, check_positions
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.units import FORCE, LENGTH, Quantity, number_and_unit
+from tissuq.experiments.units import FORCE, LENGTH, Quantity, number_and_unit
 
 __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of"]
 
@@ -183,8 +182,7 @@ def _declared_unit(table: Table, column: int) -> str:
     InputError
         When both state one and they differ.
     """
-    in_heading = heading(table.names[column]).unit
-    beneath = table.units[column].strip(f"{units.BRACKETS} ")
+    in_heading, beneath = table.stated_units(column)
     if in_heading and beneath and in_heading != beneath and units.looks_like_unit(in_heading):
         raise InputError(
             f"{table.place(column)}: the name says '{in_heading}' but the row of units beneath it says "

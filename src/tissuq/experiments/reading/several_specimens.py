@@ -11,7 +11,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice, find_column
 from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading, is_of_specimens, plain
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.units import NUMBER
+from tissuq.experiments.units import NUMBER
 
 __all__ = ["advice_on_numbered_tests", "check_one_specimen", "only_rows", "row_names"]
 
@@ -85,7 +85,7 @@ def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], cour
 def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
     """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
-    some_rows = table.taken(np.arange(0, len(table.rows), max(1, len(table.rows) // SAMPLED_ROWS)))
+    some_rows = table.some_rows(SAMPLED_ROWS)
     for column in sorted(set(range(len(table.names))) - used):
         quantity = _quantity(table, column)
         if quantity in CYCLE_NAMES | SET_NAMES or (table.block is not None and not is_of_specimens(quantity)):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.reading.layout import MISSING
-from tissuq.experiments.reading.units import NUMBER
+from tissuq.experiments.units import NUMBER
 
 __all__ = ["Summary", "find_summary"]
 

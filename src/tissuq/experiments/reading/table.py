@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.file_format import file_format, sheet_lines
+from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import WHITESPACE, column_names, find_layout, is_comment, split
 from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.text_file import read_lines
-from tissuq.experiments.reading.units import NUMBER
+from tissuq.experiments.units import BRACKETS, NUMBER
 
 __all__ = ["Column", "Table", "read_table"]
 
@@ -88,10 +89,17 @@ class Table:
             self, rows=[self.rows[k] for k in positions], lines=[self.lines[k] for k in positions], block=block
         )
 
+    def some_rows(self, count: int) -> Table:
+        """Return the table with rows at equal distances, about so many."""
+        return self.taken(np.arange(0, len(self.rows), max(1, len(self.rows) // count)))
+
+    def stated_units(self, column: int) -> tuple[str, str]:
+        """Return the units in a column's name and in the row of units; empty texts where there is none."""
+        return heading(self.names[column]).unit, self.units[column].strip(f"{BRACKETS} ")
+
     def is_constant(self, column: int) -> bool:
         """Tell whether a column (counted from 0) has the same cell, or no number, in some rows all along."""
-        few = self.taken(np.linspace(0, len(self.rows) - 1, min(len(self.rows), FEW_ROWS)).astype(np.intp))
-        cells = set(few.texts(column))
+        cells = set(self.some_rows(FEW_ROWS).texts(column))
         return len(cells) < 2 or not any(NUMBER.fullmatch(cell) for cell in cells)
 
     def texts(self, column: int) -> list[str]:
