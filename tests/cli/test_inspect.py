@@ -1,10 +1,12 @@
 """``tissuq inspect``, and the same options with ``tissuq fit``."""
 
+import os
 import subprocess
 import sys
 import tomllib
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from machine_files import biotester_protocols, instron, wintest, zwick
@@ -128,15 +130,18 @@ def test_an_inspection_needs_neither_jax_nor_matplotlib(tmp_path):
     assert said.splitlines()[-1] == "[]"
 
 
-def test_one_specimen_of_a_table_is_read_as_the_refusal_says(cli, here):
+def test_specimens_of_a_table_are_listed_and_one_of_them_is_read(cli, here):
     rows = [f"{name},{1 + k / 100},{factor * k}" for name, factor in (("a 1", 1), ("b 2", 2)) for k in range(10)]
     (here / "all.csv").write_text("\n".join(["Specimen,stretch,stress [kPa]", *rows]) + "\n")
     said = cli("inspect", "all.csv")
-    assert said.status == 2
-    assert "--only 'Specimen=a 1'" in said.err
-    said = cli("inspect", "all.csv", "--only", "Specimen=b 2")
     assert said.status == 0
-    assert "0 to 18 kPa" in said.out
+    assert "2 tests were understood" in said.out
+    for arguments in (["all.csv#b 2"], ["all.csv#2"], ["all.csv", "--only", "Specimen=b 2"]):
+        said = cli("inspect", *arguments)
+        assert said.status == 0
+        assert "0 to 18 kPa" in said.out
+    said = cli("inspect", "all.csv#c")
+    assert (said.status, said.err) == (2, "tissuq: there is no test 'c' in all.csv. Its tests are: 'a 1', 'b 2'.\n")
     assert cli("inspect", "all.csv", "--only", "Specimen").status == 2
 
 
@@ -153,3 +158,68 @@ def test_positions_and_a_rupture_are_read_by_options(cli, here):
     said = cli("inspect", "torn.csv", *options, "--zero", "first", "--until-peak")
     assert "stretch   1 to 1.38" in said.out
     assert "Note" not in said.out
+
+
+def liver_file(folder):
+    """Two tests of stretch and one of shear, beneath one another."""
+    stretch = np.linspace(1, 1.3, 12)
+    tables = [
+        ("tension", "stretch", stretch, 40 * (stretch - stretch**-2)),
+        ("shear", "shear", stretch - 1, 40 * (stretch - 1)),
+    ]
+    lines = []
+    for title, name, deformation, stress in tables:
+        lines += ["", title, f"{name}\tstress [kPa]"]
+        lines += [f"{a:.6f}\t{b:.6f}" for a, b in zip(deformation, stress, strict=True)]
+    (folder / "liver.txt").write_text("\n".join(lines) + "\n")
+
+
+def test_a_study_of_all_tests_in_a_file_is_written_and_fitted(cli, here):
+    liver_file(here)
+    said = cli("inspect", "liver.txt", "--write", "study.toml")
+    assert said.status == 0
+    assert "test 1    tension: uniaxial ('tension'), 12 rows, stretch 1 to 1.3" in said.out
+    assert "test 2    shear: simple-shear ('shear'), 12 rows, stretch 0 to 0.3, stress 0 to 12 kPa" in said.out
+    assert cli("inspect", "liver.txt", "--write", "study.toml").status == 2
+    study = here / "study.toml"
+    assert [test["table"] for test in tomllib.loads(study.read_text())["tests"]] == [1, 2]
+    study.write_text(study.read_text().replace('# specimen = "S1" ', 'specimen = "S1" '))
+    options = ["--discrepancy", "none", "--no-figures"]
+    assert cli("fit", "study.toml", *options, "--out", "from-study").status == 0
+    assert cli("fit", "liver.txt", *options, "--out", "from-file").status == 0
+    recipe = tomllib.loads((here / "from-study" / "run.toml").read_text())
+    assert [test["specimen"] for test in recipe["tests"]] == ["S1", ""]
+    assert [test["mode"] for test in recipe["tests"]] == ["uniaxial", "simple-shear"]
+    assert os.listdir(here / "from-file" / "input") == ["liver.txt"]
+    assert cli("fit", "--config", "from-file/run.toml", "--no-figures", "--out", "again").status == 0
+    summaries = [pd.read_csv(here / run / "summary.csv").drop(columns="seconds") for run in ("from-file", "again")]
+    pd.testing.assert_frame_equal(*summaries)
+
+
+def test_tests_in_a_file_take_a_mode_and_a_specimen_each(cli, here):
+    liver_file(here)
+    (here / "other.csv").write_text("stretch,stress [kPa]\n" + "".join(f"{1 + k / 20},{k}\n" for k in range(6)))
+    fit = ["fit", "liver.txt", "other.csv", "--discrepancy", "none", "--no-figures"]
+    said = cli(*fit)
+    assert (said.status, "neither 'other.csv' nor its name says in which loading mode" in said.err) == (2, True)
+    said = cli(*fit, "--mode", "uniaxial", "--mode", "simple-shear", "--mode", "planar", "--specimen", "A")
+    assert said.status == 0
+    recipe = tomllib.loads((here / "runs" / "liver-and-2-more" / "run.toml").read_text())
+    described = [(test["name"], test["mode"], test["specimen"]) for test in recipe["tests"]]
+    assert described == [
+        ("liver tension", "uniaxial", "A"),
+        ("liver shear", "simple-shear", "A"),
+        ("other", "planar", "A"),
+    ]
+    said = cli(*fit, "--mode", "uniaxial", "--mode", "planar", "--mode", "planar", "--mode", "planar")
+    assert "--mode is given 4 times for 2 files with 3 tests" in said.err
+
+
+def test_specimens_beside_one_another_are_a_population(cli, here):
+    stretch = np.linspace(1, 1.3, 12)
+    header = "stretch,stress S1 [kPa],stress S2 [kPa],stress S3 [kPa]"
+    rows = [",".join(f"{v:.6f}" for v in (s, *(k * (s - s**-2) for k in (30, 40, 50)))) for s in stretch]
+    (here / "all.csv").write_text("\n".join([header, *rows]) + "\n")
+    assert cli("population", "all.csv", "--discrepancy", "none", "--no-figures").status == 0
+    specimens = pd.read_csv(here / "runs" / "population" / "specimens.csv")
+    assert set(specimens.iloc[:, 0]) == {"s1", "s2", "s3"}

@@ -126,7 +126,7 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
             ["3 times"],
         ),
         (["tests/b.csv", "tests/uniaxial.csv", "--noise-sd", "1,2,3"], ["--noise-sd is given 3 times for 2 files"]),
-        (["tests/b.csv", "--noise-sd", "1,2"], ["--noise-sd is given 2 times for one file"]),
+        (["tests/b.csv", "--noise-sd", "1,2"], ["--noise-sd is given 2 times for one test"]),
         (["tests/b.csv", "--tolerance", "stress"], ["'stress' is not a tolerance; write stress=10%"]),
         (["tests/b.csv", "--tolerance", "zero=1%"], ["'zero=1%' is not a tolerance"]),
         (["tests/b.csv", "--tolerance", "stress=1%", "--tolerance", "stress=2%"], ["given twice for 'stress'"]),

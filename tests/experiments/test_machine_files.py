@@ -142,9 +142,10 @@ def test_positive_displacements_in_compression_change_their_sign_whatever_that_o
     np.testing.assert_allclose(data.stress, [0.0, -1.0])
 
 
-def test_a_biaxial_file_is_read_one_axis_at_a_time(tmp_path):
+def test_a_biaxial_file_is_of_both_axes_unless_another_mode_asks_for_one(tmp_path):
     path = biotester().written(tmp_path)
-    text = message(path)
+    assert read_file(path, dimensions={"thickness": "0.8 mm"}).mode_source == "columns of both axes"
+    text = message(path, mode="equibiaxial")
     assert "axis='x' (--axis x)" in text
     assert "both at once: mode='biaxial' (--mode biaxial)" in text
     assert "no columns of an axis 'x'" in message(instron().written(tmp_path), axis="x")

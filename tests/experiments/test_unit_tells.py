@@ -91,7 +91,7 @@ def test_axes_may_be_numbered(tmp_path):
         ("d (mm),e,F (N)", ["mm", "wide", "N"], "no column is recognised as stretch"),
         ("eps,sigma [kPa]", ["ratio", "kPa"], "no column is recognised as stress"),
         ("eps,True P [kPa]", ["ratio", "kPa"], "no column is recognised as stress"),
-        ("Shear [-],Stress [kPa]", ["ratio", "kPa"], "an amount of shear; if it is simple shear, give --mode simple-"),
+        ("Shear [-],Stress [kPa]", ["ratio", "kPa"], "'Shear \\[-\\]' is read as shear, which needs no length"),
     ],
 )
 def test_where_several_columns_could_be_meant_nothing_is_taken(tmp_path, names, kinds, words):

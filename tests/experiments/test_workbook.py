@@ -9,7 +9,7 @@ import pytest
 
 from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
-from tissuq.experiments.reading import file_format
+from tissuq.experiments.reading import workbooks
 from tissuq.experiments.reading.experiment_file import read_experiment, read_file
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
@@ -114,8 +114,8 @@ def test_a_stray_cell_in_the_last_column_does_not_make_every_row_that_long(tmp_p
     book.active["XFD1"] = "x"
     book.save(tmp_path / "stray.xlsx")
     cells = []
-    text = file_format._cell_text
-    monkeypatch.setattr(file_format, "_cell_text", lambda cell: cells.append(cell) or text(cell))
+    shown = workbooks._shown
+    monkeypatch.setattr(workbooks, "_shown", lambda cell: cells.append(cell) or shown(cell))
     found = read_experiment(tmp_path / "stray.xlsx")
     np.testing.assert_allclose(found.stretch, stretch, rtol=1e-12)
     assert len(cells) < 16_384 + 4 * (len(stretch) + 6)

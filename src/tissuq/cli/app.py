@@ -14,7 +14,7 @@ from tissuq.cli import (
     calibrate,
     catalogue,
     fit,
-    reading,
+    inspect,
     runs,
     structure,
     study,
@@ -54,7 +54,7 @@ def _tissuq(
 
 
 app.command("paper")(study.paper)
-app.command("inspect")(reading.inspect)
+app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
 app.command("predict")(runs.predict)
 app.command("population")(fit.population)

@@ -32,8 +32,9 @@ def fit(
     file: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="CSV or Excel file, or the name of a built-in data set (tissuq datasets); several files, or a folder "
-            "of them, are fitted together."
+            help="CSV, Excel or other file, or the name of a built-in data set (tissuq datasets); several files, a "
+            "folder of them, or several tests in a file are fitted together; FILE#NAME is one of these. Or STUDY.toml, "
+            "as tissuq inspect --write makes it."
         ),
     ] = None,
     material: Annotated[
@@ -111,6 +112,8 @@ def fit(
     from tissuq.studies.laws import LawSettings
     from tissuq.studies.specimen import SpecimenSettings
 
+    if config is None and file and [path.suffix for path in file] == [".toml"]:
+        config, file = file[0], None
     files = reading.files_of(file or [])
     options: dict[str, Any] = {
         "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,

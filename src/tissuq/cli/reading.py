@@ -1,4 +1,4 @@
-"""Files of measurements on the command line: options of reading, modes, specimens and noise; ``tissuq inspect``."""
+"""Files of measurements on the command line: options of reading, tests in them, modes, specimens and noise."""
 
 from __future__ import annotations
 
@@ -7,17 +7,30 @@ from functools import wraps
 from inspect import Parameter
 from inspect import signature as signature_of
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tissuq.cli.options import Force, once_each
+from tissuq.cli.options import once_each
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
 
-__all__ = ["Mode", "files_of", "inspect", "measured", "one_noise", "reads_files", "resolve", "run_name", "tolerances"]
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.experiment_file import Reading
 
-Mode = Annotated[str | None, typer.Option(help="Loading mode [uniaxial].")]
+__all__ = [
+    "Mode",
+    "files_of",
+    "find_tests",
+    "measured",
+    "one_noise",
+    "reads_files",
+    "resolve",
+    "run_name",
+    "tolerances",
+]
+
+Mode = Annotated[str | None, typer.Option(help="Loading mode [as file and columns say, or uniaxial].")]
 OPTIONS: dict[str, Any] = {
     "column": Annotated[
         list[str] | None,
@@ -64,10 +77,13 @@ OPTIONS: dict[str, Any] = {
     ],
     "every": Annotated[int | None, typer.Option(help="Use only every N-th row [1].")],
     "axis": Annotated[str | None, typer.Option(help="x or y: the only axis to read from a biaxial machine's file.")],
-    "sheet": Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")],
+    "sheet": Annotated[str | None, typer.Option(help="Sheet of a workbook, by name or number.")],
+    "table": Annotated[int | None, typer.Option(help="Which of several tables of a text or sheet, from 1.")],
     "skip_rows": Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")],
 }
 """The options, in the order of the help, by the names of the settings that they are."""
+SELECTION = ("sheet", "table", "columns", "only")
+"""Options that say where in a file a test is."""
 DIMENSIONS = ("length", "area", "width", "thickness", "diameter")
 
 
@@ -152,32 +168,79 @@ def measured(
     specimens: Sequence[str] | None,
     noise_sd: str | None,
 ) -> dict[str, Any]:
-    """Return the settings of a fit that say what was measured, of one file or of several.
+    """Return the settings of a fit that say what was measured: of the only test, or of each of several.
 
     Raises
     ------
     InputError
-        When there is not one mode, specimen or noise for each file, or a file does not say its mode.
+        When there is not one mode, specimen or noise for each file or test, or a test does not say its mode.
     """
-    from tissuq.experiments.reading.several_files import find_mode, stated_mode
+    from tissuq.experiments.modes import loading_modes
 
     noise = _numbers(noise_sd)
-    if len(files) < 2:
+    if not files:
+        return reading | {"noise_sd": noise[0] if noise else None}
+    of_files = [
+        find_tests(file, reading | {"mode": mode}, is_only_file=len(files) == 1)
+        for file, mode in zip(files, _modes(files, modes), strict=True)
+    ]
+    tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
+    if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
-                raise InputError(f"{option} is given {len(stated)} times for one file; give it once.")
-        file_setting: dict[str, Any] = {"file": str(files[0])} if files else {}
-        mode = modes[0] if modes else stated_mode(files[0]) if files else None
-        return reading | file_setting | {"mode": mode, "noise_sd": noise[0] if noise else None}
-    modes = _for_each(files, "--mode", modes) or [find_mode(file) for file in files]
-    names = _for_each(files, "--specimen", specimens)
-    each_noise = _for_each(files, "--noise-sd", noise) if noise and len(noise) > 1 else None
-    options = {name: value for name, value in reading.items() if value is not None}
-    tests = [options | {"file": str(file), "mode": mode} for file, mode in zip(files, modes, strict=True)]
-    for name, values in (("specimen", names), ("noise_sd", each_noise)):
-        for test, value in zip(tests, values or [], strict=False):
+                raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
+        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}
+    stated_noise = noise if noise and len(noise) > 1 else None
+    for name, option, values in (
+        ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)
+    ):  # fmt: skip
+        for test, value in zip(tests, _for_each(counts, option, values), strict=False):
             test[name] = value
+    silent = next((test["file"] for test in tests if "mode" not in test), None)
+    if silent is not None:
+        raise InputError(
+            f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for each "
+            f"file, in their order ({', '.join(loading_modes())})."
+        )
     return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}
+
+
+def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:
+    """Return the mode in which to read every file; None where it is given for each of several tests in it, or not."""
+    if not modes or len(modes) not in (1, len(files)):
+        return [None] * len(files)
+    return [*modes] * (len(files) if len(modes) == 1 else 1)
+
+
+def find_tests(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> list[tuple[dict[str, Any], Reading]]:
+    """Return the tests in a file, or the one that ``FILE#NAME`` names: the settings that read each, and what is read.
+
+    One of several files that does not say its mode is without one.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or there is no such test in it.
+    """
+    from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
+    from tissuq.experiments.reading.tests_in_file import find_tests_in_file
+    from tissuq.studies.measured_file import ReadingSettings
+
+    path, _, name = (str(file), "", "") if file.exists() else str(file).partition("#")
+    options = {name: value for name, value in reading.items() if value is not None}
+    tests = find_tests_in_file(path, **load_settings(ReadingSettings, None, options).reading_options)
+    names = {str(number): test for number, test in enumerate(tests, start=1)} | {test.name: test for test in tests}
+    if name and name not in names:
+        there_are = ", ".join(f"'{test.name}'" for test in tests)
+        raise InputError(f"there is no test '{name}' in {path}. Its tests are: {there_are}.")
+    settings = []
+    for test in [names[name]] if name else tests:
+        mode = test.options["mode"] if is_only_file or test.reading.mode_source != DEFAULT_SOURCE else None
+        of_test = options | {"file": path, "mode": mode, **{key: test.options.get(key) for key in SELECTION}}
+        if len(tests) > 1:
+            of_test["name"] = test.name if is_only_file else f"{Path(path).stem} {test.name}"
+        settings.append(({key: value for key, value in of_test.items() if value is not None}, test.reading))
+    return settings
 
 
 def tolerances(texts: Sequence[str] | None) -> dict[str, float] | None:
@@ -238,37 +301,18 @@ def _numbers(text: str | None) -> list[float | str] | None:
         ) from error
 
 
-def _for_each(files: Sequence[Path], option: str, values: Sequence[Any] | None) -> list[Any] | None:
+def _for_each(counts: Sequence[int], option: str, values: Sequence[Any] | None) -> list[Any]:
+    """Return the values of an option for every test, where they are given once, for each file or for each test.
+
+    ``counts`` are the numbers of tests in the files.
+    """
     if not values:
-        return None
-    if len(values) not in (1, len(files)):
-        raise InputError(f"{option} is given {len(values)} times for {len(files)} files; give it once for each.")
-    return list(values) * (len(files) if len(values) == 1 else 1)
-
-
-@reads_files
-def inspect(
-    file: Annotated[Path, typer.Argument(help="CSV or Excel file, or the name of a built-in data set.")],
-    mode: Mode = None,
-    *,
-    read_as: dict[str, Any],
-    out: Annotated[Path | None, typer.Option(help="Folder for figure, converted data and what is printed.")] = None,
-    force: Force = False,
-) -> None:
-    """Show what is understood of a file of measurements: columns, dimensions, cycles, rows, noise, warnings."""
-    from tissuq.experiments.reading.inspection import inspect as inspect_file
-    from tissuq.report.run_folder import check_target, run_folder
-    from tissuq.studies.measured_file import MeasuredFile
-
-    if out is not None:
-        check_target(out, force=force)
-    source = resolve(file)
-    settings = load_settings(MeasuredFile, None, read_as | {"mode": mode, "file": str(source)})
-    inspection = inspect_file(source, **settings.reading_options)
-    print(inspection)
-    if out is not None:
-        from tissuq.report.specimen import write_inspection
-
-        with run_folder(out, force=force) as folder:
-            write_inspection(inspection, folder)
-        print(f"\nFigure: {out / 'figures' / 'curve.png'}")
+        return []
+    if len(values) == 1:
+        return list(values) * sum(counts)
+    if len(values) == len(counts):
+        return [value for value, count in zip(values, counts, strict=True) for _ in range(count)]
+    if len(values) == sum(counts):
+        return list(values)
+    tests = f" with {sum(counts)} tests" if sum(counts) != len(counts) else ""
+    raise InputError(f"{option} is given {len(values)} times for {len(counts)} files{tests}; give it once for each.")

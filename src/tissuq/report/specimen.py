@@ -114,19 +114,21 @@ def _with_copied_files(
     settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path], folder: Path
 ) -> dict[str, Any]:
     """Return the settings of what was measured with the names of the files' copies, which go with the run."""
-    names = [source.name for source in sources]
-    copies = [
-        f"{INPUT}/{number}-{name}" if names.count(name) > 1 else f"{INPUT}/{name}"
-        for number, name in enumerate(names, 1)
-    ]
-    for source, copy in zip(sources, copies, strict=True):
-        shutil.copyfile(source, folder / copy)
-    if not settings.tests:
-        return {"file": copies[0]}
-    pairs = zip(settings.tests, experiment.tests, copies, strict=True)
-    return {
-        "tests": tuple(test.model_copy(update={"file": copy, "name": measured.name}) for test, measured, copy in pairs)
+    files = list(dict.fromkeys(sources))
+    names = [file.name for file in files]
+    copy_of = {
+        file: f"{INPUT}/{number}-{file.name}" if names.count(file.name) > 1 else f"{INPUT}/{file.name}"
+        for number, file in enumerate(files, 1)
     }
+    for file, copy in copy_of.items():
+        shutil.copyfile(file, folder / copy)
+    if not settings.tests:
+        return {"file": copy_of[sources[0]], "mode": experiment.mode.name}
+    tests = [
+        test.model_copy(update={"file": copy_of[source], "name": measured.name, "mode": measured.mode.name})
+        for test, source, measured in zip(settings.tests, sources, experiment.tests, strict=True)
+    ]
+    return {"tests": tuple(tests)}
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:
@@ -238,11 +240,13 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
     )
 
 
-def write_inspection(inspection: Inspection, folder: Path) -> None:
-    """Write figure, converted data and text into an empty folder."""
-    write_data(folder, inspection.reading.experiment)
-    write_figures(folder, {"curve": curve_figure(inspection)})
-    (folder / "inspection.txt").write_text(f"{inspection}\n", encoding="utf-8")
+def write_inspection(inspections: Sequence[Inspection], folder: Path) -> None:
+    """Write figures, converted data and text of every test into an empty folder."""
+    write_data(folder, Experiment.of([inspection.reading.experiment for inspection in inspections]))
+    numbers = [f"-{number}" for number in range(1, len(inspections) + 1)] if len(inspections) > 1 else [""]
+    figures = {f"curve{number}": curve_figure(item) for number, item in zip(numbers, inspections, strict=True)}
+    write_figures(folder, figures)
+    (folder / "inspection.txt").write_text("\n\n".join(map(str, inspections)) + "\n", encoding="utf-8")
 
 
 def curve_figure(inspection: Inspection) -> Figure:

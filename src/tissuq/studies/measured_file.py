@@ -24,7 +24,7 @@ class ReadingSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    mode: str = "uniaxial"
+    mode: str | None = None
     columns: dict[str, str | int] = Field(default_factory=dict)
     stress_unit: str | None = None
     stress_type: str = "engineering"
@@ -42,6 +42,7 @@ class ReadingSettings(BaseModel):
     every: int = Field(1, ge=1)
     axis: str | None = None
     sheet: str | int | None = None
+    table: int | None = Field(None, ge=1)
     skip_rows: int = Field(0, ge=0)
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from time import perf_counter
@@ -15,15 +15,15 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
-from tissuq.experiments.reading.several_files import find_mode, find_tests, read_column
+from tissuq.experiments.reading.several_files import find_tests, read_column
+from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
-from tissuq.studies.measured_file import FittedSettings, MeasuredTest, ReadingSettings
+from tissuq.studies.measured_file import FittedSettings, ReadingSettings
 
 __all__ = ["PopulationSettings", "PopulationStudy", "run_population"]
 
-DEFAULT_MODE = "uniaxial"
 MAX_DATA_WARNINGS = 8
 """Number of different warnings about the data that are shown."""
 
@@ -31,11 +31,11 @@ MAX_DATA_WARNINGS = 8
 class PopulationSettings(FittedSettings, ReadingSettings):
     """Everything that a population depends on; the noise in the files' unit of stress.
 
-    Without a mode every file says its own, by a comment or by its name; one that says none is uniaxial.
+    Without a mode every test says its own, as for `tissuq.read_experiment`. Of a file of several tests each is of a
+    specimen of its own.
     """
 
     files: tuple[str, ...] = Field(min_length=1)
-    mode: str = ""
     specimen: str | None = None
     discrepancy: str = "auto"
     parameters: tuple[str, ...] | None = None
@@ -52,16 +52,18 @@ class PopulationSettings(FittedSettings, ReadingSettings):
     def readings(self, folder: Path = Path()) -> dict[str, list[Reading]]:
         """Read the tests of every specimen; relative files lie in ``folder``."""
         sources = self.sources(folder)
-        if self.specimen is None:
-            return {name: [self._test(name, file).reading() for file in files] for name, files in sources.items()}
-        (file,) = next(iter(sources.values()))
-        readings = read_column(file, self.specimen, **self._test("", file).reading_options)
-        return {name: [reading] for name, reading in readings.items()}
-
-    def _test(self, specimen: str, file: Path) -> MeasuredTest:
-        options = {name: getattr(self, name) for name in ReadingSettings.model_fields}
-        mode = self.mode or find_mode(file, otherwise=DEFAULT_MODE)
-        return MeasuredTest(**options | {"mode": mode, "file": str(file), "name": specimen, "specimen": specimen})
+        if self.specimen is not None:
+            (file,) = next(iter(sources.values()))
+            readings = read_column(file, self.specimen, **self.reading_options)
+            return {name: [reading] for name, reading in readings.items()}
+        specimens: dict[str, list[Reading]] = {}
+        for name, files in sources.items():
+            tests = [test for file in files for test in find_tests_in_file(file, **self.reading_options)]
+            for test in tests:
+                specimen = name if len(files) > 1 or len(tests) == 1 else test.name
+                experiment = test.reading.experiment.labelled(name=specimen, specimen=specimen)
+                specimens.setdefault(specimen, []).append(replace(test.reading, experiment=experiment))
+        return specimens
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import loading_mode
-from tissuq.experiments.reading.several_files import stated_mode
+from tissuq.experiments.reading.stated_mode import mode_in_comment
 from tissuq.mechanics import Material
 from tissuq.studies.earlier_run import modes_of
 from tissuq.studies.measured_file import MeasuredFile
@@ -53,7 +53,7 @@ class PredictionSettings(BaseModel):
         InputError
             When the data say that they are of another mode, or the run is of several modes.
         """
-        stated = None if self.data is None else self.data.mode or stated_mode(folder / self.data.file)
+        stated = None if self.data is None else self.data.mode or mode_in_comment(folder / self.data.file)
         if self.mode and stated and loading_mode(self.mode) != loading_mode(stated):
             assert self.data is not None  # noqa: S101 (they told)
             raise InputError(

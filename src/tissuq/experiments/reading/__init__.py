@@ -1,5 +1,7 @@
 """From a laboratory's file to an experiment: table, columns, units, cycles, signs, and what is strange about it."""
 
-from tissuq.experiments.reading.file_format import FileFormat, Workbook
+from tissuq.experiments.reading.file_format import FileFormat
+from tissuq.experiments.reading.matlab import MatlabFile
+from tissuq.experiments.reading.workbooks import BinaryWorkbook, OldWorkbook, OpenDocument, Workbook
 
-__all__ = ["FileFormat", "Workbook"]
+__all__ = ["BinaryWorkbook", "FileFormat", "MatlabFile", "OldWorkbook", "OpenDocument", "Workbook"]

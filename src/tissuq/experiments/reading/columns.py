@@ -210,7 +210,8 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
     if axis is None and len(axes) == 2 and not mapping:
         raise InputError(
             f"{table.file} is of a biaxial test. Say which axis is read: axis='x' (--axis x) or axis='y' (--axis y), "
-            "with the loading mode that belongs to it, or read both at once: mode='biaxial' (--mode biaxial)."
+            "with the loading mode that belongs to it, or read both at once: mode='biaxial' (--mode biaxial). If "
+            "numbers in the names are of two specimens, write S1 and S2 there."
         )
     wanted = axis or (axes[0] if len(axes) == 1 else "")
     return [name if axis_of_name in ("", wanted) else "" for axis_of_name, name in names]

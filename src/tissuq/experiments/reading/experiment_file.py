@@ -23,9 +23,19 @@ from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stres
 from tissuq.experiments.reading.measures import Load, stress_of, stretch_of
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
+from tissuq.experiments.reading.stated_mode import DEFAULT_MODE, GIVEN, about_mode, mode_of
 from tissuq.experiments.reading.table import Column, Table, read_table
 
-__all__ = ["STRESS_TYPES", "Reading", "ReadingOptions", "read_experiment", "read_file", "read_rows"]
+__all__ = [
+    "STRESS_TYPES",
+    "Reading",
+    "ReadingOptions",
+    "checked_mode",
+    "read_experiment",
+    "read_file",
+    "read_rows",
+    "table_of",
+]
 
 STRESS_TYPES = ("engineering", "cauchy")
 AXES = ("x", "y")
@@ -34,7 +44,7 @@ AXES = ("x", "y")
 class ReadingOptions(TypedDict, total=False):
     """How to read a file where it does not tell by itself: the options of :func:`read_experiment`."""
 
-    mode: str | LoadingMode
+    mode: str | LoadingMode | None
     columns: Mapping[str, str | int] | None
     stress_unit: str | None
     stress_type: str
@@ -52,6 +62,7 @@ class ReadingOptions(TypedDict, total=False):
     every: int
     axis: str | None
     sheet: str | int | None
+    table: int | None
     name: str | None
     skip_rows: int
 
@@ -74,6 +85,8 @@ class Reading:
     cycles : tuple of Cycle
         Of the recorded rows.
     warnings : tuple of str
+    mode_source : str
+        Where the loading mode comes from.
     """
 
     experiment: Experiment
@@ -83,6 +96,7 @@ class Reading:
     used: MeasuredRows
     cycles: tuple[Cycle, ...]
     warnings: tuple[str, ...]
+    mode_source: str = ""
 
     @cached_property
     def used_cycles(self) -> list[Cycle]:
@@ -101,8 +115,9 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     ----------
     path : str or path
         The file.
-    mode : str or LoadingMode
-        How the specimen was loaded; uniaxial unless given.
+    mode : str or LoadingMode, optional
+        How the specimen was loaded. Without it as a comment in the file (``# mode: planar``), its name or its columns
+        say: both axes of a biaxial machine, or an amount of shear; else uniaxial.
     columns : mapping, optional
         From ``stretch``, ``strain``, ``displacement``, ``length`` (the current one, or the height) or ``shear`` (the
         amount of shear), and ``stress`` or ``force``,
@@ -148,7 +163,9 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     axis : str, optional
         ``x`` or ``y``: the only one whose columns to read from the file of a biaxial machine.
     sheet : str or int, optional
-        Name or number (from 1) of the sheet of an Excel workbook.
+        Name or number (from 1) of the sheet of a workbook.
+    table : int, optional
+        Which of several tables of a text or sheet, from 1.
     name : str, optional
         Name of the experiment; the name of the file without its ending when not given.
     skip_rows : int
@@ -186,20 +203,37 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
 
 def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
     """Read a file as :func:`read_experiment` does, and keep what was done on the way."""
-    _checked_mode(**options)
-    table = read_table(path, options.get("skip_rows", 0), options.get("sheet"))
-    return read_rows(only_rows(table, options.get("only")), path, **options)
+    if options.get("mode") is not None:
+        checked_mode(options)
+    return read_rows(only_rows(table_of(path, options), options.get("only")), path, **options)
 
 
-def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
+def table_of(path: str | os.PathLike[str], options: ReadingOptions) -> Table:
+    """Return the table of a file that the options choose."""
+    return read_table(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
+
+
+def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[ReadingOptions]) -> Reading:
     """Return what `read_file` does for the rows of a file that have been found already, all of them or some."""
-    mode = _checked_mode(**options)
+    mode_source = GIVEN
+    if options.get("mode") is None:
+        has_columns = bool(options.get("axis") or options.get("columns"))
+        options["mode"], mode_source = mode_of(path, table, has_columns=has_columns)
+    mode = checked_mode(options)
     stress_type, name = options.get("stress_type", "engineering"), options.get("name")
     is_positive = options.get("compression_positive", False)
-    labelled_choices = choose_columns(table, mode, options.get("columns"), stress_type, options.get("axis"))
+    with about_mode(mode.name, mode_source):
+        labelled_choices = choose_columns(table, mode, options.get("columns"), stress_type, options.get("axis"))
     choices = tuple(labelled_choices.values())
     dimensions = dimensions_of(table, options.get("dimensions"))
-    measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
+    try:
+        measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
+    except InputError:
+        columns = dict.fromkeys(column for choice in choices for column in (choice.deformation, choice.stress))
+        if (complete := table.without_missing(list(columns))) is table:
+            raise
+        table = complete
+        measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
     check_one_specimen(table, choices, measured.course)
     recorded = with_compression_negative(measured, choices, is_positive)
     cycles = find_cycles(table, recorded.course)
@@ -226,12 +260,13 @@ def read_rows(table: Table, path: str | os.PathLike[str], **options: Unpack[Read
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
     ).labelled(stress_unit=loads[0].unit.name)
-    return Reading(experiment, table, choices, recorded, used, tuple(cycles), (*table.notes, *dimensions.warnings))
+    warnings_of_file = (*table.notes, *dimensions.warnings)
+    return Reading(experiment, table, choices, recorded, used, tuple(cycles), warnings_of_file, mode_source)
 
 
-def _checked_mode(**options: Unpack[ReadingOptions]) -> LoadingMode:
+def checked_mode(options: ReadingOptions) -> LoadingMode:
     """Return the loading mode, once the options have been looked at that need no file."""
-    mode, stress_type = loading_mode(options.get("mode", "uniaxial")), options.get("stress_type", "engineering")
+    mode, stress_type = loading_mode(options.get("mode") or DEFAULT_MODE), options.get("stress_type", "engineering")
     axis, every = options.get("axis"), options.get("every", 1)
     if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
         raise InputError(

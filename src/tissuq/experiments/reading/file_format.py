@@ -1,11 +1,10 @@
-"""Files with sheets of cells: a class for each format, known by the first bytes of its files; workbooks of Excel."""
+"""Files with sheets of cells: a class for each format, known by the first bytes of its files."""
 
 from __future__ import annotations
 
 import os
-import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import date, time
 from typing import Any, ClassVar
@@ -14,10 +13,12 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.layout import find_layout
 from tissuq.registry import plugins, variants
 
-__all__ = ["FileFormat", "Workbook", "file_format", "sheet_lines"]
+__all__ = ["SEPARATOR_OF_CELLS", "FileFormat", "explained", "file_format", "line_of", "sheets_with_tables"]
 
 LONGEST_SIGNATURE = 64
 """First bytes of a file that are looked at."""
+SEPARATOR_OF_CELLS = "\t"
+"""What stands between the cells of a line of a sheet."""
 
 
 class FileFormat(ABC):
@@ -30,6 +31,11 @@ class FileFormat(ABC):
     name: ClassVar[str]
     signature: ClassVar[bytes]
     """First bytes of every file of this format."""
+
+    @classmethod
+    def recognises(cls, path: str | os.PathLike[str], start: bytes) -> bool:
+        """Tell whether a file that begins so is of this format."""
+        return start.startswith(cls.signature)
 
     @abstractmethod
     def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
@@ -50,21 +56,33 @@ def file_format(path: str | os.PathLike[str]) -> FileFormat | None:
     except (OSError, ValueError):
         return None
     kinds = dict.fromkeys([*variants(FileFormat).values(), *plugins(FileFormat)])
-    return next((kind() for kind in kinds if start.startswith(kind.signature)), None)
+    return next((kind() for kind in kinds if kind.recognises(path, start)), None)
 
 
-def sheet_lines(
+def sheets_with_tables(
     path: str | os.PathLike[str], sheets: dict[str, list[str]], sheet: str | int | None
-) -> tuple[str, list[str]]:
-    """Return the name and the lines of a sheet; without a choice, of the only one that holds a table.
+) -> dict[str, list[str]]:
+    """Return the lines of the sheets that hold tables, by their names; of one sheet where it is asked for.
 
     Raises
     ------
     InputError
-        When there is no such sheet, or none or several hold tables.
+        When there is no such sheet, or none with a table.
     """
-    name = _sheet_named(path, list(sheets), sheet) if sheet is not None else _only_sheet_with_table(path, sheets)
-    return name, sheets[name]
+    if sheet is not None:
+        name = _sheet_named(path, list(sheets), sheet)
+        return {name: sheets[name]}
+    tables = {
+        name: lines
+        for name, lines in sheets.items()
+        if find_layout([line for line in lines if line.strip()], SEPARATOR_OF_CELLS)
+    }
+    if not tables:
+        raise InputError(
+            f"{path} holds no sheet with a table of numbers (cells shown as percentages are not read as numbers). The "
+            f"sheets are: {', '.join(map(repr, sheets))}."
+        )
+    return tables
 
 
 def _sheet_named(path: str | os.PathLike[str], names: list[str], sheet: str | int) -> str:
@@ -76,56 +94,8 @@ def _sheet_named(path: str | os.PathLike[str], names: list[str], sheet: str | in
     raise InputError(f"{path} has no sheet '{sheet}'. The sheets are: {', '.join(map(repr, names))}.")
 
 
-def _only_sheet_with_table(path: str | os.PathLike[str], sheets: dict[str, list[str]]) -> str:
-    tables = [name for name, lines in sheets.items() if find_layout([line for line in lines if line.strip()], "\t")]
-    if not tables:
-        raise InputError(
-            f"{path} holds no sheet with a table of numbers (cells shown as percentages are not read as numbers). The "
-            f"sheets are: {', '.join(map(repr, sheets))}."
-        )
-    if len(tables) > 1:
-        raise InputError(
-            f"{path}: several sheets hold tables: {', '.join(map(repr, tables))}. Say which: sheet='{tables[0]}' "
-            f"(--sheet '{tables[0]}')."
-        )
-    return tables[0]
-
-
-class Workbook(FileFormat):
-    """Sheets of a workbook, numbers to the last digit; a cell that is shown as a percentage says so."""
-
-    name = "xlsx"
-    signature = b"PK\x03\x04"
-
-    def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
-        with _explained(path, "an Excel workbook", "openpyxl", "export the table as CSV"), warnings.catch_warnings():
-            import openpyxl
-
-            warnings.simplefilter("ignore")  # of features such as drop-down lists, which are not read
-            book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-            sheets = {page.title: _sheet_rows(page) for page in book.worksheets}
-            book.close()
-        return sheets
-
-
-class OldWorkbook(FileFormat):
-    """Sheets of a workbook of the old kind, as rheometers write it; a percentage is the ratio that is stored."""
-
-    name = "xls"
-    signature = bytes.fromhex("d0cf11e0a1b11ae1")
-
-    def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
-        kind, cure = "an Excel workbook of the old kind", "save it as .xlsx or CSV"
-        with _explained(path, kind, "python-calamine", cure):
-            from python_calamine import CalamineWorkbook
-
-            book = CalamineWorkbook.from_path(os.fspath(path))
-            rows = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
-        return {name: ["\t".join(map(_text, row)).rstrip("\t") for row in page] for name, page in rows.items()}
-
-
 @contextmanager
-def _explained(path: str | os.PathLike[str], kind: str, library: str, cure: str) -> Iterator[None]:
+def explained(path: str | os.PathLike[str], kind: str, library: str, cure: str) -> Iterator[None]:
     """Turn whatever a library raises, or that it is missing, into what to do instead."""
     try:
         yield
@@ -133,23 +103,16 @@ def _explained(path: str | os.PathLike[str], kind: str, library: str, cure: str)
         raise InputError(
             f"{path} is {kind}; reading it needs {library}: pip install 'tissuq[excel]'. Or {cure} and give that file."
         ) from error
-    except Exception as error:  # openpyxl raises whatever zipfile and its parsers do, python-calamine what Rust does
+    except Exception as error:  # libraries raise whatever their parsers do
         raise InputError(
             f"{path} seems to be {kind}, but it cannot be opened: {error}. {cure[0].upper()}{cure[1:]} and give that "
             "file."
         ) from error
 
 
-def _sheet_rows(sheet: Any) -> list[str]:
-    sheet.reset_dimensions()  # else one stray cell far to the right makes every row that long
-    return ["\t".join(map(_cell_text, row)).rstrip("\t") for row in sheet.iter_rows()]
-
-
-def _cell_text(cell: Any) -> str:
-    """Return a cell as text; a number that is shown as a percentage says so."""
-    value = cell.value
-    is_percentage = isinstance(value, int | float) and "%" in str(cell.number_format)
-    return f"{100 * value!r} %" if is_percentage else _text(value)
+def line_of(cells: Sequence[Any]) -> str:
+    """Return the line of a row of cells: numbers to the last digit, and nothing after the last one."""
+    return SEPARATOR_OF_CELLS.join(map(_text, cells)).rstrip(SEPARATOR_OF_CELLS)
 
 
 def _text(value: Any) -> str:

@@ -17,6 +17,7 @@ __all__ = [
     "heading",
     "is_of_specimens",
     "on_axis",
+    "on_lettered_axis",
     "plain",
     "role_names",
 ]
@@ -92,6 +93,8 @@ UNIT_IN_HEADING = (
 """Forms of a name with a unit; brackets are often mistyped, as in ``Stress [kPa}``."""
 QUOTIENT = re.compile(rf"[^{re.escape(BRACKETS)}/]+/[^{re.escape(BRACKETS)}/]+")
 """A unit without brackets, as in ``Stress N/mm^2``."""
+COPY = re.compile(r"(?<=[^\d\s])\.\d$")
+"""What pandas adds to a name that stands in a table again, as in ``Stress.1``."""
 UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[-_.:;|\s](?P<unit>\S*[^\W\d_]\S*|%)")
 
 
@@ -105,7 +108,7 @@ class Heading:
 
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = name.strip()
+    name = COPY.sub("", name.strip())
     matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
     suffix = UNIT_AS_SUFFIX.fullmatch(name)
     is_unit = suffix is not None and looks_like_unit(suffix["unit"])
@@ -153,3 +156,15 @@ def on_axis(quantity: str) -> tuple[str, str]:
         if axis in AXES and name in names:
             return AXES[axis], name
     return "", quantity
+
+
+def on_lettered_axis(quantity: str) -> tuple[str, str]:
+    """Return `on_axis`, but for axes that are numbered: the numbers may be those of specimens.
+
+    Examples
+    --------
+    >>> on_lettered_axis("stress y"), on_lettered_axis("stretch 1")
+    (('y', 'stress'), ('', 'stretch 1'))
+    """
+    axis, name = on_axis(quantity)
+    return (axis, name) if axis and axis in (quantity[0], quantity[-1]) else ("", quantity)

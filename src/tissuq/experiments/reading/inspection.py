@@ -17,7 +17,7 @@ from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import stress_unit
 
-__all__ = ["Inspection", "inspect", "noise_between_neighbours"]
+__all__ = ["Inspection", "inspect", "noise_between_neighbours", "overview"]
 
 MIN_TRIPLES = 30
 """Number of triples of neighbouring measurements from which their scatter shows the noise."""
@@ -42,6 +42,20 @@ class Inspection:
 
     reading: Reading
     noise_sds: tuple[float | None, ...]
+
+    @classmethod
+    def of(cls, reading: Reading) -> Inspection:
+        """Return what was understood of a file that has been read."""
+        course = reading.used.course
+        return cls(reading, tuple(noise_between_neighbours(course, stress) for stress in reading.used.stress))
+
+    @property
+    def line(self) -> str:
+        """What was understood, in one line: name, loading mode, rows, stretches and stresses."""
+        experiment = self.reading.experiment
+        spans = dict(self._spans())
+        name = f"{experiment.name}: {experiment.mode.name} ({self.reading.mode_source})"
+        return f"{name}, {len(self.reading.used)} rows, stretch {spans['stretch']}, stress {spans['stress']}"
 
     @property
     def noise_sd(self) -> float | None:
@@ -70,22 +84,29 @@ class Inspection:
         return "\n".join([*lines, *[""] * bool(notes), *(_wrapped("Note", text) for text in notes)])
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        table, used, unit = self.reading.table, self.reading.used, stress_unit(self.reading.experiment.stress_unit)
+        table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
         cells = SEPARATORS[table.separator]
         yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {head}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])
+        yield "mode", f"{self.reading.experiment.mode.name} ({self.reading.mode_source})"
+        spans = dict(self._spans())
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
-        spans = labelled(used.labels, [f"{stretch.min():.6g} to {stretch.max():.6g}" for stretch in used.stretch])
-        yield "stretch", f"{'; '.join(spans)}{again}"
-        ends = [(stress.min() / unit.to_mpa, stress.max() / unit.to_mpa) for stress in used.stress]
-        spans = labelled(used.labels, [f"{low:.6g} to {high:.6g} {unit.name}" for low, high in ends])
-        yield "stress", f"{'; '.join(spans)} (engineering stress, tension positive)"
+        yield "stretch", f"{spans['stretch']}{again}"
+        yield "stress", f"{spans['stress']} (engineering stress, tension positive)"
         noise = [self._noise(sd, stress) for sd, stress in zip(self.noise_sds, used.stress, strict=True)]
         yield "noise", "; ".join(labelled(used.labels, noise))
+
+    def _spans(self) -> Iterator[tuple[str, str]]:
+        """Yield the ranges of stretches and of stresses in words."""
+        used, unit = self.reading.used, stress_unit(self.reading.experiment.stress_unit)
+        spans = labelled(used.labels, [f"{stretch.min():.6g} to {stretch.max():.6g}" for stretch in used.stretch])
+        yield "stretch", "; ".join(spans)
+        ends = [(stress.min() / unit.to_mpa, stress.max() / unit.to_mpa) for stress in used.stress]
+        yield "stress", "; ".join(labelled(used.labels, [f"{low:.6g} to {high:.6g} {unit.name}" for low, high in ends]))
 
     def _columns(self) -> Iterator[str]:
         table = self.reading.table
@@ -139,9 +160,21 @@ def inspect(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> 
     >>> print(inspection.steps[0])
     stretch = column 'stretch'
     """
-    reading = read_file(path, **options)
-    course = reading.used.course
-    return Inspection(reading, tuple(noise_between_neighbours(course, stress) for stress in reading.used.stress))
+    return Inspection.of(read_file(path, **options))
+
+
+def overview(inspections: Sequence[Inspection]) -> str:
+    """Return what was understood of several tests: a line and the warnings of each."""
+    lines = [f"{len(inspections)} tests were understood", ""]
+    noted: dict[str, list[str]] = {}
+    for number, inspection in enumerate(inspections, start=1):
+        lines.append(_wrapped(f"test {number}", inspection.line))
+        for text in inspection.warnings:
+            noted.setdefault(text, []).append(str(number))
+    for text, numbers in noted.items():
+        of_tests = "all tests" if len(numbers) == len(inspections) else f"test {', '.join(numbers)}"
+        lines += ["", _wrapped("Note", f"{of_tests}: {text}")]
+    return "\n".join([*lines, "", "To see one of them: tissuq inspect 'FILE#NAME', with its name or number."])
 
 
 def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:

@@ -10,7 +10,17 @@ from functools import partial
 
 from tissuq.experiments.units import NUMBER, looks_like_unit
 
-__all__ = ["WHITESPACE", "Layout", "column_names", "find_layout", "is_comment", "split"]
+__all__ = [
+    "MISSING",
+    "SPREADSHEET_ERRORS",
+    "WHITESPACE",
+    "Layout",
+    "column_names",
+    "find_layout",
+    "is_comment",
+    "later_tables",
+    "split",
+]
 
 WHITESPACE = " "
 SEPARATORS = ("\t", ";", ",", WHITESPACE)
@@ -26,6 +36,10 @@ LINES_FOR_SEPARATOR = 500
 """Lines at the head of a file that show its separator."""
 SHORT_TABLE, LENGTH_RATIO = 3, 10
 """Rows that a table passed over has at most, and how many times more the one beneath it has at least."""
+FEWEST_ROWS = 5
+"""Rows that a further table has at least."""
+WORD = re.compile(r"[^\W\d_]{2}|%")
+"""What a line of names or units holds, and a row of numbers does not."""
 
 Split = Callable[[str], list[str]]
 
@@ -74,6 +88,33 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
     width = len(cells(lines[confirmed]))
     has_names = names_row >= 0 and bool(column_names(lines[names_row], width, separator, has_units=has_units))
     return Layout(separator, first_row, width, names_row if has_names else None, units_row if has_units else None)
+
+
+def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
+    """Return the positions in numbered lines at which what belongs to each further table begins.
+
+    Its names are those of the first table again, or stand apart from the rows above, or over a row of units.
+    """
+    texts = [text for _, text in lines]
+    cells = partial(split, separator=layout.separator)
+    header = None if layout.names is None else texts[layout.names].strip()
+    numeric = [column for column, cell in enumerate(cells(texts[layout.first_row])) if NUMBER.fullmatch(cell)]
+    starts, last_row = list[int](), layout.first_row
+    for position in range(layout.first_row + 1, len(texts)):
+        text = texts[position]
+        row = cells(text) if WORD.search(text) else []
+        is_row = all(column < len(row) and _are_values([row[column]]) for column in numeric) if row else True
+        if position <= last_row or is_row:
+            last_row = max(last_row, position)
+            continue
+        has_units = position + 1 < len(texts) and _is_units_row(cells(texts[position + 1]))
+        is_apart = lines[position][0] > lines[position - 1][0] + 1 or last_row < position - 1
+        if text.strip() == header or ((is_apart or has_units) and _are_names(row)):
+            first_row = position + 1 + has_units
+            if _length(texts, cells, first_row, limit=FEWEST_ROWS) == FEWEST_ROWS:
+                starts.append(last_row + 1)
+                last_row = first_row
+    return starts
 
 
 def is_comment(line: str) -> bool:

@@ -13,7 +13,7 @@ from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading,
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import NUMBER
 
-__all__ = ["advice_on_numbered_tests", "check_one_specimen", "only_rows", "row_names"]
+__all__ = ["SeveralSpecimens", "advice_on_numbered_tests", "check_one_specimen", "filled_on", "only_rows", "row_names"]
 
 ROWS_OF_TEST = 5
 """Rows that the tests of a table have on average at least."""
@@ -25,6 +25,23 @@ SPECIMENS_OF_POPULATION = 3
 """Fewest specimens that show a population."""
 SHOWN = 6
 """Number of values that a message lists."""
+
+
+class SeveralSpecimens(InputError):
+    """That rows are of several tests, and which.
+
+    Parameters
+    ----------
+    message : str
+    column : str
+        Name of the column that tells them apart, or its number from 1.
+    labels : sequence of str
+        Its cells, one a row.
+    """
+
+    def __init__(self, message: str, column: str, labels: Sequence[str]) -> None:
+        super().__init__(message)
+        self.column, self.labels = column, labels
 
 
 def only_rows(table: Table, only: Mapping[str, str | int] | None) -> Table:
@@ -50,7 +67,12 @@ def row_names(table: Table, column: int) -> list[str]:
     cells = table.texts(column)
     if cells.count("") <= len(cells) / 2:
         return cells
-    return list(accumulate(cells, _cell_or_above))
+    return filled_on(cells)
+
+
+def filled_on(cells: Sequence[str]) -> list[str]:
+    """Return cells, of which each goes for the empty ones after it."""
+    return list(accumulate(cells, _cell_or_last))
 
 
 def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Column) -> None:
@@ -60,7 +82,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 
     Raises
     ------
-    InputError
+    SeveralSpecimens
         When there are several, with what reads one of them, or all.
     """
     for column, labels in _parting_columns(table, choices, course):
@@ -68,10 +90,12 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
             continue
         name, distinct = table.key(column), list(dict.fromkeys(labels))
         fit_all = f"; to fit each and the population that they are from: tissuq population FILE --specimen '{name}'"
-        raise InputError(
+        raise SeveralSpecimens(
             f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
             f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}})"
-            f"{fit_all if len(distinct) >= SPECIMENS_OF_POPULATION else ''}."
+            f"{fit_all if len(distinct) >= SPECIMENS_OF_POPULATION else ''}.",
+            name,
+            labels,
         )
 
 
@@ -115,8 +139,8 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
     return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
 
 
-def _cell_or_above(above: str, cell: str) -> str:
-    return cell or above
+def _cell_or_last(last: str, cell: str) -> str:
+    return cell or last
 
 
 def _is_cycle(label: str) -> bool:

@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from io import StringIO
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.file_format import file_format, sheet_lines
+from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.headings import heading
-from tissuq.experiments.reading.layout import WHITESPACE, column_names, find_layout, is_comment, split
+from tissuq.experiments.reading.layout import (
+    MISSING,
+    SPREADSHEET_ERRORS,
+    WHITESPACE,
+    column_names,
+    find_layout,
+    is_comment,
+    later_tables,
+    split,
+)
 from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.units import BRACKETS, NUMBER
 
-__all__ = ["Column", "Table", "read_table"]
+__all__ = ["Column", "Table", "read_table", "read_tables"]
 
 Column = NDArray[np.float64]
 Lines = list[tuple[int, str]]
@@ -30,6 +41,11 @@ FEW_ROWS = 200
 """Rows that show whether a column is constant."""
 HEAD_LINES = 1000
 """Lines of a long file that show its layout."""
+ALL_TESTS = "tissuq.read_tests and tissuq fit read all of them."
+CACHED_FILES = 2
+"""Files whose tables are remembered: tests of one file are read one after another."""
+TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo)|(zeit|time)$")
+"""Names of a column of times."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +72,12 @@ class Table:
         All cells, where they have been read as numbers already.
     notes : tuple of str
         What a person should know of how the table was found.
+    sheet : str
+        The sheet of a workbook that it is in.
+    number : int
+        Which of the tables of a text or sheet it is, from 1; 0 for the only one.
+    title : str
+        What stands alone in the line above the names, such as the name of a step.
     """
 
     file: str
@@ -67,6 +89,14 @@ class Table:
     head: Sequence[tuple[int, str]] = ()
     block: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
+    sheet: str = ""
+    number: int = 0
+    title: str = ""
+
+    @property
+    def span(self) -> str:
+        """Return the lines of its rows, in words."""
+        return f"lines {self.lines[0]} to {self.lines[-1]}"
 
     def label(self, column: int) -> str:
         """Return how messages name a column (counted from 0)."""
@@ -134,6 +164,27 @@ class Table:
                 return list(block.T)
         raise self._bad_cell(columns)
 
+    def without_missing(self, columns: Sequence[int]) -> Table:
+        """Return the table without rows in which columns (counted from 0) are all empty, or marked as missing.
+
+        Of the last rows, one of the columns is enough: the test ended there.
+        """
+        cells = list(zip(*(self.texts(column) for column in columns), strict=True))
+        absent = MISSING - SPREADSHEET_ERRORS
+        filled = [[cell for cell in row if cell.lower() not in absent] for row in cells]
+        is_missing = np.array([not row for row in filled])
+        for row in reversed(range(len(filled))):
+            if len(filled[row]) == len(columns) or not all(map(NUMBER.fullmatch, filled[row])):
+                break
+            is_missing[row] = True
+        if not is_missing.any() or is_missing.all():
+            return self
+        count, first = np.count_nonzero(is_missing), self.lines[int(np.argmax(is_missing))]
+        what = "1 row" if count == 1 else f"{count} rows"
+        names = " and ".join(map(self.label, columns))
+        note = f"{what} without values of {names} left out, {'' if count == 1 else 'the first '}in line {first}."
+        return replace(self.taken(np.flatnonzero(~is_missing)), notes=(*self.notes, note))
+
     def _readings(self) -> Iterator[tuple[list[str], Callable[[str], float] | None]]:
         """Yield the rows and what converts their cells, the fastest first: points, commas, both by column."""
         yield self.rows, None
@@ -161,17 +212,46 @@ class Table:
         return InputError(f"{self.file}: columns {' and '.join(map(self.label, columns))} do not hold numbers.")
 
 
-def read_table(path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None) -> Table:
-    """Return the table in a file: lines above it, names, units and rows are recognised.
+def read_table(
+    path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None
+) -> Table:
+    """Return the table in a file; as `read_tables`, where that is one.
+
+    Raises
+    ------
+    InputError
+        When there are several, with how to choose.
+    """
+    tables = read_tables(path, skip_rows, sheet, number)
+    if len(tables) == 1:
+        return tables[0]
+    sheets = list(dict.fromkeys(table.sheet for table in tables))
+    if len(sheets) > 1:
+        raise InputError(
+            f"{path}: several sheets hold tables: {', '.join(map(repr, sheets))}. Say which: sheet='{sheets[0]}' "
+            f"(--sheet '{sheets[0]}'). {ALL_TESTS}"
+        )
+    of_file = ", ".join(f"{table.number} in {table.span}" for table in tables)
+    raise InputError(f"{path} holds several tables: {of_file}. Say which: table=1 (--table 1). {ALL_TESTS}")
+
+
+def read_tables(
+    path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None
+) -> list[Table]:
+    """Return the tables in a file: lines above them, names, units and rows are recognised.
+
+    Tables with the same names, in which a time goes on from one to the next, are one.
 
     Parameters
     ----------
     path : str or path
-        Comma-, semicolon-, tab- or blank-separated text, or an Excel workbook (.xlsx).
+        Comma-, semicolon-, tab- or blank-separated text, or a workbook.
     skip_rows : int
         Number of lines at the top of the file to pass over unseen.
     sheet : str or int, optional
-        Name or number (from 1) of a workbook's sheet; without it the only one that holds a table.
+        Name or number (from 1) of a workbook's sheet; without it all that hold tables.
+    number : int, optional
+        Which of several tables in a text or sheet, from 1; without it all.
 
     Raises
     ------
@@ -180,13 +260,35 @@ def read_table(path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | in
     """
     if not isinstance(skip_rows, int) or skip_rows < 0:
         raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
+    try:
+        status = os.stat(path)
+        stamp = status.st_mtime_ns, status.st_size
+    except (OSError, ValueError):
+        stamp = 0, 0
+    tables = _tables_in(os.fspath(path), stamp, skip_rows, sheet)
+    if number is None:
+        return list(tables)
+    of_number = [table for table in tables if number == (table.number or 1)]
+    if not of_number:
+        raise InputError(f"{path} has no table {number!r}; its tables are numbered from 1 to {len(tables)}.")
+    return of_number
+
+
+@lru_cache(maxsize=CACHED_FILES)
+def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | int | None) -> tuple[Table, ...]:
+    """Return the tables in a file, which a time of change and a size (bytes) stand for."""
     if (workbook := file_format(path)) is not None:
-        name, lines = sheet_lines(path, workbook.sheets(path), sheet)
-        return _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, "	")
+        sheets = sheets_with_tables(path, workbook.sheets(path), sheet)
+        parts = [
+            _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, SEPARATOR_OF_CELLS, name)
+            for name, lines in sheets.items()
+        ]
+        return tuple(table for tables in parts for table in tables)
     if sheet is not None:
         raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
-    file, lines = str(path), read_lines(path)
-    return _read_long(file, lines, skip_rows) or _read_every_line(file, lines, skip_rows)
+    lines = read_lines(path)
+    long = _read_long(path, lines, skip_rows)
+    return tuple(_read_every_line(path, lines, skip_rows)) if long is None else (long,)
 
 
 def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
@@ -197,8 +299,10 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
     if len(lines) < LONG_FILE:
         return None
     try:
-        head = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
+        head, *others = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
     except InputError:
+        return None
+    if others:
         return None
     rows = lines[head.lines[0] - 1 :]
     while rows and not rows[-1].strip():
@@ -222,10 +326,29 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
     return replace(head, rows=rows, lines=numbers, block=block)
 
 
-def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str | None = None) -> Table:
-    """Return the table of any file, looking at every line."""
+def _read_every_line(
+    file: str, lines: list[str], skip_rows: int, separator: str | None = None, sheet: str = ""
+) -> list[Table]:
+    """Return the tables of any text or sheet, looking at every line."""
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
+    content = [(line, text) for line, text in filled if "#" not in text or not is_comment(text)]
+    layout = find_layout([text for _, text in content], separator)
+    if layout is None:
+        raise _no_table(file, content)
+    starts = [content[position][0] for position in later_tables(content, layout)]
+    bounds = pairwise([0, *starts, len(lines) + 1])
+    parts = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
+    tables = _joined([_table_of(file, part, layout.separator, sheet) for part in parts])
+    if len(tables) == 1:
+        return tables
+    return [
+        replace(table, file=f"{file}, table {number}", number=number) for number, table in enumerate(tables, start=1)
+    ]
+
+
+def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
+    """Return the table in numbered lines that are not blank."""
     content = [(line, text) for line, text in filled if "#" not in text or not is_comment(text)]
     texts = [text for _, text in content]
     layout = find_layout(texts, separator)
@@ -247,9 +370,43 @@ def _read_every_line(file: str, lines: list[str], skip_rows: int, separator: str
         rows=texts[layout.first_row :],
         lines=[line for line, _ in content[layout.first_row :]],
         head=[(line, text) for line, text in filled if line < first_line],
+        sheet=sheet,
+        title=_title(texts[: layout.names or 0], separator),
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     return _without_summary(table)
+
+
+def _title(above: Sequence[str], separator: str) -> str:
+    """Return what stands alone in the last of the lines above the names; an empty text where more or nothing does."""
+    cells = [cell for cell in split(above[-1], separator) if cell] if above else []
+    is_alone = len(cells) == 1 or separator == WHITESPACE
+    return " ".join(cells) if is_alone and not any(map(NUMBER.fullmatch, cells[:1])) else ""
+
+
+def _joined(tables: Sequence[Table]) -> list[Table]:
+    """Return tables, those that go on from the one before as one with it."""
+    joined = list(tables[:1])
+    for table in tables[1:]:
+        if _goes_on(joined[-1], table):
+            note = f"{joined[-1].span} and {table.span}, in which time goes on, read as one table."
+            rows, lines = [*joined[-1].rows, *table.rows], [*joined[-1].lines, *table.lines]
+            joined[-1] = replace(joined[-1], rows=rows, lines=lines, notes=(*joined[-1].notes, note))
+        else:
+            joined.append(table)
+    return joined
+
+
+def _goes_on(table: Table, later: Table) -> bool:
+    """Tell whether a table has the names of the one before, and times that go on from there."""
+    if (table.names, table.units) != (later.names, later.units):
+        return False
+    times = [column for column, name in enumerate(table.names) if TIME.search(heading(name).quantity)]
+    ends = table.taken(np.array([0, len(table.rows) - 1]))
+    return bool(times) and all(
+        before[0] < before[-1] <= after[0]
+        for before, after in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
+    )
 
 
 def _without_summary(table: Table) -> Table:

@@ -1,0 +1,115 @@
+"""Columns of several tests beside one another in a table: which of them belong to one test, and what it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from tissuq.experiments.reading.columns import LENGTHENINGS, LOADS
+from tissuq.experiments.reading.headings import AXES, heading, is_of_specimens, on_lettered_axis, plain, role_names
+from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.several_specimens import filled_on
+from tissuq.experiments.reading.table import Table
+
+__all__ = ["ColumnsOfTest", "columns_side_by_side"]
+
+TENSOR = frozenset(["11", "22", "33", "12", "13", "23", "21", "31", "32"])
+"""Components, which are not numbers of tests."""
+
+
+class ColumnsOfTest(NamedTuple):
+    """The columns of one of several tests beside one another, by their roles and numbers from 1."""
+
+    name: str
+    columns: Mapping[str, str | int]
+
+
+class _Role(NamedTuple):
+    """What a column's name says that it holds, and of which test."""
+
+    role: str
+    test: str
+
+
+def columns_side_by_side(table: Table, stress_type: str, *, is_shear: bool) -> list[ColumnsOfTest]:
+    """Return the columns of every test where a table has several beside one another; nothing where it has one.
+
+    They are a stress or force for each test, and a deformation for each or one for all. Their names are the same, or
+    differ in the number, letter or name of a specimen; the names of the tests may stand in the line above.
+    """
+    deformations = ("shear",) if is_shear else LENGTHENINGS
+    roles = [_role(name, (*deformations, *LOADS), stress_type) for name in table.names]
+    load, loads = _columns_of_first(LOADS, roles)
+    measure, measures = _columns_of_first(deformations, roles)
+    labels = [roles[column].test for column in loads]
+    if len(loads) < 2 or not measures or set(labels) <= TENSOR or (set(labels) <= AXES.keys() and labels[0]):
+        return []
+    is_named = len(set(labels)) == len(labels) and all(labels)
+    if is_named and (by_label := {roles[column].test: column for column in measures}).keys() == set(labels):
+        pairs = [(by_label[label], column) for label, column in zip(labels, loads, strict=True)]
+    elif len(measures) == 1 and (is_named or (not any(labels) and _names_above(table, loads))):
+        pairs = [(measures[0], column) for column in loads]
+    elif len(measures) == len(loads) and not any(labels):
+        pairs = list(zip(measures, loads, strict=True))
+    else:
+        return []
+    numbers = [str(number) for number in range(1, len(pairs) + 1)]
+    names = labels if is_named else _names_above(table, loads) or numbers
+    return [
+        ColumnsOfTest(name, {measure: deformation + 1, load: stress + 1})
+        for name, (deformation, stress) in zip(names, pairs, strict=True)
+    ]
+
+
+def _columns_of_first(candidates: Sequence[str], roles: Sequence[_Role]) -> tuple[str, list[int]]:
+    """Return the first of some roles that columns have, and these."""
+    for candidate in candidates:
+        if columns := [column for column, of_column in enumerate(roles) if of_column.role == candidate]:
+            return candidate, columns
+    return "", []
+
+
+def _role(name: str, roles: Sequence[str], stress_type: str) -> _Role:
+    """Return which of some roles a column has by its name, and the test that the name tells."""
+    quantity = heading(name).quantity
+    if on_lettered_axis(quantity)[0]:
+        return _Role("", "")
+    for words, test in _parts(quantity):
+        for role in roles:
+            if words in role_names(role, stress_type):
+                return _Role(role, test)
+    return _Role("", "")
+
+
+def _parts(quantity: str) -> Iterator[tuple[str, str]]:
+    """Yield the name of a quantity and the test that stands after or before it: first the whole, and no test."""
+    yield quantity, ""
+    words = [word.strip(".:,()#") for word in quantity.split()]
+    for count in range(1, len(words)):
+        first, last = " ".join(words[:count]), " ".join(words[count:])
+        for name, test in ((first, last), (last, first)):
+            if _is_test(test):
+                yield name, test
+
+
+def _is_test(text: str) -> bool:
+    """Tell whether a part of a name is the number, the letter or the name of a specimen."""
+    words = text.split()
+    return bool(words) and (len(words[-1]) == 1 or any(map(str.isdigit, text)) or is_of_specimens(words[0]))
+
+
+def _names_above(table: Table, columns: Sequence[int]) -> list[str]:
+    """Return what the last line above the names of columns says over each of some; nothing where it says no names.
+
+    What stands over the first of neighbouring columns goes for them all.
+    """
+    names = [heading(name).quantity for name in table.names]
+    for _, text in reversed(table.head):
+        cells = split(text, table.separator)[: len(names)]
+        if [heading(cell).quantity for cell in cells] == names[: len(cells)] or not any(cells):
+            continue
+        above = filled_on(cells + [""] * (len(names) - len(cells)))
+        over = [above[column] for column in columns]
+        if all(over) and len({plain(name) for name in over}) == len(over):
+            return over
+    return []

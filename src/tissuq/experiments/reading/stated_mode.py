@@ -1,0 +1,115 @@
+"""The loading mode that a file states: in a comment, by its name or that of a sheet, or by its columns."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import loading_modes
+from tissuq.experiments.reading.headings import heading, on_lettered_axis, role_names
+from tissuq.experiments.reading.table import Table
+
+__all__ = ["DEFAULT_MODE", "DEFAULT_SOURCE", "GIVEN", "about_mode", "find_mode", "mode_in_comment", "mode_of"]
+
+DEFAULT_MODE = "uniaxial"
+"""Where nothing states one."""
+GIVEN, DEFAULT_SOURCE = "as given", "nothing says otherwise"
+"""Where a mode comes from that the file does not state."""
+MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "axial": "uniaxial", "shear": "simple-shear"}
+"""Words for loading modes beside their names."""
+HEAD_LINES = 20
+"""Lines of a file in which a comment may state its mode."""
+
+
+def find_mode(file: str | os.PathLike[str], words: Sequence[str] = ()) -> tuple[str, str]:
+    """Return the mode that a file states, and where; empty texts where it states none.
+
+    A comment line such as ``# mode: planar`` goes before other words, such as the name of a sheet, the last ones first,
+    and these before the name of the file.
+
+    Examples
+    --------
+    >>> find_mode("liver-7-planar.csv"), find_mode("simple_shear.csv"), find_mode("liver.xlsx", ["Sheet 1", "tension"])
+    (('planar', 'the name of the file'), ('simple-shear', 'the name of the file'), ('uniaxial', "'tension'"))
+    """
+    path = Path(file)
+    if mode := mode_in_comment(path):
+        return mode, "a comment in the file"
+    for word in reversed(words):
+        if mode := _mode_of_words(word):
+            return mode, f"'{word}'"
+    mode = _mode_of_words(path.stem)
+    return mode, "the name of the file" if mode else ""
+
+
+def mode_of(
+    file: str | os.PathLike[str], table: Table, words: Sequence[str] = (), *, has_columns: bool = False
+) -> tuple[str, str]:
+    """Return the mode that a file states, or the columns of its table leave no choice about, or else the default one.
+
+    Parameters
+    ----------
+    file : str or path
+    table : Table
+    words : sequence of str
+        Further names of the test.
+    has_columns : bool
+        Whether columns or an axis have been chosen, so that others tell nothing.
+
+    Returns
+    -------
+    (str, str)
+        The mode, and where it comes from.
+    """
+    mode, source = find_mode(file, [table.sheet, table.title, *words])
+    if not mode and not has_columns:
+        mode, source = _mode_of_columns(table)
+    return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
+
+
+@contextmanager
+def about_mode(mode: str, source: str) -> Iterator[None]:
+    """Add to what is wrong with the columns where the file's loading mode comes from, unless it was given."""
+    try:
+        yield
+    except InputError as error:
+        if not mode or source in ("", GIVEN, DEFAULT_SOURCE):
+            raise
+        raise InputError(f"{error} (The loading mode {mode} is from {source}; give --mode for another.)") from error
+
+
+def _mode_of_columns(table: Table) -> tuple[str, str]:
+    """Return the mode that the columns of a table leave no choice about, and why; empty texts where they do."""
+    quantities = [heading(name).quantity for name in table.names]
+    deformations = role_names("stretch") | role_names("strain") | role_names("displacement")
+    on_axes = [on_lettered_axis(quantity) for quantity in quantities]
+    loads = role_names("stress") | role_names("stress", "cauchy") | role_names("force")
+    if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
+        return "biaxial", "columns of both axes"
+    is_shear = not deformations & set(quantities) and len(role_names("shear") & set(quantities)) == 1
+    return ("simple-shear", "a column of shear") if is_shear else ("", "")
+
+
+def mode_in_comment(file: Path) -> str:
+    """Return the mode that a comment line such as ``# mode: planar`` at the head of a file states, or an empty text."""
+    try:
+        with file.open("rb") as content:
+            head = [content.readline(1000).decode("latin-1") for _ in range(HEAD_LINES)]
+    except (OSError, ValueError):
+        return ""
+    stated = (line.split(":", 1)[1] for line in head if re.match(r"#\s*mode\s*:", line, re.IGNORECASE))
+    return _mode_of_words(next(stated, ""))
+
+
+def _mode_of_words(text: str) -> str:
+    """Return the loading mode that words name; an empty text for none, or several."""
+    words = "-".join(re.findall(r"[a-z]+", text.lower()))
+    for name in sorted(loading_modes(), key=len, reverse=True):
+        if re.search(rf"(^|-){name}($|-)", words):
+            return name
+    modes = {mode for word, mode in MODE_WORDS.items() if word in words.split("-")}
+    return modes.pop() if len(modes) == 1 else ""

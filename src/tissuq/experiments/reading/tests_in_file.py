@@ -1,0 +1,168 @@
+"""All tests in one file, whether in sheets, tables, columns or rows, each with the options that read it alone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple, Unpack
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.columns import choose_columns
+from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, checked_mode, read_rows
+from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
+from tissuq.experiments.reading.side_by_side import columns_side_by_side
+from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, GIVEN, about_mode, mode_of
+from tissuq.experiments.reading.table import Table, read_tables
+
+__all__ = ["TestInFile", "find_tests_in_file", "read_tests"]
+
+MIN_SHARE_OF_TEST = 0.5
+"""Rows of a table that may be a test, over those of the longest test in its file; shorter ones are of results."""
+
+
+class TestInFile(NamedTuple):
+    """A test in a file.
+
+    Parameters
+    ----------
+    name : str
+        What the file calls it; that of the file where it is the only one.
+    reading : Reading
+    options : ReadingOptions
+        Those that read it alone, its loading mode among them.
+    """
+
+    name: str
+    reading: Reading
+    options: ReadingOptions
+
+
+def read_tests(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> list[Experiment]:
+    """Read all tests in one file: in the sheets of a workbook, in tables, columns or rows of several specimens.
+
+    Parameters
+    ----------
+    path : str or path
+    options
+        As for :func:`tissuq.read_experiment`, for every test.
+
+    Returns
+    -------
+    list of Experiment
+        In the order of the file, named as there.
+
+    Raises
+    ------
+    InputError
+        When there is no test in the file, or one of them cannot be read.
+
+    Examples
+    --------
+    >>> from tissuq.experiments import datasets
+    >>> [test.name for test in read_tests(datasets.path("rubber-treloar-uniaxial"))]
+    ['rubber-treloar-uniaxial']
+    """
+    return [test.reading.experiment for test in find_tests_in_file(path, **options)]
+
+
+def find_tests_in_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> list[TestInFile]:
+    """Return all tests in one file, as `read_tests` reads them, each with the options that read it alone.
+
+    Shorter tables without columns of deformation and load, such as one of results, are no tests.
+
+    Raises
+    ------
+    InputError
+        As `read_tests`, and where some tests say in which loading mode they were measured, and others do not.
+    """
+    tables = read_tables(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
+    has_sheets = len({table.sheet for table in tables}) > 1
+    tests, refused = list[TestInFile](), list[tuple[Table, InputError]]()
+    for table in tables:
+        selection, names = options.copy(), list[str]()
+        if has_sheets:
+            selection["sheet"] = table.sheet
+            names.append(table.sheet)
+        if table.number:
+            selection["table"] = table.number
+            names.append(table.title or str(table.number))
+        try:
+            of_table = list(_side_by_side(only_rows(table, options.get("only")), path, selection, names))
+        except InputError as error:
+            refused.append((table, error))
+            continue
+        for part in of_table:
+            tests += _of_one_table(*part)
+    longest = max((len(test.reading.table.rows) for test in tests), default=0)
+    for table, refusal in refused:
+        if len(table.rows) >= MIN_SHARE_OF_TEST * longest:
+            raise _may_be_test(refusal, tests) if tests else refusal
+    _check_modes(path, tests)
+    notes = [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in refused]
+    first = tests[0]
+    reading = replace(first.reading, warnings=(*first.reading.warnings, *notes))
+    return [first._replace(reading=reading), *tests[1:]]
+
+
+def _may_be_test(refusal: InputError, tests: Sequence[TestInFile]) -> InputError:
+    """Return why a table was refused, with how to read the tests in the others."""
+    options = tests[0].options
+    place = f"--sheet '{options['sheet']}'" if options.get("sheet") else f"--table {options.get('table')}"
+    return InputError(f"{refusal} To leave that table out and read '{tests[0].name}': {place}.")
+
+
+_Part = tuple[Table, str | os.PathLike[str], ReadingOptions, list[str]]
+"""Rows, the path of their file, the options that read them, and what the file calls them."""
+
+
+def _side_by_side(
+    table: Table, path: str | os.PathLike[str], options: ReadingOptions, names: list[str]
+) -> Iterator[_Part]:
+    """Yield the tests whose columns stand beside one another; the table itself where it has those of one."""
+    stated, source = mode_of(path, table, names)
+    mode = checked_mode({**options, "mode": options.get("mode") or stated})
+    stress_type, columns = options.get("stress_type", "engineering"), options.get("columns")
+    tests = [] if columns else columns_side_by_side(table, stress_type, is_shear=mode.controls == (SHEAR,))
+    if not tests or len(mode.stresses) > 1:
+        with about_mode(mode.name, GIVEN if options.get("mode") else source):
+            choose_columns(table, mode, columns, stress_type, options.get("axis"))
+        yield table, path, options, names
+        return
+    for test in tests:
+        yield table, path, {**options, "columns": test.columns}, [*names, test.name]
+
+
+def _of_one_table(
+    table: Table, path: str | os.PathLike[str], options: ReadingOptions, names: list[str]
+) -> Iterator[TestInFile]:
+    """Yield the test in rows, or those of each specimen that a column names."""
+    name, source = " ".join(names) or Path(path).stem, ""
+    of_test: ReadingOptions = {"name": name, **options}
+    if options.get("mode") is None:
+        of_test["mode"], source = mode_of(path, table, names, has_columns=bool(options.get("columns")))
+    try:
+        reading = read_rows(table, path, **of_test)
+    except SeveralSpecimens as several:
+        only, labels = options.get("only") or {}, np.array(several.labels)
+        for label in dict.fromkeys(several.labels):
+            rows = table.taken(np.flatnonzero(labels == label))
+            selection: ReadingOptions = {**options, "only": {**only, several.column: label}}
+            yield from _of_one_table(rows, path, selection, [*names, label])
+        return
+    yield TestInFile(name, replace(reading, mode_source=source or reading.mode_source), of_test)
+
+
+def _check_modes(path: str | os.PathLike[str], tests: Sequence[TestInFile]) -> None:
+    """Refuse tests of which some say their loading mode, and others do not."""
+    silent = [test.name for test in tests if test.reading.mode_source == DEFAULT_SOURCE]
+    if silent and len(silent) < len(tests):
+        raise InputError(
+            f"{path}: '{silent[0]}' does not say in which loading mode it was measured, as other tests in the file do. "
+            f"Rename it, or give --mode once for all {len(tests)} tests, or once for each."
+        )

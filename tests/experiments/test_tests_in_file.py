@@ -1,0 +1,302 @@
+"""Several tests in one file: in sheets, tables, columns or rows."""
+
+from __future__ import annotations
+
+import zipfile
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import MU, neo_hookean, ramp
+from tissuq.errors import InputError
+from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
+
+STIFFNESS = {"S1": 1.0, "S2": 1.1, "S3": 1.2}
+SIZES = {"length": "10 mm", "area": "10 mm2"}
+
+
+def cell(number):
+    return f"{number:.6f}"
+
+
+def rows_of(*columns):
+    return [[cell(value) for value in row] for row in zip(*columns, strict=True)]
+
+
+def written(path, rows, separator=","):
+    path.write_text("\n".join(separator.join(row) for row in rows) + "\n", encoding="utf-8")
+    return path
+
+
+def check(tests, names=STIFFNESS, sizes=(1.0, 1.1, 1.2), stretch=None):
+    """Compare tests with neo-Hookean specimens, each so many times as stiff."""
+    assert [test.name for test in tests] == list(names)
+    for test, size in zip(tests, sizes, strict=True):
+        np.testing.assert_allclose(test.stretch, ramp() if stretch is None else stretch, atol=2e-6)
+        np.testing.assert_allclose(test.stress, size * neo_hookean(test.stretch), atol=2e-6)
+
+
+def one_column_a_specimen(header, names_above=()):
+    stretch = ramp()
+    columns = [stretch - 1, *(1e3 * size * neo_hookean(stretch) for size in STIFFNESS.values())]
+    return [*([list(names_above)] if names_above else []), header, *rows_of(*columns)]
+
+
+def pairs(header, names_above=()):
+    stretch = ramp()
+    columns = [column for size in STIFFNESS.values() for column in (stretch - 1, 1e3 * size * neo_hookean(stretch))]
+    return [*([list(names_above)] if names_above else []), header, *rows_of(*columns)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "names"),
+    [
+        (one_column_a_specimen(["Strain", *(f"Stress_S{k} [kPa]" for k in "123")]), ["s1", "s2", "s3"]),
+        (one_column_a_specimen(["Strain", *(f"Sample {k} stress [kPa]" for k in "123")]),
+         ["sample 1", "sample 2", "sample 3"]),
+        (one_column_a_specimen(["Strain", *["Stress [kPa]"] * 3], ["", *STIFFNESS]), STIFFNESS),
+        (pairs(["Strain", "Stress [kPa]"] * 3), "123"),
+        (pairs(["Strain", "Stress [kPa]"] * 3, ["S1", "", "S2", "", "S3", ""]), STIFFNESS),
+        (pairs(["Strain", "Stress [kPa]", "Strain.1", "Stress [kPa].1", "Strain.2", "Stress [kPa].2"]), "123"),
+        (pairs([name.format(k) for k in "ABC" for name in ("Strain {} [-]", "Stress {} [kPa]")]), "abc"),
+    ],
+)  # fmt: skip
+def test_tests_beside_one_another_are_read_each_by_its_columns(tmp_path, rows, names):
+    check(read_tests(written(tmp_path / "wide.csv", rows)), names)
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (["Strain", "Stress [kPa]", "Stress [kPa]", "Stress [kPa]"], "several columns may be the stress"),
+        (["Strain", "Stress 11 [kPa]", "Stress 22 [kPa]", "Stress 33 [kPa]"], "no column is recognised as"),
+        (["Strain", "Engineering stress [kPa]", "Nominal stress [kPa]", "Stress rate [kPa]"], "several columns may be"),
+    ],
+)
+def test_columns_that_are_not_of_several_tests_are_not_taken_for_them(tmp_path, header, message):
+    with pytest.raises(InputError, match=message):
+        read_tests(written(tmp_path / "one.csv", one_column_a_specimen(header)))
+
+
+def test_axes_x_and_y_are_of_one_test_and_1_and_2_are_asked_about(tmp_path):
+    rows = rows_of(*[ramp()] * 2, *[ramp() - ramp() ** -5] * 2)
+    header = ["stretch_{}", "stretch_{}", "stress_{} [kPa]", "stress_{} [kPa]"]
+    lettered, numbered = (
+        [name.format(axis) for name, axis in zip(header, axes, strict=True)] for axes in ("xyxy", "1212")
+    )
+    (test,) = find_tests_in_file(written(tmp_path / "axes.csv", [lettered, *rows]))
+    assert (test.options["mode"], test.reading.mode_source) == ("biaxial", "columns of both axes")
+    path = written(tmp_path / "either.csv", [numbered, *rows])
+    with pytest.raises(InputError, match=r"--mode biaxial.*If numbers in the names are of two specimens, write S1"):
+        read_tests(path)
+    (test,) = find_tests_in_file(path, mode="biaxial")
+    assert test.reading.experiment.stress.shape == (60, 2)
+
+
+def test_a_shorter_test_ends_where_its_cells_do(tmp_path):
+    rows = pairs(["Strain", "Stress [kPa]"] * 3)
+    common = one_column_a_specimen(["Strain", "Stress_S1 [kPa]", "Stress_S2 [kPa]", "Stress_S3 [kPa]"])
+    for row in rows[-7:]:
+        row[2:4] = ["", ""]
+    for row in common[-7:]:
+        row[2] = "---"
+    for content in (rows, common):
+        tests = find_tests_in_file(written(tmp_path / "wide.csv", content))
+        assert [len(test.reading.experiment) for test in tests] == [60, 53, 60]
+        assert "7 rows without values of" in tests[1].reading.warnings[0]
+        assert f"the first in line {len(content) - 6}" in tests[1].reading.warnings[0]
+        np.testing.assert_allclose(tests[1].reading.experiment.stretch, ramp()[:53], atol=2e-6)
+
+
+def test_missing_rows_are_left_out_and_a_single_missing_cell_is_not(tmp_path):
+    rows = [["stretch", "stress [kPa]"], *rows_of(ramp(), 1e3 * neo_hookean(ramp()))]
+    rows[10] = ["NaN", "NaN"]
+    test = find_tests_in_file(written(tmp_path / "a.csv", rows))[0].reading
+    assert len(test.experiment) == 59
+    assert test.warnings == ("1 row without values of 'stretch' and 'stress [kPa]' left out, in line 11.",)
+    rows[20] = ["1.1", "NaN"]
+    with pytest.raises(InputError, match="line 21, column 'stress \\[kPa\\]': 'NaN' is not a finite number"):
+        read_tests(written(tmp_path / "b.csv", rows))
+
+
+def steps(titles=("Tension - 1", "Tension - 2"), sizes=(1.0, 1.1)):
+    """Two steps as a rheometer's software exports them."""
+    lines = [["Filename", "test"], [""]]
+    for title, size in zip(titles, sizes, strict=True):
+        lines += [[""], ["[step]"], [title], ["Time", "Displacement", "Force"], ["s", "mm", "N"]]
+        lines += rows_of(np.arange(60) / 10, 10 * (ramp() - 1), 10 * size * neo_hookean(ramp()))
+    return lines
+
+
+def test_tables_beneath_one_another_are_tests_named_by_their_titles(tmp_path):
+    path = written(tmp_path / "steps.txt", steps(), "\t")
+    check(read_tests(path, dimensions=SIZES), ["Tension - 1", "Tension - 2"], (1.0, 1.1))
+    with pytest.raises(InputError, match=r"several tables: 1 in lines 8 to 67, 2 in lines 73 to 132.*--table 1"):
+        tq.read_experiment(path, dimensions=SIZES)
+    second = tq.read_experiment(path, dimensions=SIZES, table=2)
+    np.testing.assert_allclose(second.stress, 1.1 * neo_hookean(ramp()), atol=2e-6)
+    assert second.source.startswith("steps.txt, table 2: stretch")
+    with pytest.raises(InputError, match="has no table 3; its tables are numbered from 1 to 2"):
+        tq.read_experiment(path, table=3)
+
+
+def test_tables_in_which_time_goes_on_are_one_test(tmp_path):
+    lines, time = [["MTS793"]], np.arange(60) / 10
+    for part in (slice(0, 25), slice(25, 60)):
+        lines += [[""], ["Data Header:", "Time:", "5.1", "Sec"], ["Crosshead", "Load", "Time"], ["mm", "N", "Sec"]]
+        lines += rows_of(10 * (ramp() - 1)[part], 10 * neo_hookean(ramp())[part], time[part])
+    (test,) = find_tests_in_file(written(tmp_path / "mts.txt", lines, "\t"), dimensions=SIZES)
+    check([test.reading.experiment], ["mts"], [1.0])
+    assert "in which time goes on, read as one table" in test.reading.warnings[0]
+
+
+def test_a_word_among_the_numbers_is_a_bad_cell_and_no_second_table(tmp_path):
+    rows = [["stretch", "stress [kPa]"], *rows_of(ramp(), 1e3 * neo_hookean(ramp()))]
+    rows.insert(30, ["stop", "stop"])
+    with pytest.raises(InputError, match="line 31, column 'stretch': 'stop' is not a number"):
+        read_tests(written(tmp_path / "a.csv", rows))
+
+
+def book(path, **sheets):
+    openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
+    workbook = openpyxl.Workbook()
+    workbook.remove(workbook.active)
+    for name, rows in sheets.items():
+        sheet = workbook.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    workbook.save(path)
+    return path
+
+
+def sheet(names, deformation, stress):
+    return [names, *([float(a), float(b)] for a, b in zip(deformation, stress, strict=True))]
+
+
+TENSION = sheet(["stretch", "stress [kPa]"], ramp(), 1e3 * neo_hookean(ramp()))
+SHEAR = sheet(["shear", "stress [kPa]"], ramp() - 1, 1e3 * MU * (ramp() - 1))
+RESULTS = [["Specimen", "Maximum"], [1, 2.0], [2, 3.0]]
+
+
+def test_sheets_are_tests_with_the_modes_that_they_say(tmp_path):
+    path = book(tmp_path / "liver.xlsx", Results=RESULTS, tension=TENSION, Blatt3=SHEAR)
+    tests = find_tests_in_file(path)
+    assert [(test.name, test.options["mode"], test.reading.mode_source) for test in tests] == [
+        ("tension", "uniaxial", "'tension'"),
+        ("Blatt3", "simple-shear", "a column of shear"),
+    ]
+    assert "sheet 'Results' is left out: no columns of a test" in tests[0].reading.warnings[-1]
+    np.testing.assert_allclose(tests[1].reading.experiment.stress, MU * (ramp() - 1), rtol=1e-12)
+    for test in tests:
+        alone = tq.read_experiment(path, **test.options)
+        assert alone.mode == test.reading.experiment.mode
+        np.testing.assert_array_equal(alone.measured, test.reading.experiment.measured)
+
+
+def test_a_long_table_that_is_not_understood_is_no_mere_results(tmp_path):
+    unknown = sheet(["alpha", "beta"], ramp(), ramp())
+    path = book(tmp_path / "liver.xlsx", tension=TENSION, other=unknown)
+    with pytest.raises(InputError, match=r"sheet 'other': no column is recognised.*read 'tension': --sheet 'tension'"):
+        read_tests(path)
+    assert len(read_tests(path, sheet="tension")) == 1
+
+
+def test_one_sheet_that_holds_a_test_is_the_test_of_the_file(tmp_path):
+    (test,) = find_tests_in_file(book(tmp_path / "liver.xlsx", Results=RESULTS, Data=TENSION))
+    assert test.options["sheet"] == "Data"
+
+
+def test_a_mode_that_only_some_tests_say_is_asked_for(tmp_path):
+    path = book(tmp_path / "liver.xlsx", tension=TENSION, Blatt3=TENSION)
+    with pytest.raises(InputError, match=r"'Blatt3' does not say in which loading mode.*--mode once for all 2 tests"):
+        read_tests(path)
+    assert len(read_tests(path, mode="equibiaxial")) == 2
+
+
+def test_tests_of_specimens_and_modes_in_rows_are_parted_by_both(tmp_path):
+    rows = [["mode", "stretch", "stress_kPa", "specimen"]]
+    for name, size in (("A", 1.0), ("B", 1.1)):
+        for mode, stretch in (("uniaxial", ramp()), ("equibiaxial", ramp(1.2))):
+            stress = MU * (stretch - stretch ** (-2.0 if mode == "uniaxial" else -5.0))
+            rows += [[mode, *row, name] for row in rows_of(stretch, 1e3 * size * stress)]
+    tests = read_tests(written(tmp_path / "rows.csv", rows))
+    names = [(test.mode.name, round(1e3 * test.stress[-1], 3)) for test in tests]
+    uni, equi = 1e3 * neo_hookean(1.4), 1e3 * MU * (1.2 - 1.2**-5)
+    assert names == [
+        (mode, pytest.approx(size * top, abs=1e-3))
+        for size in (1.0, 1.1)
+        for mode, top in (("uniaxial", uni), ("equibiaxial", equi))
+    ]
+
+
+def test_a_mode_comes_from_the_name_of_a_file_and_a_misfit_says_so(tmp_path):
+    path = written(tmp_path / "liver-planar.csv", TENSION[:1] + rows_of(ramp(), neo_hookean(ramp())))
+    assert tq.read_experiment(path).mode.name == "planar"
+    assert tq.read_experiment(path, mode="uniaxial").mode.name == "uniaxial"
+    path = written(tmp_path / "shear.csv", TENSION[:1] + rows_of(ramp(), neo_hookean(ramp())))
+    with pytest.raises(InputError, match="The loading mode simple-shear is from the name of the file; give --mode"):
+        tq.read_experiment(path)
+
+
+def test_sheets_of_libreoffice_are_read(tmp_path):
+    pytest.importorskip("python_calamine", reason="python-calamine is not installed")
+    rows = "".join(
+        "<table:table-row>"
+        + "".join(
+            f'<table:table-cell office:value-type="float" office:value="{value!r}"><text:p>{value:.2f}</text:p>'
+            "</table:table-cell>"
+            if isinstance(value, float)
+            else f'<table:table-cell office:value-type="string"><text:p>{value}</text:p></table:table-cell>'
+            for value in row
+        )
+        + "</table:table-row>"
+        for row in TENSION
+    )
+    urn = "urn:oasis:names:tc:opendocument:xmlns"
+    spaces = "".join(f' xmlns:{name}="{urn}:{name}:1.0"' for name in ("office", "table", "text"))
+    sheet = f'<table:table table:name="tension">{rows}</table:table>'
+    body = f"<office:body><office:spreadsheet>{sheet}</office:spreadsheet></office:body>"
+    with zipfile.ZipFile(tmp_path / "test.ods", "w") as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        archive.writestr("META-INF/manifest.xml", f'<manifest:manifest xmlns:manifest="{urn}:manifest:1.0"/>')
+        archive.writestr("content.xml", f"<office:document-content{spaces}>{body}</office:document-content>")
+    (test,) = read_tests(tmp_path / "test.ods")
+    np.testing.assert_array_equal(test.stress, 1e-3 * np.array([row[1] for row in TENSION[1:]]))
+
+
+def matlab_file(path, kind, **variables):
+    if kind == "5":
+        from scipy.io import savemat
+
+        savemat(path, variables)
+        return path
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in variables.items():
+            for field, part in value.items() if isinstance(value, dict) else [("", value)]:
+                file[f"{name}/{field}" if field else name] = np.atleast_2d(part) if np.ndim(part) < 2 else part.T
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["5", "7.3"])
+def test_vectors_and_structures_of_matlab_are_tables(tmp_path, kind):
+    stress = 1e3 * neo_hookean(ramp())
+    path = matlab_file(tmp_path / "a.mat", kind, stretch=ramp(), stress=stress, comment_code=3.0)
+    test = tq.read_experiment(path, stress_unit="kPa")
+    np.testing.assert_array_equal(test.stretch, ramp())
+    np.testing.assert_allclose(test.stress, neo_hookean(ramp()), rtol=1e-15)
+    structure = {name: {"stretch": ramp(), "stress": size * stress} for name, size in STIFFNESS.items()}
+    check(read_tests(matlab_file(tmp_path / "b.mat", kind, **structure), stress_unit="kPa"))
+    matrix = matlab_file(tmp_path / "c.mat", kind, data=np.column_stack([ramp(), stress]))
+    test = tq.read_experiment(matrix, columns={"stretch": 1, "stress": 2}, stress_unit="kPa")
+    np.testing.assert_allclose(test.stress, neo_hookean(ramp()), rtol=1e-15)
+
+
+def test_a_damaged_file_of_matlab_is_refused(tmp_path):
+    (tmp_path / "a.mat").write_bytes(b"MATLAB 5.0 MAT-file, Platform: " + bytes(range(200)))
+    with pytest.raises(InputError, match="seems to be a file of MATLAB, but it cannot be opened"):
+        tq.read_experiment(tmp_path / "a.mat")
