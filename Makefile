@@ -11,7 +11,7 @@ BENCH := .venv-bench
 APT := { apt-get install -qq -y calculix-ccx || { apt-get update -qq && apt-get install -qq -y calculix-ccx; }; }
 JAX_CACHE ?= .jax_cache
 
-.PHONY: demo test test-rest test-all mutants frozen architecture lint types check system lock bench clean help
+.PHONY: demo test test-rest test-all mutants fuzz frozen architecture lint types check system lock bench clean help
 
 help:  ## List the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -35,6 +35,9 @@ test-all: $(VENV)/.installed-dev  ## Run every test, with coverage (half an hour
 
 mutants: $(VENV)/.installed-dev  ## Plant faults in copies of the source and see that tests catch each (ten minutes)
 	$(BIN)/python tests/mutants.py
+
+fuzz: $(VENV)/.installed-dev  ## Read ten thousand files mutated at random, and see that each is read or refused (three minutes)
+	$(BIN)/python tests/fuzz.py --files 10000
 
 frozen: $(VENV)/.installed-dev  ## Hold reference posteriors against their stored numbers (a minute, at first two)
 	JAX_COMPILATION_CACHE_DIR=$(abspath $(JAX_CACHE)) JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \

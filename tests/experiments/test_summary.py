@@ -113,3 +113,10 @@ def test_a_summary_of_a_sheet_is_left_out(tmp_path, label):
         sheet.append([label, *map(statistic, values[:, 1:].T.tolist())])
     book.save(tmp_path / "test.xlsx")
     assert len(tq.read_experiment(tmp_path / "test.xlsx")) == len(values)
+
+
+def test_a_number_beyond_all_bounds_at_the_end_is_no_statistic(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text("stretch,stress [kPa]\n" + "".join(f"{1 + k / 100},{k}\n" for k in range(20)) + "\n1.19,1e999\n")
+    with pytest.raises(InputError, match=r"line 23, column 'stress .kPa.': '1e999' is too large"):
+        tq.read_experiment(path)

@@ -154,14 +154,15 @@ def _is_word(cell: str) -> bool:
 
 
 def _number(cell: str) -> float:
-    return float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
+    number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
+    return number if np.isfinite(number) else np.nan
 
 
 def _rounding(cell: str) -> float:
     """Return by how much a number may differ from the statistic that it was rounded from."""
     mantissa, _, exponent = cell.lower().replace(",", ".").partition("e")
     decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
-    return float(ROUNDED * 10.0**-decimals + FLOATING * abs(_number(cell)))
+    return float(ROUNDED * float(f"1e{-decimals}") + FLOATING * abs(_number(cell)))
 
 
 def _same_width(rows: list[list[float]]) -> list[list[float]]:
