@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
+from tissuq.experiments.units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
 __all__ = ["Curve", "Experiment", "checked_points"]
@@ -339,24 +340,19 @@ def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
 
 def _in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
     """Return stresses in MPa, and the unit in which people want to read them."""
-    if _is_quantity(stress):
-        return _magnitude(stress, "megapascal"), stress_unit_of(unit or f"{stress.units:~C}").name
+    if is_quantity(stress):
+        return _magnitude(stress, "megapascal"), stress_unit_of(unit or unit_of(stress)).name
     given = stress_unit_of(unit or "MPa")
     return _numbers("stress", stress) * given.to_mpa, given.name
 
 
 def _magnitude(values: Any, unit: str) -> Any:
     """Return a quantity of pint as numbers in a unit; anything else as it is."""
-    if not _is_quantity(values):
+    if not is_quantity(values):
         return values
     if not values.is_compatible_with(unit):
         raise InputError(f"values in '{values.units}' were given where {unit} was expected.")
     return values.to(unit).magnitude
-
-
-def _is_quantity(values: Any) -> bool:
-    """Tell whether values are a quantity of pint, of whatever registry."""
-    return hasattr(values, "magnitude") and hasattr(values, "is_compatible_with")
 
 
 def _numbers(name: str, values: Any) -> FloatArray:

@@ -19,12 +19,14 @@ __all__ = [
     "NUMBER",
     "Quantity",
     "StressUnit",
+    "is_quantity",
     "looks_like_unit",
     "measured_in",
     "number_and_unit",
     "strain_factor",
     "stress_unit",
     "stress_units_in",
+    "unit_of",
 ]
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -223,6 +225,23 @@ def number_and_unit(text: str) -> tuple[float | None, str]:
     """Return the number at the head of a text, if there is one, and what follows it."""
     match = re.fullmatch(rf"\s*({NUMBER.pattern})\s*\[?\(?([^\d\s\[\]()][^\s\[\]()]*)?[\])]?\s*", text)
     return (float(match[1].replace(",", ".")), match[2] or "") if match else (None, "")
+
+
+def is_quantity(values: Any) -> bool:
+    """Tell whether values are a quantity of pint, of whatever registry."""
+    return hasattr(values, "magnitude") and hasattr(values, "is_compatible_with")
+
+
+def unit_of(quantity: Any) -> str:
+    """Return the unit of a quantity of pint in short; an empty text for plain numbers.
+
+    Examples
+    --------
+    >>> import pint
+    >>> unit_of(pint.UnitRegistry().Quantity([1.0, 2.0], "kilopascal"))
+    'kPa'
+    """
+    return f"{quantity.units:~C}".replace("**", "")
 
 
 def looks_like_unit(text: str) -> bool:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal, Unpack
 
 from tissuq.assessment.stable_posterior import modes_named
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
+from tissuq.experiments.reading.experiment_file import PythonOptions, measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
@@ -23,9 +24,12 @@ from tissuq.posterior.solver import METHODS, Method, Solver
 
 __all__ = ["fit", "fit_many"]
 
+OPTIONS = ("discrepancy", "material", "noise_sd", "noise", "priors", "tolerances", "method", "stable_in", "seed")
+"""Of a fit, beside those of reading."""
+
 
 def fit(
-    data: Experiment | Sequence[Experiment],
+    data: Any,
     *,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
@@ -36,14 +40,16 @@ def fit(
     method: Method = "auto",
     stable_in: str | Sequence[str] = (),
     seed: int = 0,
+    **reading: Unpack[PythonOptions],
 ) -> Posterior:
     """Identify the parameters of a material from an experiment, with a model discrepancy and noise.
 
     Parameters
     ----------
-    data : Experiment or sequence of Experiment
+    data : Experiment, str, path or table, or sequence of these
         The measurements: of one test, or of several in any modes, which share one material. A discrepancy that is an
-        energy acts in all of them; one in stress is another in each test, of the same size.
+        energy acts in all of them; one in stress is another in each test, of the same size. Files and tables (of
+        pandas, polars, xarray) are read as by `tissuq.read`.
     discrepancy : str or Discrepancy
         What the material cannot explain, by name (``tissuq discrepancies`` lists them) or as an object; ``"auto"`` is
         an average of strain energies that leave the initial shear modulus alone, by the evidence.
@@ -79,6 +85,9 @@ def fit(
         measured: the prior leaves out what is not, and the posterior is known by those of its draws that are.
     seed : int
         Of the draws.
+    reading
+        Options of `tissuq.read`, where files or tables are given, such as ``mode``, ``stress="P [kPa]"``, ``unit`` (of
+        the stresses; noise and priors are in MPa whatever it is), ``length="10 mm"``.
 
     Raises
     ------
@@ -104,6 +113,9 @@ def fit(
     >>> low, high = posterior.summary().loc["C10", ["hdi_low", "hdi_high"]]
     >>> bool(low < 1.2 < high)
     True
+    >>> table = {"lambda": [0.8, 0.9, 1.1, 1.2, 1.3], "P [kPa]": [-3.81, -1.67, 1.37, 2.53, 3.54]}
+    >>> tq.fit(table, discrepancy="none", noise_sd=1e-5)
+    <Posterior of C10: neo-hookean, discrepancy none, 5 measurements, exact>
     """
     return fit_many(
         [data],
@@ -116,11 +128,12 @@ def fit(
         method=method,
         stable_in=stable_in,
         seed=seed,
+        **reading,
     )[0]
 
 
 def fit_many(
-    datasets: Sequence[Experiment | Sequence[Experiment]],
+    datasets: Sequence[Any],
     *,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
@@ -131,6 +144,7 @@ def fit_many(
     method: Method = "auto",
     stable_in: str | Sequence[str] = (),
     seed: int = 0,
+    **reading: Unpack[PythonOptions],
 ) -> list[Posterior]:
     """Fit many experiments with the same model, each by itself; the parameters are those of `fit`.
 
@@ -140,7 +154,7 @@ def fit_many(
 
     Parameters
     ----------
-    datasets : sequence of Experiment, or of sequences of them
+    datasets : sequence of Experiment, files or tables, or of sequences of them
         Several tests that belong together count as one data set.
 
     Returns
@@ -158,6 +172,7 @@ def fit_many(
     >>> len(held)
     20
     """
+    experiments = [measurements(data, OPTIONS, **reading) for data in datasets]
     if isinstance(tolerances, str):
         tolerances = Tolerances(tolerances)
     if tolerances is not None and not isinstance(tolerances, Tolerances):
@@ -182,7 +197,7 @@ def fit_many(
             model = solver.with_spreads_of_tests(model)
         return solver.with_probable_noise(model)
 
-    models = [model_of(Experiment.of(data)) for data in datasets]
+    models = [model_of(data) for data in experiments]
     groups: dict[tuple[States, int], list[int]] = {}
     for number, model in enumerate(models):
         is_shared = len(model.experiment.tests) == 1 and not model.tolerances and not noise_model.is_consecutive

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack, cast
 
 import numpy as np
 
@@ -18,19 +18,25 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
+from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.measures import Load, stress_of, stretch_of
+from tissuq.experiments.reading.options import spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
 from tissuq.experiments.reading.stated_mode import DEFAULT_MODE, GIVEN, about_mode, mode_of
 from tissuq.experiments.reading.table import Column, Table, read_table
 
 __all__ = [
+    "READING_OPTIONS",
     "STRESS_TYPES",
+    "PythonOptions",
     "Reading",
     "ReadingOptions",
     "checked_mode",
+    "measurements",
+    "read",
     "read_experiment",
     "read_file",
     "read_rows",
@@ -42,7 +48,7 @@ AXES = ("x", "y")
 
 
 class ReadingOptions(TypedDict, total=False):
-    """How to read a file where it does not tell by itself: the options of :func:`read_experiment`."""
+    """How to read a file where it does not tell by itself: the options of :func:`tissuq.read`."""
 
     mode: str | LoadingMode | None
     columns: Mapping[str, str | int] | None
@@ -65,6 +71,32 @@ class ReadingOptions(TypedDict, total=False):
     table: int | None
     name: str | None
     skip_rows: int
+
+
+READING_OPTIONS = tuple(ReadingOptions.__annotations__)
+
+
+class PythonOptions(ReadingOptions, total=False):
+    """The options of :func:`tissuq.read`, with entries of `columns` and `dimensions`, and the unit, by themselves."""
+
+    stretch: str | int | None
+    strain: str | int | None
+    displacement: str | int | None
+    shear: str | int | None
+    stress: str | int | None
+    force: str | int | None
+    stretch2: str | int | None
+    strain2: str | int | None
+    displacement2: str | int | None
+    shear2: str | int | None
+    stress2: str | int | None
+    force2: str | int | None
+    length: Any
+    area: Any
+    width: Any
+    thickness: Any
+    diameter: Any
+    unit: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +136,8 @@ class Reading:
         return find_cycles(self.used.table, self.used.course)
 
 
-def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Experiment:
-    """Read stretches and stresses from a file: CSV, TSV, columns of numbers, or an Excel workbook.
+def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
+    """Read stretches and stresses from a file (CSV, TSV, columns of numbers, an Excel workbook) or a table in memory.
 
     Separators, decimal points or commas, encodings, lines above the table, a row of column names, a
     row of units, and columns and dimensions in English or German are recognised. Nothing is guessed where a wrong
@@ -113,8 +145,16 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
 
     Parameters
     ----------
-    path : str or path
-        The file.
+    path : str or path, or table
+        The file, or a table in memory: a DataFrame of pandas or polars, a Dataset of xarray, a mapping from names to
+        arrays or quantities of pint. Units are those in the names of columns, of quantities, and of the attributes
+        ``units`` of xarray.
+    stretch, strain, displacement, shear, stress, force, and with 2 at the end : str or int, optional
+        Entries of ``columns``: the name of a column, or its number from 1.
+    length, area, width, thickness, diameter : str, optional
+        Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
+    unit : str, optional
+        In short for ``stress_unit``.
     mode : str or LoadingMode, optional
         How the specimen was loaded. Without it as a comment in the file (``# mode: planar``), its name or its columns
         say: both axes of a biaxial machine, or an amount of shear; else uniaxial.
@@ -186,14 +226,19 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     Raises
     ------
     InputError
-        When the file, a cell or an option cannot be used, naming the line and the column.
+        When the file, a cell or an option cannot be used, naming the line (of a table in memory its row, counted from
+        0) and the column.
 
     Examples
     --------
-    >>> from tissuq.experiments import datasets
-    >>> data = read_experiment(datasets.path("rubber-treloar-uniaxial"))
+    >>> import pandas as pd
+    >>> import tissuq as tq
+    >>> data = tq.read(tq.datasets.path("rubber-treloar-uniaxial"))
     >>> data.stress_unit, len(data)
     ('MPa', 21)
+    >>> frame = pd.DataFrame({"lambda": [1.0, 1.1, 1.2], "P [kPa]": [0.0, 2.5, 5.5], "T [kPa]": [0.0, 2.75, 6.6]})
+    >>> tq.read(frame, stress="P [kPa]").stress.tolist()
+    [0.0, 0.0025, 0.0055]
     """
     reading = read_file(path, **options)
     for text in assumptions(reading.used, reading.choices):
@@ -201,14 +246,59 @@ def read_experiment(path: str | os.PathLike[str], **options: Unpack[ReadingOptio
     return reading.experiment
 
 
-def read_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Reading:
-    """Read a file as :func:`read_experiment` does, and keep what was done on the way."""
-    if options.get("mode") is not None:
-        checked_mode(options)
-    return read_rows(only_rows(table_of(path, options), options.get("only")), path, **options)
+read_experiment = read
+"""The earlier name of `read`."""
 
 
-def table_of(path: str | os.PathLike[str], options: ReadingOptions) -> Table:
+def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
+    """Return what people have as an experiment: one as it is, a file or a table as `read` does, or several together.
+
+    Parameters
+    ----------
+    data : Experiment, str, path or table, or sequence of these
+    others : sequence of str
+        Names of further options, which messages may propose.
+    options
+        As of `read`; of several files those of each.
+
+    Raises
+    ------
+    InputError
+        When it is none of these, or options of reading come with what has been read.
+
+    Examples
+    --------
+    >>> measurements({"stretch": [1.0, 1.1], "stress": [0.0, 0.2]}, unit="MPa").stress.tolist()
+    [0.0, 0.2]
+    """
+    spelled_out(options, READING_OPTIONS, others)
+    if isinstance(data, str | os.PathLike) or is_data_frame(data):
+        return read(data, **options)
+    if isinstance(data, Experiment):
+        if options:
+            raise InputError(
+                f"{', '.join(options)}: said of how a file is read, but the measurements are an Experiment, "
+                "which has been read. Give it to tissuq.read, or to Experiment."
+            )
+        return data
+    if isinstance(data, Sequence):
+        return Experiment.of([measurements(test, others, **options) for test in data])
+    raise InputError(
+        "measurements are needed: a file ('test.csv'), a table (a DataFrame, a Dataset of xarray), or an Experiment, "
+        f"which tissuq.Experiment(mode, stretch, stress) makes of arrays; or a list of these. Not {data!r:.80}."
+    )
+
+
+def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
+    """Read a file as :func:`read` does, and keep what was done on the way."""
+    plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
+    if plain.get("mode") is not None:
+        checked_mode(plain)
+    table = table_of(path, plain)
+    return read_rows(only_rows(table, plain.get("only")), table.file if is_data_frame(path) else path, **plain)
+
+
+def table_of(path: Any, options: ReadingOptions) -> Table:
     """Return the table of a file that the options choose."""
     return read_table(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
 
@@ -251,7 +341,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
         rows = np.arange(0, len(used), every)
         used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
     check_signs(used, choices, is_positive)
-    used = used.with_step(f"{len(used)} rows (lines {used.table.lines[0]} to {used.table.lines[-1]})")
+    used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet = table.file.removeprefix(str(path))
     experiment = Experiment(
         mode=mode,

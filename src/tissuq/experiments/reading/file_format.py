@@ -13,7 +13,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.layout import find_layout
 from tissuq.registry import plugins, variants
 
-__all__ = ["SEPARATOR_OF_CELLS", "FileFormat", "explained", "file_format", "line_of", "sheets_with_tables"]
+__all__ = ["SEPARATOR_OF_CELLS", "FileFormat", "as_text", "explained", "file_format", "line_of", "sheets_with_tables"]
 
 LONGEST_SIGNATURE = 64
 """First bytes of a file that are looked at."""
@@ -112,15 +112,15 @@ def explained(path: str | os.PathLike[str], kind: str, library: str, cure: str) 
 
 def line_of(cells: Sequence[Any]) -> str:
     """Return the line of a row of cells: numbers to the last digit, and nothing after the last one."""
-    return SEPARATOR_OF_CELLS.join(map(_text, cells)).rstrip(SEPARATOR_OF_CELLS)
+    return SEPARATOR_OF_CELLS.join(map(as_text, cells)).rstrip(SEPARATOR_OF_CELLS)
 
 
-def _text(value: Any) -> str:
+def as_text(value: Any) -> str:
     """Return the value of a cell as text, numbers to the last digit."""
     if value is None:
         return ""
     if isinstance(value, date | time):
         return value.isoformat()
-    if isinstance(value, int | float):
-        return repr(value)
+    if isinstance(value, float):
+        return float.__repr__(value)  # not that of numpy's numbers
     return " ".join(str(value).replace('"', "'").split())

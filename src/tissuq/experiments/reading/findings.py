@@ -68,14 +68,14 @@ def _cycles(reading: Reading, number: int) -> str:
 
 def _rupture(reading: Reading, number: int) -> str:
     used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
-    control, peak = _control(reading), int(np.argmax(np.abs(stress)))
+    control, peak, table = _control(reading), int(np.argmax(np.abs(stress))), used.table
     for cycle in reading.used_cycles:
         rows = cycle.rows("loading")
         if rupture := find_rupture(course[rows], stress[rows], control.reference):
             row, rows = rows[rupture.start - 1], rows[rows <= peak]
             is_before_peak = find_rupture(course[rows], stress[rows], control.reference) is not None
             return (
-                f"after line {used.table.lines[row]} ({control.name} {course[row]:.4g}) the stress falls by "
+                f"after {table.counted} {table.lines[row]} ({control.name} {course[row]:.4g}) the stress falls by "
                 f"{rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
                 f"{'delete the rows from there on.' if is_before_peak else UNTIL_PEAK}"
             )
@@ -92,7 +92,7 @@ def _holds(reading: Reading, number: int) -> str:
     more = f" and {len(holds) - SHOWN} more" if len(holds) > SHOWN else ""
     is_before_peak = any(hold.stop <= peak for hold in holds)
     return (
-        f"in lines {where}{more} the stretch rests while the stress falls by up to "
+        f"in {used.table.counted}s {where}{more} the stretch rests while the stress falls by up to "
         f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; "
         f"{'delete these rows.' if is_before_peak else UNTIL_PEAK}"
     )

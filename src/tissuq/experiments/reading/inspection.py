@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import fill
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
-from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
+from tissuq.experiments.reading.experiment_file import PythonOptions, Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
@@ -86,8 +85,9 @@ class Inspection:
     def _rows(self) -> Iterator[tuple[str, str]]:
         table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
-        cells = SEPARATORS[table.separator]
-        yield "table", f"{len(table.names)} columns, separated by {cells}; rows in lines {_span(table.lines)}, {head}"
+        cells = f", separated by {SEPARATORS[table.separator]}; rows in lines {_span(table.lines)}, {head}"
+        in_memory = f"; rows {_span(table.lines)}, counted from 0"
+        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else in_memory}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])
@@ -134,7 +134,7 @@ class Inspection:
     def _cycle_table(self) -> Iterator[str]:
         cycles, stretch = self.reading.cycles, self.reading.recorded.course
         mean = "mean " * (len(self.reading.experiment.mode.controls) > 1)
-        yield f"{'cycle     lines':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
+        yield f"{f'cycle     {self.reading.table.counted}s':<{29 - len(mean)}}{mean}stretch: from   turning at   to"
         for number, cycle in list(enumerate(cycles, start=1))[:MAX_CYCLES_SHOWN]:
             rows = cycle.rows()
             ends = (stretch[row] for row in (rows[0], cycle.peak, rows[-1]))
@@ -145,8 +145,8 @@ class Inspection:
             yield f"... {len(cycles)} cycles in all"
 
 
-def inspect(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> Inspection:
-    """Return what would be understood of a file, with the options of :func:`tissuq.read_experiment`, before a fit.
+def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
+    """Return what would be understood of a file or a table, with the options of :func:`tissuq.read`, before a fit.
 
     Raises
     ------

@@ -18,6 +18,7 @@ __all__ = [
     "column_names",
     "find_layout",
     "is_comment",
+    "is_units_row",
     "later_tables",
     "split",
 ]
@@ -82,7 +83,7 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
         return None
     first_row = _with_faulty_rows_above(lines, cells, confirmed)
     units_row = first_row - 1
-    has_units = units_row > 0 and _is_units_row(cells(lines[units_row]))
+    has_units = units_row > 0 and is_units_row(cells(lines[units_row]))
     has_units = has_units and _are_names(_without_number(cells(lines[units_row - 1])))
     names_row = units_row - has_units
     width = len(cells(lines[confirmed]))
@@ -107,7 +108,7 @@ def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
         if position <= last_row or is_row:
             last_row = max(last_row, position)
             continue
-        has_units = position + 1 < len(texts) and _is_units_row(cells(texts[position + 1]))
+        has_units = position + 1 < len(texts) and is_units_row(cells(texts[position + 1]))
         is_apart = lines[position][0] > lines[position - 1][0] + 1 or last_row < position - 1
         if text.strip() == header or ((is_apart or has_units) and _are_names(row)):
             first_row = position + 1 + has_units
@@ -215,7 +216,7 @@ def _with_faulty_rows_above(lines: Sequence[str], cells: Split, row: int) -> int
         previous = cells(lines[row - 1])
         is_row = _are_values(previous) or (_is_data(previous) and len(previous) == width)
         is_beneath_names = row > 1 and _are_names(cells(lines[row - 2]))
-        if not is_row or (is_beneath_names and _is_units_row(previous)):
+        if not is_row or (is_beneath_names and is_units_row(previous)):
             break
         row -= 1
     return row
@@ -238,5 +239,6 @@ def _are_names(cells: Sequence[str]) -> bool:
     return len(cells) >= 2 and len(words) >= 1 and _count_numbers(cells) == 0
 
 
-def _is_units_row(cells: Sequence[str]) -> bool:
+def is_units_row(cells: Sequence[str]) -> bool:
+    """Tell whether cells are units, at least one of them not empty."""
     return all(map(looks_like_unit, cells)) and any(re.search(r"[^\W\d_]|%", cell) for cell in cells)

@@ -91,7 +91,7 @@ class MeasuredRows:
         size = np.abs(self.stress)
         peak = int(np.argmax((size / np.maximum(size.max(axis=1, keepdims=True), np.finfo(float).tiny)).sum(axis=0)))
         kept = self.kept(np.arange(peak + 1), "after the largest stress")
-        return kept.with_step(f"only rows up to the largest stress, in line {self.table.lines[peak]}")
+        return kept.with_step(f"only rows up to the largest stress, in {self.table.counted} {self.table.lines[peak]}")
 
     def taut(self, preload: str, thresholds: Sequence[float], peak: int) -> MeasuredRows:
         """Return the rows in which every axis carries the preload, with stretches counted from where it first does.
@@ -185,9 +185,10 @@ class _TautStart:
             row = int(slack[-1]) + 1
             share = (threshold - size[row - 1]) / (size[row] - size[row - 1])
             reference = stretch[row - 1] + share * (stretch[row] - stretch[row - 1])
-            start = cls(row, float(reference), f"between lines {table.lines[row - 1]} and {table.lines[row]}")
+            words = f"between {table.counted}s {table.lines[row - 1]} and {table.lines[row]}"
+            start = cls(row, float(reference), words)
         else:
-            words = f"in line {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
+            words = f"in {table.counted} {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
             start = cls(0, float(stretch[0]), words)
         if start.stretch <= 0:
             raise InputError(

@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from io import StringIO
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import (
@@ -23,6 +25,7 @@ from tissuq.experiments.reading.layout import (
     column_names,
     find_layout,
     is_comment,
+    is_units_row,
     later_tables,
     split,
 )
@@ -50,7 +53,7 @@ TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo)|(zeit|time)$")
 
 @dataclass(frozen=True)
 class Table:
-    """A table found in a file; a row of an Excel sheet is a line.
+    """A table found in a file, or in memory; a row of an Excel sheet is a line.
 
     Parameters
     ----------
@@ -65,7 +68,7 @@ class Table:
     rows : list of str
         The rows of data as text.
     lines : sequence of int
-        The line in the file of every row, counted from 1.
+        The line in the file of every row, counted from 1; of a table in memory its rows, counted from 0.
     head : sequence of (int, str)
         The lines above the rows, with their numbers.
     block : (rows, columns) array, optional
@@ -78,6 +81,8 @@ class Table:
         Which of the tables of a text or sheet it is, from 1; 0 for the only one.
     title : str
         What stands alone in the line above the names, such as the name of a step.
+    counted : str
+        What ``lines`` counts: lines, or the rows of a table in memory.
     """
 
     file: str
@@ -92,11 +97,12 @@ class Table:
     sheet: str = ""
     number: int = 0
     title: str = ""
+    counted: str = "line"
 
     @property
     def span(self) -> str:
         """Return the lines of its rows, in words."""
-        return f"lines {self.lines[0]} to {self.lines[-1]}"
+        return f"{self.counted}s {self.lines[0]} to {self.lines[-1]}"
 
     def label(self, column: int) -> str:
         """Return how messages name a column (counted from 0)."""
@@ -108,7 +114,7 @@ class Table:
 
     def place(self, column: int, row: int | None = None) -> str:
         """Return the place of a column, or of its cell in a row, as an editor shows it."""
-        line = "" if row is None else f", line {self.lines[row]}"
+        line = "" if row is None else f", {self.counted} {self.lines[row]}"
         return f"{self.file}{line}, column {self.label(column)}"
 
     def taken(self, rows: NDArray[np.intp]) -> Table:
@@ -182,7 +188,8 @@ class Table:
         count, first = np.count_nonzero(is_missing), self.lines[int(np.argmax(is_missing))]
         what = "1 row" if count == 1 else f"{count} rows"
         names = " and ".join(map(self.label, columns))
-        note = f"{what} without values of {names} left out, {'' if count == 1 else 'the first '}in line {first}."
+        where = f"{'' if count == 1 else 'the first '}in {self.counted} {first}"
+        note = f"{what} without values of {names} left out, {where}."
         return replace(self.taken(np.flatnonzero(~is_missing)), notes=(*self.notes, note))
 
     def _readings(self) -> Iterator[tuple[list[str], Callable[[str], float] | None]]:
@@ -202,7 +209,7 @@ class Table:
                 if problem:
                     return InputError(f"{self.place(column, row)}: {problem}")
                 for mark in set(cell) & {".", ","}:
-                    marks.setdefault(mark, f"'{cell}' in line {self.lines[row]}")
+                    marks.setdefault(mark, f"'{cell}' in {self.counted} {self.lines[row]}")
                 if len(marks) == 2:
                     return InputError(
                         f"{self.place(column, row)}: decimal points and decimal commas are mixed: "
@@ -212,10 +219,8 @@ class Table:
         return InputError(f"{self.file}: columns {' and '.join(map(self.label, columns))} do not hold numbers.")
 
 
-def read_table(
-    path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None
-) -> Table:
-    """Return the table in a file; as `read_tables`, where that is one.
+def read_table(path: Any, skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None) -> Table:
+    """Return the table in a file, or in memory; as `read_tables`, where that is one.
 
     Raises
     ------
@@ -236,16 +241,17 @@ def read_table(
 
 
 def read_tables(
-    path: str | os.PathLike[str], skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None
+    path: Any, skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None
 ) -> list[Table]:
-    """Return the tables in a file: lines above them, names, units and rows are recognised.
+    """Return the tables in a file, where lines above them, names, units and rows are recognised, or that in memory.
 
     Tables with the same names, in which a time goes on from one to the next, are one.
 
     Parameters
     ----------
-    path : str or path
-        Comma-, semicolon-, tab- or blank-separated text, or a workbook.
+    path : str or path, or table
+        Comma-, semicolon-, tab- or blank-separated text, or a workbook; or a table in memory, such as a DataFrame of
+        pandas (`tissuq.experiments.reading.data_frame`).
     skip_rows : int
         Number of lines at the top of the file to pass over unseen.
     sheet : str or int, optional
@@ -260,6 +266,10 @@ def read_tables(
     """
     if not isinstance(skip_rows, int) or skip_rows < 0:
         raise InputError(f"skip_rows must be a number of lines, 0 or more, not {skip_rows!r}.")
+    if is_data_frame(path):
+        if skip_rows or sheet is not None or number is not None:
+            raise InputError(f"{kind_of(path)} is no file: leave sheet, table and skip_rows out.")
+        return [_of_data_frame(path)]
     try:
         status = os.stat(path)
         stamp = status.st_mtime_ns, status.st_size
@@ -289,6 +299,36 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
     lines = read_lines(path)
     long = _read_long(path, lines, skip_rows)
     return tuple(_read_every_line(path, lines, skip_rows)) if long is None else (long,)
+
+
+def _of_data_frame(data: Any) -> Table:
+    """Return the table in memory, with cells as they are in a file: numbers to the last digit."""
+    columns = columns_of(data)
+    cells = zip(*(column.texts() for column in columns), strict=True)
+    rows = [SEPARATOR_OF_CELLS.join(row) for row in cells]
+    table = Table(
+        file=kind_of(data),
+        names=tuple(column.name for column in columns),
+        units=tuple(column.unit for column in columns),
+        separator=SEPARATOR_OF_CELLS,
+        rows=rows,
+        lines=range(len(rows)),
+        counted="row",
+    )
+    if is_units_row(first := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
+        table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first))
+    if len(rows) >= LONG_FILE and (block := _block(columns)) is not None:
+        return replace(table, block=block)
+    return _without_summary(table)
+
+
+def _block(columns: Sequence[DataColumn]) -> NDArray[np.float64] | None:
+    """Return all cells of columns, where they are finite numbers."""
+    try:
+        block = np.column_stack([column.cells.astype(np.float64) for column in columns])
+    except (TypeError, ValueError):
+        return None
+    return block if np.isfinite(block).all() else None
 
 
 def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
@@ -415,10 +455,11 @@ def _without_summary(table: Table) -> Table:
     if summary is None:
         return table
     first, last = table.lines[summary.start], table.lines[-1]
-    where = f"line {first}" if first == last else f"lines {first} to {last}"
+    counted = table.counted
+    where = f"{counted} {first}" if first == last else f"{counted}s {first} to {last}"
     if summary.statistics is None:
         raise InputError(
-            f"{table.file}, {where}: set apart at the end of the table, and not going on from line "
+            f"{table.file}, {where}: set apart at the end of the table, and not going on from {counted} "
             f"{table.lines[summary.start - 1]}. Delete a summary; put measurements into a file of their own."
         )
     what = f" with its {', '.join(summary.statistics)}" if summary.statistics else ""

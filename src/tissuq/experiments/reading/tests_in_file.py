@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack, cast
 
 import numpy as np
 
@@ -14,7 +14,16 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns
-from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, checked_mode, read_rows
+from tissuq.experiments.reading.data_frame import is_data_frame
+from tissuq.experiments.reading.experiment_file import (
+    READING_OPTIONS,
+    PythonOptions,
+    Reading,
+    ReadingOptions,
+    checked_mode,
+    read_rows,
+)
+from tissuq.experiments.reading.options import spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
 from tissuq.experiments.reading.side_by_side import columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, GIVEN, about_mode, mode_of
@@ -43,14 +52,14 @@ class TestInFile(NamedTuple):
     options: ReadingOptions
 
 
-def read_tests(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> list[Experiment]:
-    """Read all tests in one file: in the sheets of a workbook, in tables, columns or rows of several specimens.
+def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
+    """Read all tests in one file or table: sheets of a workbook, tables, columns or rows of several specimens.
 
     Parameters
     ----------
-    path : str or path
+    path : str or path, or table
     options
-        As for :func:`tissuq.read_experiment`, for every test.
+        As for :func:`tissuq.read`, for every test.
 
     Returns
     -------
@@ -68,10 +77,11 @@ def read_tests(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) 
     >>> [test.name for test in read_tests(datasets.path("rubber-treloar-uniaxial"))]
     ['rubber-treloar-uniaxial']
     """
-    return [test.reading.experiment for test in find_tests_in_file(path, **options)]
+    plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
+    return [test.reading.experiment for test in find_tests_in_file(path, **plain)]
 
 
-def find_tests_in_file(path: str | os.PathLike[str], **options: Unpack[ReadingOptions]) -> list[TestInFile]:
+def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[TestInFile]:
     """Return all tests in one file, as `read_tests` reads them, each with the options that read it alone.
 
     Shorter tables without columns of deformation and load, such as one of results, are no tests.
@@ -82,6 +92,7 @@ def find_tests_in_file(path: str | os.PathLike[str], **options: Unpack[ReadingOp
         As `read_tests`, and where some tests say in which loading mode they were measured, and others do not.
     """
     tables = read_tables(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
+    path = tables[0].file if is_data_frame(path) else path
     has_sheets = len({table.sheet for table in tables}) > 1
     tests, refused = list[TestInFile](), list[tuple[Table, InputError]]()
     for table in tables:
