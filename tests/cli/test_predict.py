@@ -40,8 +40,8 @@ def test_a_mode_is_predicted(cli, here, run):
     found = rows_of(here / "run-planar")
     assert [float(row["stretch"]) for row in found] == pytest.approx([0.9 + 0.2 * place for place in range(9)])
     assert {row["is_calibrated"] for row in found} == {"True", "False"}
-    # C10 is about 50 kPa: 2 C10 (l - l^-3) MPa.
-    assert float(found[2]["alone_median"]) == pytest.approx(0.1 * (1.3 - 1.3**-3), rel=0.03)
+    # C10 is about 50 kPa: 2 C10 (l - l^-3).
+    assert float(found[2]["alone_median [kPa]"]) == pytest.approx(100 * (1.3 - 1.3**-3), rel=0.03)
     assert (here / "run-planar" / "figures" / "prediction.png").exists()
 
 

@@ -34,9 +34,15 @@ def files(here):
     ]
 
 
+def in_mpa(row):
+    """Return the cells of a row with those in kPa in MPa, under the names without a unit."""
+    cells = ((*name.removesuffix("]").partition(" ["), value) for name, value in row.items())
+    return {name: str(float(value) * 1e-3) if unit else value for name, _, unit, value in cells}
+
+
 def summary_of(folder):
     with (folder / "summary.csv").open(newline="") as lines:
-        return list(csv.DictReader(lines))
+        return list(map(in_mpa, csv.DictReader(lines)))
 
 
 def expected(files, **options):
@@ -109,7 +115,7 @@ def test_every_test_is_predicted_from_the_others(cli, files, here):
     parts = [tq.read_experiment(file, mode=mode) for file, mode in zip(files, ("planar", "uniaxial"), strict=True)]
     found = tq.held_out_tests(parts, discrepancy="none", noise_sd=1.5e-3)
     with (here / "run" / "held_out.csv").open(newline="") as lines:
-        rows = list(csv.DictReader(lines))
+        rows = list(map(in_mpa, csv.DictReader(lines)))
     assert [row["test"] for row in rows] == ["b", "uniaxial"]
     for name in ("inside", "beyond", "half_width", "error", "C10_median"):
         assert [float(row[name]) for row in rows] == pytest.approx(found[name].tolist(), rel=1e-9)

@@ -44,7 +44,7 @@ def test_a_panel_tells_how_many_measurements_are_inside_its_band(specimen_study)
     figure = predictive_figure(specimen_study.posteriors, discrepancy=True, unit=KPA)
     for axis, (name, posterior) in zip(figure.axes, specimen_study.posteriors.items(), strict=False):
         stretch, stress = posterior.model.experiment.stretch, posterior.model.experiment.stress
-        band = posterior.predict(stretch)
+        band = posterior.predict(stretch, unit="MPa")
         inside = int(((band["low"] <= stress) & (stress <= band["high"])).sum())
         assert axis.get_title(loc="left") == f"{name}:  {inside} of 12 inside"
 

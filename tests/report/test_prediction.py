@@ -44,11 +44,11 @@ def test_numbers_are_in_the_unit_of_the_run(found):
     assert len(headers) == len(rows[0])
     assert [row[0] for row in rows] == ["1", "1.1", "1.3", "2.2"]
     median = found.bands[0, True, False]["median"][2]
-    assert float(rows[2][1]) == pytest.approx(1000 * median, rel=0.05)
+    assert float(rows[2][1]) == pytest.approx(median, rel=0.05)
     assert [row[-1] for row in rows] == ["yes", "yes", "yes", "no"]
     scores = readable_scores(found)
     assert "CRPS, kPa" in score_headers(found)
-    assert float(scores[0][6]) == pytest.approx(1000 * found.scores["crps"][0], rel=0.01)
+    assert float(scores[0][6]) == pytest.approx(found.scores["crps"][0], rel=0.01)
     assert [row[1] for row in scores] == ["all", "calibrated", "beyond"] * 2
 
 
@@ -81,7 +81,7 @@ def test_a_panel_shows_the_bands_in_the_unit_of_the_run(found):
     assert "with the discrepancy yeoh" in with_it.get_title("left")
     assert "neo-hookean alone" in alone.get_title("left")
     (median,) = [line for line in alone.lines if line.get_label() == "predicted median"]
-    np.testing.assert_allclose(median.get_ydata(), 1000 * found.bands[0, False, False]["median"], rtol=1e-12)
+    np.testing.assert_allclose(median.get_ydata(), found.bands[0, False, False]["median"], rtol=1e-12)
     inside = round(found.scores["inside"][0] * found.scores["count"][0])
     assert with_it.get_title("left").endswith(f"{inside} of 4 inside")
 
@@ -125,7 +125,7 @@ def test_a_folder_holds_tables_arrays_figure_and_page(found, planar, tmp_path):
     }  # fmt: skip
     with (folder / "prediction.csv").open() as table:
         first = list(csv.DictReader(table))[2]
-    assert float(first["median"]) == found.bands[0, True, False]["median"][2]
+    assert float(first["median [kPa]"]) == found.bands[0, True, False]["median"][2]
     assert json.loads((folder / "scores.json").read_text())[0]["crps"] == found.scores["crps"][0]
     recipe = (folder / "run.toml").read_text()
     assert 'run = "../run"' in recipe

@@ -55,9 +55,9 @@ def test_bands_are_those_of_the_posterior(fits):
             own = fits["auto"].predict([0.9, 1.2, 1.4], mode="planar", discrepancy=kind, noise=noise, prob=0.8)
             assert found.bands[0, kind, noise].equals(own)
     table = found.table
-    assert table["low"].tolist() == found.bands[0, True, False]["low"].tolist()
-    assert table["alone_predictive_high"].tolist() == found.bands[0, False, True]["high"].tolist()
-    assert (table["predictive_high"] >= table["high"]).all()
+    assert table["low [MPa]"].tolist() == found.bands[0, True, False]["low"].tolist()
+    assert table["alone_predictive_high [MPa]"].tolist() == found.bands[0, False, True]["high"].tolist()
+    assert (table["predictive_high [MPa]"] >= table["high [MPa]"]).all()
 
 
 def test_the_usual_stretches_are_the_calibrated_ones(fits, data):
@@ -92,7 +92,7 @@ def test_an_error_of_the_stress_is_left_out_elsewhere_and_that_is_said(fits):
     found = predicted(fits["constant"], mode="planar", stretch=[1.2])
     assert found.kinds == (False,)
     assert any("does not apply to the planar stress" in text for text in found.warnings)
-    assert "median" not in found.table
+    assert "median [MPa]" not in found.table
     own = predicted(fits["constant"], stretch=[1.2])
     assert own.kinds == (True, False)
     assert not own.warnings
@@ -118,7 +118,7 @@ def test_a_reader_is_told_what_the_comparison_cannot_say(fits, data, planar):
     assert not any("--estimand" in text for text in predicted(tolerant, data=planar).warnings)
 
 
-def test_labelled_arrays_hold_every_band_in_mpa(fits, planar, tmp_path):
+def test_labelled_arrays_hold_every_band_with_its_unit(fits, planar, tmp_path):
     found = predicted(fits["auto"], data=planar, stretch=[1.1, 1.3])
     found.save(tmp_path / "prediction.nc")
     read = xr.open_dataset(tmp_path / "prediction.nc", engine="h5netcdf")
@@ -138,7 +138,7 @@ def test_cauchy_stress_is_the_engineering_stress_times_the_stretch(fits, planar)
     one, other = (
         predicted(fits["none"], data=planar, stretch=[1.5], stress_type=each) for each in ("engineering", "cauchy")
     )
-    np.testing.assert_allclose(other.table["alone_high"], 1.5 * one.table["alone_high"], rtol=1e-12)
+    np.testing.assert_allclose(other.table["alone_high [MPa]"], 1.5 * one.table["alone_high [MPa]"], rtol=1e-12)
     np.testing.assert_allclose(other.measured(0), planar.stretch * planar.stress, rtol=1e-12)
     assert other.stresses == ("Cauchy stress",)
 
@@ -149,7 +149,7 @@ def test_a_mode_of_two_controls_has_a_band_for_each_stress_equal_where_stretches
     table = found.table
     assert len(table) == 8
     assert table["stretch2"].unique().tolist() == [1.1]
-    equal = predicted(fits["auto"], mode="biaxial", stretch=[[1.2, 1.2]]).table["median"]
+    equal = predicted(fits["auto"], mode="biaxial", stretch=[[1.2, 1.2]]).table["median [MPa]"]
     assert equal[0] == pytest.approx(equal[1], rel=1e-9)
     single = fits["auto"].predict([1.2], mode="equibiaxial", noise=False)["median"][0]
     assert equal[0] == pytest.approx(single, rel=1e-6)
@@ -196,7 +196,7 @@ def test_a_stress_beyond_all_numbers_is_refused(fits):
 
 def test_a_run_predicts_as_its_fit_does(run, data):
     found = tq.predict_run(run, "constant", stretch=[0.8, 1.2])
-    direct = tq.fit(data, discrepancy="constant", noise_sd=NOISE_SD).predict([0.8, 1.2])
+    direct = tq.fit(data, discrepancy="constant", noise_sd=NOISE_SD).predict([0.8, 1.2], unit="kPa")
     np.testing.assert_allclose(found.bands[0, True, True].to_numpy(), direct.to_numpy(), rtol=1e-6)
     assert found.unit.name == "kPa"
 

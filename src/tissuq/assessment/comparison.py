@@ -16,6 +16,7 @@ from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import StressUnit, headed, in_unit, stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.prediction.bands import predict_average, stress_ratio
@@ -64,15 +65,18 @@ class Average:
         Returns
         -------
         pandas.DataFrame
-            Indexed by parameter: mean, sd, hdi_low, hdi_high.
+            Indexed by parameter: mean, sd, hdi_low, hdi_high; in the unit of the measurements.
         """
         import pandas as pd
 
         if not 0 < prob < 1:
             raise InputError(f"prob must be between 0 and 1, not {prob}.")
         rows = [(marginal.mean, marginal.sd, *marginal.hdi(prob)) for marginal in self.marginals.values()]
+        parameters = next(iter(self.solutions.values())).model.material.parameters
+        scales = [[self._unit.to_mpa if parameter.unit else 1.0] for parameter in parameters]
         index = pd.Index(list(self.marginals), name="parameter")
-        return pd.DataFrame(np.array(rows), index, ["mean", "sd", "hdi_low", "hdi_high"])
+        table = pd.DataFrame(np.array(rows) / np.array(scales), index, ["mean", "sd", "hdi_low", "hdi_high"])
+        return headed(table, self._unit)
 
     def predict(
         self,
@@ -83,14 +87,20 @@ class Average:
         prob: float = 0.95,
         mode: str | LoadingMode | None = None,
     ) -> pd.DataFrame:
-        """Return the predicted engineering stress at new stretches; arguments and table are those of a posterior's."""
+        """Return the predicted engineering stress at new stretches, as a posterior does."""
         import pandas as pd
 
         options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
-        return pd.DataFrame(vars(predict_average(self._weighted_fits, stretch, **options)))
+        table = pd.DataFrame(vars(predict_average(self._weighted_fits, stretch, **options)))
+        return in_unit(table, ["median", "low", "high"], self._unit.name)
 
     def __repr__(self) -> str:
         return f"<Average of {', '.join(f'{name} {weight:.0%}' for name, weight in self.weights.items())}>"
+
+    @property
+    def _unit(self) -> StressUnit:
+        """The unit of stress of the measurements."""
+        return stress_unit(next(iter(self.solutions.values())).model.experiment.stress_unit)
 
     @property
     def _weighted_fits(self) -> list[tuple[float, Solution]]:
@@ -173,6 +183,8 @@ def _check_average(fits: Mapping[str, Any]) -> None:
 
 FloatArray = NDArray[np.float64]
 
+ROUNDING = 1e-12
+"""Relative difference of the same measurements in two units."""
 EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
 
@@ -303,11 +315,20 @@ def _check_comparable(trees: Mapping[str, Any]) -> None:
         if trees[name].attrs.get("loading_mode") != first_tree.attrs.get("loading_mode"):
             raise InputError(f"'{names[0]}' and '{name}' are fits of different loading modes.")
         for group, variable in (("observed_data", "stress"), ("constant_data", "stretch")):
-            values, other_values = first_tree[group][variable].to_numpy(), trees[name][group][variable].to_numpy()
-            if values.shape != other_values.shape or not np.array_equal(values, other_values):
+            values, other_values = (_plain(tree[group][variable]) for tree in (first_tree, trees[name]))
+            if values.shape != other_values.shape or not np.allclose(values, other_values, ROUNDING, 0.0):
                 raise InputError(
                     f"'{names[0]}' and '{name}' are fits of different measurements: compare fits of the same ones."
                 )
+
+
+def _plain(values: Any) -> FloatArray:
+    """Return values of an array, those of a stress in MPa: earlier files have them so, others in the unit of the data.
+
+    A unit is that of all stresses.
+    """
+    units = values.attrs.get("units", "1")
+    return np.asarray(values.to_numpy() * (1.0 if units == "1" else stress_unit(units).to_mpa))
 
 
 def scores_of(

@@ -116,10 +116,11 @@ def _print_held_out(path: Path, headline: str, unit: str) -> None:
     if not path.exists():
         return
     from tissuq.experiments.units import stress_unit
-    from tissuq.report.tables import HELD_OUT, readable_held_out
+    from tissuq.report.tables import HELD_OUT, HELD_OUT_HEADLINE, in_mpa, readable_held_out
 
     with damage_reported(path):
         rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = in_mpa(rows, [f"{headline}_{name}" for name in HELD_OUT_HEADLINE])
         cells = [list(map(str, row)) for row in readable_held_out(rows, headline, stress_unit(unit))]
     print_rows("Each test predicted from the others", [*HELD_OUT, f"{headline} of the others, {unit}"], cells)
 
@@ -143,13 +144,14 @@ def _read_run(
     import tomllib
 
     from tissuq.experiments.units import stress_unit
-    from tissuq.report.tables import readable_summary
+    from tissuq.report.tables import headline_columns, in_mpa, readable_summary
     from tissuq.studies.specimen import SpecimenSettings
 
     unit, title = stress_unit("MPa"), "The study of the paper: neo-Hookean C10 under seven formulations"
     rows = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
     if not rows:
         raise ValueError("the summary has no rows")
+    rows = in_mpa(rows, headline_columns(rows[0]))
     recipe = tomllib.loads((folder / RECIPE).read_text(encoding="utf-8"))
     if "file" in recipe or "tests" in recipe:
         settings = load_settings(SpecimenSettings, folder / RECIPE, {})

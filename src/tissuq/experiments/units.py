@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = [
     "AREA",
@@ -19,6 +22,8 @@ __all__ = [
     "NUMBER",
     "Quantity",
     "StressUnit",
+    "headed",
+    "in_unit",
     "is_quantity",
     "looks_like_unit",
     "measured_in",
@@ -121,6 +126,30 @@ def stress_unit(text: str) -> StressUnit:
         compact = PASCALS[compact.lower()]
     factor = COMMON_STRESS_UNITS.get(compact)
     return StressUnit(name, _factor_from_pint(name) if factor is None else factor)
+
+
+def in_unit(table: pd.DataFrame, columns: Sequence[str], unit: str) -> pd.DataFrame:
+    """Return a table whose columns in MPa are in another unit of stress, which stands at the head of the columns.
+
+    Raises
+    ------
+    InputError
+        When it is no unit of stress.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> print(in_unit(pd.DataFrame({"stretch": [1.1], "low": [0.002]}), ["low"], "kPa"))
+    stresses in kPa  stretch  low
+    0                    1.1  2.0
+    """
+    given = stress_unit(unit)
+    return headed(table.assign(**{name: table[name] / given.to_mpa for name in columns}), given)
+
+
+def headed(table: pd.DataFrame, unit: StressUnit) -> pd.DataFrame:
+    """Return a table with the unit of its stresses at the head of its columns, as their name."""
+    return table.rename_axis(columns=f"stresses in {unit.name}")
 
 
 def strain_factor(text: str) -> float:

@@ -9,22 +9,30 @@ from numpy.typing import NDArray
 
 from tissuq.assessment import known_evidence_changes
 from tissuq.errors import InputError
+from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
 from tissuq.posterior.netcdf import LabelledGroup
 from tissuq.prediction.densities import leave_one_out, pointwise_log_likelihood, replicate_data, stride
 
-__all__ = ["labelled_arrays", "labels_of", "summaries"]
+__all__ = ["labelled_arrays", "labels_of", "summaries", "summaries_in"]
+
+OF_VALUES = ("mean", "sd", "median", "hdi_low", "hdi_high")
+"""Numbers of a summary that have the unit of their parameter."""
 
 
-def labelled_arrays(solution: Solution, seed: int) -> dict[str, LabelledGroup]:
-    """Return draws, replicated data, densities and measurements; the groups are those of `Posterior.data`."""
+def labelled_arrays(solution: Solution, seed: int, unit: StressUnit) -> dict[str, LabelledGroup]:
+    """Return draws, replicated data, densities and measurements; the groups are those of `Posterior.data`.
+
+    Stresses, and parameters that are stresses, are in the unit; densities are those of data in MPa in any.
+    """
     experiment = solution.model.experiment
     point = {"measurement": np.arange(experiment.size)}
     chains, draws = (np.arange(size) for size in solution.shape)
     sample = {"chain": chains, "draw": draws}
     thinned_sample = {"chain": chains, "draw": draws[:: stride(solution)]}
     parameters = {parameter.symbol: parameter for parameter in solution.model.parameters}
-    in_mpa = {"units": "MPa"}
+    scales = {symbol: unit.to_mpa if parameter.unit else 1.0 for symbol, parameter in parameters.items()}
+    in_stress, of_mpa = {"units": unit.name}, {"density_of": "stresses in MPa"}
     coordinates = {"stretch": ("measurement", experiment.states.abscissa, {"units": "1"})}
     if len(experiment.tests) > 1:
         coordinates["test"] = (
@@ -35,12 +43,18 @@ def labelled_arrays(solution: Solution, seed: int) -> dict[str, LabelledGroup]:
     groups = {
         "posterior": LabelledGroup(
             {
-                symbol: (("chain", "draw"), values, {"units": parameters[symbol].unit or "1"})
+                symbol: (
+                    ("chain", "draw"),
+                    values / scales[symbol],
+                    {"units": unit.name if parameters[symbol].unit else "1"},
+                )
                 for symbol, values in _draws(solution, seed).items()
             },
             sample,
         ),
-        "observed_data": LabelledGroup({"stress": ("measurement", experiment.measured, in_mpa)}, point),
+        "observed_data": LabelledGroup(
+            {"stress": ("measurement", experiment.measured / unit.to_mpa, in_stress)}, point
+        ),
         "constant_data": LabelledGroup(coordinates, point),
     }
     if not solution.is_of_data:
@@ -48,14 +62,14 @@ def labelled_arrays(solution: Solution, seed: int) -> dict[str, LabelledGroup]:
     stress, left_out = ("chain", "draw", "measurement"), leave_one_out(solution)
     groups |= {
         "posterior_predictive": LabelledGroup(
-            {"stress": (stress, replicate_data(solution, seed), in_mpa)}, thinned_sample | point
+            {"stress": (stress, replicate_data(solution, seed) / unit.to_mpa, in_stress)}, thinned_sample | point
         ),
         "log_likelihood": LabelledGroup(
-            {"stress": (stress, pointwise_log_likelihood(solution))}, thinned_sample | point
+            {"stress": (stress, pointwise_log_likelihood(solution), of_mpa)}, thinned_sample | point
         ),
         "leave_one_out": LabelledGroup(
             {
-                "log_density": ("measurement", left_out.log_density),
+                "log_density": ("measurement", left_out.log_density, of_mpa),
                 "is_rough": ("measurement", left_out.is_rough.astype(np.int8)),
             },
             point,
@@ -99,7 +113,7 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> d
 def summaries(
     solution: Solution, prob: float = 0.95, parameters: Sequence[str] | None = None
 ) -> dict[str, dict[str, float]]:
-    """Return mean, sd, median and interval of the parameters that are asked for; `Posterior.summary` describes it."""
+    """Return mean, sd, median and interval of the parameters that are asked for, in MPa; see `Posterior.summary`."""
     model = solution.model
     if not 0 < prob < 1:
         raise InputError(f"prob must be between 0 and 1, not {prob}.")
@@ -108,6 +122,17 @@ def summaries(
     if unknown:
         raise InputError(f"there is no parameter '{unknown[0]}'; there are {', '.join(model.symbols)}.")
     return {symbol: _numbers(solution, symbol, prob) for symbol in wanted}
+
+
+def summaries_in(
+    unit: StressUnit, solution: Solution, prob: float = 0.95, parameters: Sequence[str] | None = None
+) -> dict[str, dict[str, float]]:
+    """Return `summaries` with parameters that are stresses in a unit."""
+    scales = {parameter.symbol: unit.to_mpa if parameter.unit else 1.0 for parameter in solution.model.parameters}
+    return {
+        symbol: {name: value / scales[symbol] if name in OF_VALUES else value for name, value in numbers.items()}
+        for symbol, numbers in summaries(solution, prob, parameters).items()
+    }
 
 
 def _numbers(solution: Solution, symbol: str, prob: float) -> dict[str, float]:

@@ -18,6 +18,7 @@ from tissuq.assessment.stability import stable_ranges
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import in_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
@@ -126,14 +127,16 @@ class LawComparison:
     def predict(
         self, stretch: ArrayLike, *, mode: str | LoadingMode | None = None, prob: float = 0.95, noise: bool = True
     ) -> pd.DataFrame:
-        """Return median, low and high of the stress (MPa), averaged over the laws by their probabilities.
+        """Return median, low and high of the stress, averaged over the laws by their probabilities.
 
-        Parameters are those of `Posterior.predict`.
+        Parameters are those of `Posterior.predict`; stresses are in the unit of the measurements.
         """
         import pandas as pd
 
         weighted = [(weight, self.fits[name].solution) for name, weight in self._likely.items()]
-        return pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
+        table = pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
+        unit = weighted[0][1].model.experiment.stress_unit
+        return in_unit(table, ["median", "low", "high"], unit)
 
     @cached_property
     def _moduli(self) -> Mapping[str, Marginal]:

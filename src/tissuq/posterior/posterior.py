@@ -17,6 +17,7 @@ from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import StressUnit, headed, in_unit, stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import Diagnostics, Solution
 from tissuq.mechanics import Material
@@ -25,7 +26,7 @@ from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
-from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries
+from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries, summaries_in
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
@@ -62,6 +63,10 @@ class Posterior:
     def model(self) -> StatisticalModel:
         """The model that was fitted, with its data and priors."""
         return self.solution.model
+
+    def unit(self, name: str | None = None) -> StressUnit:
+        """Return a unit of stress by its name; without one that of the measurements, in which tables are."""
+        return stress_unit(name or self.model.experiment.stress_unit)
 
     @property
     def marginals(self) -> Mapping[str, Marginal]:
@@ -242,8 +247,10 @@ class Posterior:
         """
         return Posterior(self.solver.solve([self.model.with_more(more)])[0], self.solver)
 
-    def summary(self, prob: float = 0.95, parameters: Sequence[str] | None = None) -> pd.DataFrame:
-        """Return mean, sd, median and the highest-density interval of every parameter (MPa; psi in stretch).
+    def summary(
+        self, prob: float = 0.95, parameters: Sequence[str] | None = None, unit: str | None = None
+    ) -> pd.DataFrame:
+        """Return mean, sd, median and the highest-density interval of every parameter (psi in stretch).
 
         Amplitudes of an energy discrepancy whose prior has no mean (the default, half-Cauchy) have a median and an
         interval only: few directions of the data tell them, so that their posterior may have its prior's tail.
@@ -254,17 +261,31 @@ class Posterior:
             Only these; what is not asked for is not computed.
         prob : float
             Probability inside the interval; 0.95 gives the paper's 95 % HPD.
+        unit : str, optional
+            Unit of stress, such as ``"MPa"``; that of the measurements unless given.
 
         Returns
         -------
         pandas.DataFrame
             Indexed by parameter: mean, sd, median, hdi_low, hdi_high; and ess (the lesser of bulk and tail) and rhat
-            when the posterior was sampled.
+            when the posterior was sampled. The unit of stresses stands at the head of the columns.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.Experiment("uniaxial", [0.8, 0.9, 1.1, 1.2], [-3.81, -1.67, 1.37, 2.53], stress_unit="kPa")
+        >>> posterior = tq.fit(data, discrepancy="none", noise_sd=1e-5)
+        >>> print(posterior.summary()[["mean", "sd"]].round(3))  # doctest: +NORMALIZE_WHITESPACE
+        stresses in kPa   mean     sd
+        parameter
+        C10              2.499  0.005
+        >>> float(posterior.summary(unit="MPa").loc["C10", "mean"].round(4))
+        0.0025
         """
         import pandas as pd
 
-        rows = summaries(self.solution, prob, parameters)
-        return pd.DataFrame(list(rows.values()), pd.Index(list(rows), name="parameter"))
+        rows = summaries_in(self.unit(unit), self.solution, prob, parameters)
+        return headed(pd.DataFrame(list(rows.values()), pd.Index(list(rows), name="parameter")), self.unit(unit))
 
     def predict(
         self,
@@ -276,6 +297,7 @@ class Posterior:
         mode: str | LoadingMode | None = None,
         channel: int = 0,
         stress_type: str = "engineering",
+        unit: str | None = None,
     ) -> pd.DataFrame:
         """Return the predicted stress at new stretches.
 
@@ -294,11 +316,13 @@ class Posterior:
             Which of the mode's stresses, from 0, where it has several.
         stress_type : str
             ``"engineering"``, or ``"cauchy"``: times the stretch along the axis of the stress (a shear stress is both).
+        unit : str, optional
+            Unit of stress, such as ``"MPa"``; that of the measurements unless given.
 
         Returns
         -------
         pandas.DataFrame
-            Columns stretch, median, low, high; MPa.
+            Columns stretch, median, low, high, with the unit of the latter at the head of the columns.
         """
         import pandas as pd
 
@@ -307,10 +331,16 @@ class Posterior:
         table = pd.DataFrame(vars(predict_band(self.solution, stretch, **options, channel=channel)))
         factor = ratio(np.atleast_1d(np.asarray(stretch, dtype=np.float64)))
         table[["median", "low", "high"]] *= np.asarray(factor)[:, None]
-        return table
+        return in_unit(table, ["median", "low", "high"], self.unit(unit).name)
 
     def scores(
-        self, test: Experiment, *, discrepancy: bool = True, prob: float = 0.95, stress_type: str = "engineering"
+        self,
+        test: Experiment,
+        *,
+        discrepancy: bool = True,
+        prob: float = 0.95,
+        stress_type: str = "engineering",
+        unit: str | None = None,
     ) -> pd.DataFrame:
         """Return how well a test that the posterior has not seen is predicted, in any loading mode.
 
@@ -318,7 +348,7 @@ class Posterior:
         ----------
         test : Experiment
             Its measurements without stress are left out: at rest it is zero by definition.
-        discrepancy, prob, stress_type
+        discrepancy, prob, stress_type, unit
             As of `predict`.
 
         Returns
@@ -327,7 +357,7 @@ class Posterior:
             For every stress of the test a row with all measurements and, where some lie beyond the range in which both
             invariants were measured, one with those in the ``range`` (``"calibrated"``) and one with those
             ``"beyond"``: how many (``count``), and what `tissuq.prediction.scores.Judged.summary` describes: inside,
-            half_width, error, crps and interval_score.
+            half_width, error, crps and interval_score, the unit of the latter two at the head of the columns.
 
         Examples
         --------
@@ -339,7 +369,8 @@ class Posterior:
         >>> bool(found["inside"][0] > 0.7), bool(found["crps"][0] < 0.03)
         (True, True)
         """
-        return scores_of(self.solution, test, discrepancy=discrepancy, prob=prob, stress_type=stress_type)
+        table = scores_of(self.solution, test, discrepancy=discrepancy, prob=prob, stress_type=stress_type)
+        return in_unit(table, ["crps", "interval_score"], self.unit(unit).name)
 
     def ensemble(self, count: int, seed: int = 0, sampling: Sampling = "sobol", *, admissible: bool = True) -> Ensemble:
         """Return equally probable draws as complete materials, with the discrepancy in their energy.
@@ -398,7 +429,7 @@ class Posterior:
 
     @cached_property
     def data(self) -> xr.DataTree:
-        """Everything as labelled arrays that ArviZ reads.
+        """Everything as labelled arrays that ArviZ reads, in the unit of the measurements: `data_in` of it.
 
         Groups posterior, posterior_predictive, log_likelihood (dimensions chain, draw and, for the latter two,
         measurement), leave_one_out, observed_data and constant_data. With very many measurements the former two hold
@@ -408,20 +439,44 @@ class Posterior:
         tests have in common; what is said of the measurements has not. On the
         exact route draws of nonlinear parameters (S, c, psi, noise_sd) take the values of the quadrature's points: for
         their intervals and densities use `summary` and ``solution.marginals``.
+
+        Examples
+        --------
+        >>> import arviz_stats
+        >>> import tissuq as tq
+        >>> data = tq.Experiment("uniaxial", [0.8, 0.9, 1.1, 1.2], [-3.81, -1.67, 1.37, 2.53], stress_unit="kPa")
+        >>> posterior = tq.fit(data, discrepancy="none", noise_sd=1e-5)
+        >>> posterior.data["posterior"]["C10"].attrs["units"]
+        'kPa'
+        >>> float(arviz_stats.summary(posterior.data, round_to=1).loc["C10", "mean"])
+        2.5
+        """
+        return self.data_in(self.unit().name)
+
+    def data_in(self, unit: str) -> xr.DataTree:
+        """Return `data` with stresses, and parameters that are stresses, in a unit of stress, such as ``"MPa"``.
+
+        Every variable says its unit in its attribute ``units``. Densities are those of data in MPa in any unit, and so
+        are the evidence and the numbers of the headline parameter among the attributes.
+
+        Raises
+        ------
+        InputError
+            When it is no unit of stress.
         """
         import xarray as xr
 
-        return xr.DataTree.from_dict({name: group.to_dataset() for name, group in self._groups.items()})
+        groups = self._groups(self.unit(unit))
+        return xr.DataTree.from_dict({name: group.to_dataset() for name, group in groups.items()})
 
-    @cached_property
-    def _groups(self) -> dict[str, LabelledGroup]:
+    def _groups(self, unit: StressUnit) -> dict[str, LabelledGroup]:
         headline = summaries(self.solution, parameters=[self.model.headline])[self.model.headline]
         labels = labels_of(self.solution, self.seed, headline)
-        return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed)
+        return {"/": LabelledGroup(attrs=labels)} | labelled_arrays(self.solution, self.seed, unit)
 
     def save(self, path: str | Path) -> None:
         """Write the whole posterior as NetCDF: `data`, which ArviZ and xarray open, and what `load` needs."""
-        save_groups(self._groups | solution_groups(self.solution, self.solver), Path(path))
+        save_groups(self._groups(self.unit()) | solution_groups(self.solution, self.solver), Path(path))
 
     @classmethod
     def load(

@@ -11,7 +11,7 @@ import numpy as np
 from tissuq.experiments.units import StressUnit
 from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import write_figures, write_page
-from tissuq.report.tables import interval
+from tissuq.report.tables import interval, with_named_units, write_csv
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,7 +118,7 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
 
 
 def write_comparison(table: pd.DataFrame, runs: list[str], unit: StressUnit, folder: Path) -> None:
-    """Write comparison.csv (MPa), the figure and report.html into an empty folder.
+    """Write comparison.csv, the figure and report.html into an empty folder.
 
     Parameters
     ----------
@@ -127,11 +127,12 @@ def write_comparison(table: pd.DataFrame, runs: list[str], unit: StressUnit, fol
     runs : list of str
         What was compared, as it was named.
     unit : StressUnit
-        Of the parameter in figure and page.
+        Of the parameter.
     folder : Path
         Exists and is empty.
     """
-    table.rename_axis("fit").to_csv(folder / "comparison.csv")
+    rows = [{"fit": name, **row} for name, row in table.astype(object).where(table.notna(), None).iterrows()]
+    write_csv(folder / "comparison.csv", with_named_units(rows, ("median", "hdi_low", "hdi_high"), unit))
     write_figures(folder, {"comparison": comparison_figure(table, unit)})
     write_page(
         folder,

@@ -12,7 +12,16 @@ from tissuq.prediction.bands import predict_band
 from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import write_figures, write_page, write_posteriors
 from tissuq.report.specimen import lines_of_tests, noise_in_words, write_inputs
-from tissuq.report.tables import known_number, readable_methods, significant, tolerances_in_words, write_csv, write_json
+from tissuq.report.tables import (
+    in_unit_of,
+    known_number,
+    readable_methods,
+    significant,
+    tolerances_in_words,
+    with_named_units,
+    write_csv,
+    write_json,
+)
 from tissuq.studies.laws import LawStudy
 
 if TYPE_CHECKING:
@@ -24,6 +33,8 @@ MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
 SIGNIFICANT_ERRORS = 2.0
 """Standard errors of a difference of elpd beyond which it counts."""
+MODULUS = ("modulus", "modulus_low", "modulus_high")
+"""Columns that are stresses."""
 HEADERS = [
     "law", "modulus", "95 % HPD", "parameters", "probability", "elpd less best", "R2 alone", "error alone",
     "share of discrepancy", "stable / to 1.5 I",
@@ -37,8 +48,8 @@ def write_law_run(study: LawStudy, sources: Sequence[Path], folder: Path, *, fig
         {"law": name} | {str(column): known_number(value) for column, value in row.items()}
         for name, row in study.comparison.table.iterrows()
     ]
-    write_csv(folder / "laws.csv", rows)
-    write_json(folder / "laws.json", rows)
+    write_csv(folder / "laws.csv", with_named_units(rows, MODULUS, study.unit))
+    write_json(folder / "laws.json", in_unit_of(rows, MODULUS, study.unit))
     write_posteriors(folder, study.comparison.fits)
     if figures:
         write_figures(folder, {"moduli": modulus_figure(study), "curves": curve_figure(study)})

@@ -216,8 +216,10 @@ def write_prediction_run(
     prediction.save(folder / "prediction.nc")
     if prediction.scores is not None:
         rows = [{str(name): value for name, value in row.items()} for row in prediction.scores.to_dict("records")]
-        write_csv(folder / "scores.csv", rows)
-        write_json(folder / "scores.json", rows)
+        unit = prediction.unit.name
+        names = {name: f"{name} [{unit}]" for name in ("crps", "interval_score")}
+        write_csv(folder / "scores.csv", [{names.get(name, name): row[name] for name in row} for row in rows])
+        write_json(folder / "scores.json", [row | {"unit": unit} for row in rows])
     if figures:
         write_figures(folder, {"prediction": prediction_figure(prediction)})
     write_page(folder, "prediction.html", **_context(prediction, settings), command=command)
@@ -269,12 +271,12 @@ def score_headers(prediction: Prediction) -> list[str]:
 
 def readable_scores(prediction: Prediction) -> list[list[str]]:
     """Return how the measurements are predicted as text."""
-    rows, scale = [], prediction.unit.to_mpa
+    rows = []
     assert prediction.scores is not None  # noqa: S101 (requested only if there are measurements)
     for row in prediction.scores.to_dict("records"):
         cells = [_of(prediction, row)] + [row["measured"]] * (len(prediction.stresses) > 1)
         shares = [_share(row[name]) for name in ("inside", "half_width", "error")]
-        stresses = [_stress(row[name] / scale) for name in ("crps", "interval_score")]
+        stresses = [_stress(row[name]) for name in ("crps", "interval_score")]
         rows.append([*cells, row["range"], f"{row['count']}", *shares, *stresses])
     return rows
 

@@ -17,7 +17,15 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
-from tissuq.report.tables import Row, parameter_rows, write_csv, write_json
+from tissuq.report.tables import (
+    Row,
+    headline_columns,
+    in_unit_of,
+    parameter_rows,
+    with_named_units,
+    write_csv,
+    write_json,
+)
 from tissuq.studies.settings import RECIPE
 
 if TYPE_CHECKING:
@@ -26,6 +34,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from tissuq.experiments.experiment import Experiment
+    from tissuq.experiments.units import StressUnit
     from tissuq.posterior.posterior import Posterior
 
 __all__ = [
@@ -219,24 +228,34 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
-def write_data(folder: Path, experiment: Experiment) -> None:
-    """Write the measurements as fitted: stretch and engineering stress in MPa, in full precision.
+def write_data(folder: Path, experiment: Experiment, unit: StressUnit | None = None) -> None:
+    """Write the measurements as fitted, in full precision: stretch and engineering stress, in MPa unless said.
 
     Of several tests with the name of each and its mode.
     """
+    stress, to_mpa = ("stress", 1.0) if unit is None else (f"stress [{unit.name}]", unit.to_mpa)
     headers = ["test", "mode", "measured"] if len(experiment.curves) > 1 else []
     with (folder / "data.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*headers, "stretch", "stress"])
+        writer.writerow([*headers, "stretch", stress])
         for curve in experiment.curves:
             label_columns = map(repeat, (curve.name, curve.mode.name, curve.quantity)[: len(headers)])
-            writer.writerows(zip(*label_columns, curve.abscissa.tolist(), curve.stress.tolist(), strict=False))
+            values = curve.abscissa.tolist(), (curve.stress / to_mpa).tolist()
+            writer.writerows(zip(*label_columns, *values, strict=False))
 
 
-def write_tables(folder: Path, summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
-    """Write summary.csv, summary.json and parameters.csv."""
-    write_csv(folder / f"summary{suffix}.csv", summary)
-    write_json(folder / f"summary{suffix}.json", summary)
+def write_tables(
+    folder: Path,
+    summary: list[Row],
+    posteriors: Mapping[str, Posterior],
+    suffix: str = "",
+    unit: StressUnit | None = None,
+) -> None:
+    """Write summary.csv, summary.json and parameters.csv; the summary, which is in MPa, in a unit where one is said."""
+    columns = headline_columns(summary[0])
+    in_names = summary if unit is None else with_named_units(summary, columns, unit)
+    write_csv(folder / f"summary{suffix}.csv", in_names)
+    write_json(folder / f"summary{suffix}.json", summary if unit is None else in_unit_of(summary, columns, unit))
     write_csv(folder / f"parameters{suffix}.csv", parameter_rows(posteriors))
 
 

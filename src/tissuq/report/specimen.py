@@ -28,7 +28,9 @@ from tissuq.report.run_folder import (
     write_tables,
 )
 from tissuq.report.tables import (
+    HELD_OUT_HEADLINE,
     Row,
+    in_unit_of,
     readable_held_out,
     readable_methods,
     readable_parameters,
@@ -39,6 +41,7 @@ from tissuq.report.tables import (
     stability_rows,
     summary_row,
     tolerances_in_words,
+    with_named_units,
     write_csv,
     write_json,
 )
@@ -76,13 +79,14 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     """
     command = write_inputs(study.settings, study.experiment, sources, folder, figures=figures)
     summary = specimen_summary(study)
-    write_tables(folder, summary, study.posteriors)
+    write_tables(folder, summary, study.posteriors, unit=study.unit)
     stability = stability_rows(study.posteriors)
     if stability:
         write_csv(folder / "stability.csv", stability)
     if study.held_out:
-        write_csv(folder / "held_out.csv", list(study.held_out))
-        write_json(folder / HELD_OUT_TESTS, list(study.held_out))
+        columns = [f"{study.headline}_{name}" for name in HELD_OUT_HEADLINE]
+        write_csv(folder / "held_out.csv", with_named_units(study.held_out, columns, study.unit))
+        write_json(folder / HELD_OUT_TESTS, in_unit_of(study.held_out, columns, study.unit))
     write_posteriors(folder, study.posteriors)
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
     if figures:
@@ -106,7 +110,7 @@ def write_inputs(
     options = "".join(f" --material {name}" for name in copies) if copies != named else ""
     command = f"fit{'' if figures else ' --no-figures'}{options}"
     write_recipe(folder, command, settings.model_copy(update=relocated), without=without)
-    write_data(folder, experiment)
+    write_data(folder, experiment, stress_unit(experiment.stress_unit))
     return command
 
 
@@ -242,7 +246,8 @@ def _lead(summary: list[Row], study: SpecimenStudy) -> str:
 
 def write_inspection(inspections: Sequence[Inspection], folder: Path) -> None:
     """Write figures, converted data and text of every test into an empty folder."""
-    write_data(folder, Experiment.of([inspection.reading.experiment for inspection in inspections]))
+    experiment = Experiment.of([inspection.reading.experiment for inspection in inspections])
+    write_data(folder, experiment, stress_unit(experiment.stress_unit))
     numbers = [f"-{number}" for number in range(1, len(inspections) + 1)] if len(inspections) > 1 else [""]
     figures = {f"curve{number}": curve_figure(item) for number, item in zip(numbers, inspections, strict=True)}
     write_figures(folder, figures)

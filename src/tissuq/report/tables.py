@@ -10,15 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY
-from tissuq.posterior.labelled import summaries
+from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.posterior.labelled import summaries, summaries_in
 
 if TYPE_CHECKING:
-    from tissuq.experiments.units import StressUnit
     from tissuq.model.tolerances import Tolerances
     from tissuq.posterior.posterior import Posterior
 
 __all__ = [
+    "headline_columns",
     "headline_of",
+    "in_mpa",
+    "in_unit_of",
     "known_number",
     "parameter_rows",
     "readable_held_out",
@@ -31,6 +34,7 @@ __all__ = [
     "stability_rows",
     "summary_row",
     "tolerances_in_words",
+    "with_named_units",
     "write_csv",
     "write_json",
 ]
@@ -61,6 +65,11 @@ def summary_row(formulation: str, posterior: Posterior, seconds: float, truth: f
     }
 
 
+def headline_columns(row: Row) -> list[str]:
+    """Return the columns of a row that begin with its headline parameter, in whose unit they are."""
+    return [name for name in row if name.startswith(f"{headline_of(row)}_")]
+
+
 def headline_of(row: Row) -> str:
     """Return the parameter whose posterior the row of a formulation gives."""
     names = [name.removesuffix("_mean") for name in row if name.endswith("_mean")]
@@ -69,19 +78,47 @@ def headline_of(row: Row) -> str:
     return names[0]
 
 
+UNIT = "unit"
+"""What rows call the unit of their stresses; without it these are in MPa."""
+
+
+def in_unit_of(rows: Sequence[Row], columns: Sequence[str], unit: StressUnit) -> list[Row]:
+    """Return rows whose columns in MPa are in another unit, which stands among them."""
+    return [_divided(row, columns, unit.to_mpa) | {UNIT: unit.name} for row in rows]
+
+
+def in_mpa(rows: Sequence[Row], columns: Sequence[str]) -> list[Row]:
+    """Return rows of a file with these columns in MPa, in which earlier files have them without saying so."""
+    return [_divided(row, columns, 1 / stress_unit(row[UNIT]).to_mpa) if UNIT in row else row for row in rows]
+
+
+def with_named_units(rows: Sequence[Row], columns: Sequence[str], unit: StressUnit) -> list[Row]:
+    """Return rows whose columns in MPa are in another unit, which stands in the names of these columns."""
+    names = {name: f"{name} [{unit.name}]" for name in columns}
+    return [
+        {names.get(name, name): value for name, value in row.items() if name != UNIT}
+        for row in in_unit_of(rows, columns, unit)
+    ]
+
+
+def _divided(row: Row, columns: Sequence[str], divisor: float) -> Row:
+    return {name: value / divisor if name in columns and value is not None else value for name, value in row.items()}
+
+
 def parameter_rows(posteriors: Mapping[str, Posterior]) -> list[Row]:
     """Return mean, sd, median and 95 % HPD of every parameter of every formulation, with its unit and prior."""
     rows = []
     for formulation, posterior in posteriors.items():
-        table = summaries(posterior.solution)
+        unit = posterior.unit()
+        table = summaries_in(unit, posterior.solution)
         for parameter in posterior.model.parameters:
-            numbers = table[parameter.symbol]
+            numbers, prior = table[parameter.symbol], posterior.model.priors[parameter.symbol]
             rows.append(
                 {
                     "formulation": formulation,
                     "parameter": parameter.symbol,
-                    "unit": parameter.unit,
-                    "prior": str(posterior.model.priors[parameter.symbol]),
+                    "unit": unit.name if parameter.unit else "",
+                    "prior": str(prior.scaled(1 / unit.to_mpa) if parameter.unit else prior),
                     **{name: known_number(numbers[name]) for name in ("mean", "sd", "median", "hdi_low", "hdi_high")},
                     "rhat": float(numbers["rhat"]) if "rhat" in numbers else None,
                     "ess": float(numbers["ess"]) if "ess" in numbers else None,
@@ -145,6 +182,8 @@ def write_json(path: Path, rows: list[Row]) -> None:
     path.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
+HELD_OUT_HEADLINE = ("median", "hdi_low", "hdi_high")
+"""What is said of the headline parameter from the other tests."""
 HELD_OUT = ["formulation", "test", "measured", "inside", "beyond", "half width", "error"]
 """What `readable_held_out` gives, before the headline parameter."""
 
@@ -260,9 +299,7 @@ def readable_held_out(rows: Sequence[Row], headline: str, unit: StressUnit) -> l
     """Return how every test is predicted from the others, as cells for people."""
     cells = []
     for row in rows:
-        median, low, high = (
-            significant(row[f"{headline}_{name}"] / unit.to_mpa) for name in ("median", "hdi_low", "hdi_high")
-        )
+        median, low, high = (significant(row[f"{headline}_{name}"] / unit.to_mpa) for name in HELD_OUT_HEADLINE)
         shares = [_share(row[name]) for name in ("inside", "beyond", "half_width", "error")]
         cells.append([row["formulation"], row["test"], row["measured"], *shares, f"{median} [{low}, {high}]"])
     return cells

@@ -34,7 +34,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     -------
     pandas.DataFrame
         One row a test, as `prediction_of` describes it, and median and 95 % interval of the headline parameter from the
-        others.
+        others, MPa.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def held_out_tests(tests: Sequence[Experiment] | Experiment, **options: Any) -> 
     rows = []
     for index, test in enumerate(tests):
         posterior = fit([training_test for number, training_test in enumerate(tests) if number != index], **options)
-        headline = posterior.summary(parameters=[posterior.model.headline]).iloc[0]
+        headline = posterior.summary(parameters=[posterior.model.headline], unit="MPa").iloc[0]
         estimates = {f"{posterior.model.headline}_{name}": headline[name] for name in ("median", "hdi_low", "hdi_high")}
         rows += [row | estimates for row in prediction_of(posterior, test)]
     return pd.DataFrame(rows)

@@ -16,7 +16,7 @@ from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.experiments.units import StressUnit, in_unit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN
@@ -58,7 +58,8 @@ class Prediction:
     data : Experiment, optional
         The measurements that it is compared with.
     scores : pandas.DataFrame, optional
-        How they are predicted (`Posterior.scores`), with the discrepancy or without as column ``discrepancy``.
+        How they are predicted (`Posterior.scores`), with the discrepancy or without as column ``discrepancy``; in the
+        unit of the run.
     warnings : tuple of str
         Warnings about fit and prediction.
     """
@@ -81,10 +82,11 @@ class Prediction:
 
     @cached_property
     def bands(self) -> Mapping[tuple[int, bool, bool], pd.DataFrame]:
-        """The `curves` as tables with the columns stretch, median, low and high."""
+        """The `curves` as tables with the columns stretch, median, low and high, in the unit of the run."""
         import pandas as pd
 
-        return {key: pd.DataFrame(vars(band)) for key, band in self.curves.items()}
+        columns, unit = ["median", "low", "high"], self.unit.name
+        return {key: in_unit(pd.DataFrame(vars(band)), columns, unit) for key, band in self.curves.items()}
 
     @property
     def stresses(self) -> tuple[str, ...]:
@@ -122,11 +124,11 @@ class Prediction:
 
     @property
     def table(self) -> pd.DataFrame:
-        """All bands, MPa: a row for every stress and point.
+        """All bands: a row for every stress and point, and the unit of stress in the names of the columns.
 
-        Columns measured (of several stresses), stretch (and stretch2), is_calibrated; median, low, high of the stress
-        with the discrepancy and predictive_low, predictive_high of a measurement of it; and the same of the material
-        alone, from alone_median on.
+        Columns measured (of several stresses), stretch (and stretch2), is_calibrated; ``median [kPa]``, low, high of
+        the stress with the discrepancy and predictive_low, predictive_high of a measurement of it; and the same of the
+        material alone, from alone_median on.
         """
         import pandas as pd
 
@@ -136,13 +138,15 @@ class Prediction:
     def rows(self) -> list[dict[str, Any]]:
         """The rows of `table`."""
         rows: list[dict[str, Any]] = []
+        unit = self.unit
         for channel, name in enumerate(self.stresses):
             columns: dict[str, FloatArray | NDArray[np.bool_]] = self.controls | {"is_calibrated": self.is_calibrated}
             for kind in self.kinds:
                 prefix = "" if kind else "alone_"
                 stress, noisy = (self.curves[channel, kind, noise] for noise in (False, True))
-                columns |= {f"{prefix}{end}": getattr(stress, end) for end in ("median", "low", "high")}
-                columns |= {f"{prefix}predictive_{end}": getattr(noisy, end) for end in ("low", "high")}
+                bands = {end: getattr(stress, end) for end in ("median", "low", "high")}
+                bands |= {f"predictive_{end}": getattr(noisy, end) for end in ("low", "high")}
+                columns |= {f"{prefix}{name} [{unit.name}]": band / unit.to_mpa for name, band in bands.items()}
             label = {"measured": name} if len(self.stresses) > 1 else {}
             values = (column.tolist() for column in columns.values())
             rows += [label | dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
@@ -150,7 +154,7 @@ class Prediction:
 
     @property
     def data_set(self) -> xr.Dataset:
-        """All bands as labelled arrays, with the measurements where there are some; stresses in MPa.
+        """All bands as labelled arrays, with the measurements where there are some; in the unit of the run.
 
         Dimensions discrepancy and noise (``"with"``, ``"without"``), stress, and stretch, or point where the mode has
         several controls.
@@ -165,13 +169,14 @@ class Prediction:
         shape = len(self.kinds), 2, len(self.stresses), len(self.points)
         arrays = {
             end: np.reshape([getattr(self.curves[channel, kind, noise], end) for kind, noise, channel in order], shape)
+            / self.unit.to_mpa
             for end in ("median", "low", "high")
         }
-        mpa, dims = {"units": "MPa"}, ("discrepancy", "noise", "stress", along)
+        units, dims = {"units": self.unit.name}, ("discrepancy", "noise", "stress", along)
         by_name: dict[str, Any] = {
-            "median": (dims, arrays["median"], mpa | {"long_name": "median stress"}),
-            "low": (dims, arrays["low"], mpa | {"long_name": f"lower end of the {self.prob:.12g} interval"}),
-            "high": (dims, arrays["high"], mpa | {"long_name": f"upper end of the {self.prob:.12g} interval"}),
+            "median": (dims, arrays["median"], units | {"long_name": "median stress"}),
+            "low": (dims, arrays["low"], units | {"long_name": f"lower end of the {self.prob:.12g} interval"}),
+            "high": (dims, arrays["high"], units | {"long_name": f"upper end of the {self.prob:.12g} interval"}),
             "is_calibrated": (along, self.is_calibrated.astype(np.int8), {"units": "1"}),
         }
         coordinates: dict[str, Any] = {name: (along, column, {"units": "1"}) for name, column in self.controls.items()}
@@ -179,7 +184,7 @@ class Prediction:
         coordinates |= {"stress": list(self.stresses)}
         if self.data is not None:
             stress = [self.measured(channel) for channel in range(len(self.stresses))]
-            by_name["measured"] = (("stress", "measurement"), np.array(stress), mpa)
+            by_name["measured"] = (("stress", "measurement"), np.array(stress) / self.unit.to_mpa, units)
             for number, column in enumerate(self.data.stretch.reshape(len(self.data), -1).T, 1):
                 name = f"measured_stretch{number if number > 1 else ''}"
                 by_name[name] = ("measurement", column, {"units": "1"})

@@ -1,0 +1,54 @@
+"""What a run leaves is in the unit of the file, and says so; runs of earlier versions, in MPa, go on."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+
+import pytest
+
+import tissuq as tq
+
+
+def rows_of(file):
+    with file.open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+@pytest.fixture
+def run(cli, here, specimen):
+    said = cli("fit", specimen, "--discrepancy", "none", "--prior", "C10=normal(40,30)", "--no-figures", "--out", "run")
+    assert said.status == 0, said.err
+    return here / "run"
+
+
+def test_tables_of_a_run_are_in_the_unit_of_the_file(run):
+    marginal = tq.load(run).marginals["C10"]
+    (summary,), (plain,) = rows_of(run / "summary.csv"), json.loads((run / "summary.json").read_text())
+    for name, value in {"mean": marginal.mean, "sd": marginal.sd, "hdi_low": marginal.hdi()[0]}.items():
+        assert float(summary[f"C10_{name} [kPa]"]) == pytest.approx(1e3 * value, rel=1e-9)
+        assert plain[f"C10_{name}"] == pytest.approx(1e3 * value, rel=1e-9)
+    assert plain["unit"] == "kPa"
+    c10 = next(row for row in rows_of(run / "parameters.csv") if row["parameter"] == "C10")
+    assert (c10["unit"], c10["prior"]) == ("kPa", "normal(40, 30, low=0)")
+    assert float(c10["median"]) == pytest.approx(1e3 * marginal.quantile(0.5), rel=1e-9)
+
+
+def test_the_data_of_a_run_are_read_back_with_their_unit(run, specimen):
+    data, of_run = tq.read(specimen, unit="kPa"), tq.read(run / "data.csv")
+    assert of_run.stress_unit == "kPa"
+    assert of_run.stress == pytest.approx(data.stress, rel=1e-12)
+
+
+def test_a_run_of_an_earlier_version_in_mpa_is_shown_as_before(cli, run):
+    earlier = run.with_name("earlier")
+    shutil.copytree(run, earlier)
+    (row,) = json.loads((earlier / "summary.json").read_text())
+    assert row.pop("unit") == "kPa"
+    row |= {name: value * 1e-3 for name, value in row.items() if name.startswith("C10_")}
+    (earlier / "summary.json").write_text(json.dumps([row]), encoding="utf-8")
+    shown = [cli("show", folder) for folder in (run, earlier)]
+    assert shown[0].status == 0
+    assert "C10, kPa" in shown[0].out
+    assert shown[1].out == shown[0].out.replace("/run/report.html", "/earlier/report.html")
