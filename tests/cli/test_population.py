@@ -86,12 +86,18 @@ def test_the_numbers_are_those_of_the_specimens(population_run):
     folder, _ = population_run
     found = {row["quantity"]: {key: float(row[key]) for key in ("median", "hdi_low", "hdi_high")}
              for row in table(folder / "run" / "population.csv")}  # fmt: skip
-    assert found["median"]["median"] == pytest.approx(np.exp(np.mean(np.log(MODULI_KPA))) * 1e-3, rel=0.05)
-    assert found["new patient"]["hdi_low"] < 0.040
-    assert found["new patient"]["hdi_high"] > 0.075
+    assert found["median"]["median"] == pytest.approx(np.exp(np.mean(np.log(MODULI_KPA))), rel=0.05)
+    assert found["new patient"]["hdi_low"] < 40
+    assert found["new patient"]["hdi_high"] > 75
+    assert 0.1 < found["spread"]["median"] < 0.6  # of the logarithm, which has no unit
+    units = [row["unit"] for row in table(folder / "run" / "population.csv")]
+    assert units == ["kPa", "", "kPa", "kPa"]
     own = [float(row["median"]) for row in table(folder / "run" / "specimens.csv")]
-    assert own == pytest.approx(np.array(MODULI_KPA) * 1e-3, rel=0.05)
-    assert len(table(folder / "run" / "data.csv")) == 7 * len(STRETCH)
+    assert own == pytest.approx(MODULI_KPA, rel=0.05)
+    data, bands = (table(folder / "run" / f"{name}.csv") for name in ("data", "new_patient"))
+    assert len(data) == 7 * len(STRETCH)
+    stress = max(float(row["stress [kPa]"]) for row in data)
+    assert float(bands[-1]["median [kPa]"]) == pytest.approx(stress, rel=0.5)
 
 
 @pytest.mark.slow

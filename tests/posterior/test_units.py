@@ -82,3 +82,16 @@ def test_fits_in_two_units_are_compared_and_averages_are_in_that_of_the_measurem
     assert average.summary().loc["C10", "mean"] == pytest.approx(1e3 * average.marginals["C10"].mean, rel=1e-12)
     medians = [fit.predict([1.2])["median"][0] for fit in (posterior, without, average)]
     assert min(medians[:2]) <= medians[2] <= max(medians[:2])
+
+
+def test_notebooks_show_tables_with_units(posterior):
+    page = posterior._repr_html_()
+    assert "stresses in kPa" in page
+    assert page.startswith("<p>&lt;Posterior of C10")
+    assert f"<td>{posterior.summary().loc['C10', 'median']:.4g}</td>" in page
+    data = posterior.model.experiment.labelled(name="<b>")
+    shown = data._repr_html_()
+    assert "<b>" not in shown
+    assert "stress to [kPa]" in shown
+    assert "<td>3.54</td>" in shown
+    assert repr(data) == "<Experiment '<b>': uniaxial, 5 measured stresses in kPa>"

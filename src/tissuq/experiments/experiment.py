@@ -68,7 +68,7 @@ class Curve:
         return self.mode.stresses[self.channel]
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Experiment:
     """Measurements of one test: what it set, such as stretches, and the stresses. `Experiment.of` joins several tests.
 
@@ -178,6 +178,23 @@ class Experiment:
 
     def __len__(self) -> int:
         return sum(len(test.curves[0]) for test in self.tests)
+
+    def __repr__(self) -> str:
+        modes = ", ".join(mode.name for mode in self.modes)
+        return f"<Experiment '{self.name}': {modes}, {self.size} measured stresses in {self.stress_unit}>"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the curves, which notebooks show."""
+        import pandas as pd
+
+        rows = []
+        for curve in self.curves:
+            ends = [curve.abscissa.min(), curve.abscissa.max()]
+            stress = curve.stress / stress_unit_of(self.stress_unit).to_mpa
+            span = {"from": ends[0], "to": ends[1], f"stress from [{self.stress_unit}]": stress.min()}
+            labels = {"test": curve.name, "specimen": curve.specimen, "mode": curve.mode.name, "rows": len(curve)}
+            rows.append(labels | span | {f"stress to [{self.stress_unit}]": stress.max()})
+        return str(pd.DataFrame(rows).to_html(index=False, float_format="{:.5g}".format))
 
     @property
     def size(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -504,3 +505,7 @@ class Posterior:
             f"<Posterior of {', '.join(model.symbols)}: {model.material.name}, discrepancy {model.discrepancy.name}, "
             f"{model.experiment.size} measurements, {self.solution.route}>"
         )
+
+    def _repr_html_(self) -> str:
+        """Return the posterior in a line above its summary, which notebooks show."""
+        return f"<p>{escape(repr(self))}</p>{self.summary().to_html(float_format='{:.4g}'.format)}"

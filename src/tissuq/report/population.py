@@ -22,7 +22,7 @@ from tissuq.report.run_folder import (
     write_posteriors,
     write_recipe,
 )
-from tissuq.report.tables import Row, interval, significant, write_csv
+from tissuq.report.tables import Row, interval, significant, with_named_units, write_csv
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -182,12 +182,14 @@ def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Pa
     command = f"population{'' if figures else ' --no-figures'}{named}"
     write_recipe(folder, command, study.settings.model_copy(update=relocated))
     several = len(study.modes) > 1
-    write_csv(folder / "data.csv", _data_rows(study, several))
-    tables = {"population": population.summary(), "specimens": population.specimen_summary()}
+    write_csv(folder / "data.csv", with_named_units(_data_rows(study, several), ["stress"], unit))
+    summaries = {"population": population.summary(), "specimens": population.specimen_summary()}
+    tables = {name: _in_units(study, table) for name, table in summaries.items()}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
     bands, not_predicted, drawn = *_bands(study), {}
     if bands:
-        tables["new_patient"] = _band_table(bands, several)
+        band_table = _band_table(bands, several) / unit.to_mpa
+        tables["new_patient"] = band_table.rename(columns={name: f"{name} [{unit.name}]" for name in band_table})
         drawn = {"new_patient": patient_figure(population, bands, unit)} if figures else {}
     for name, table in tables.items():
         table.to_csv(folder / f"{name}.csv")
@@ -248,6 +250,18 @@ def _copied(study: PopulationStudy, folder: Path, beside: Path) -> tuple[str, ..
         for file in files:
             shutil.copyfile(file, target / file.name)
     return (INPUT,) if study.settings.specimen is None else (f"{INPUT}/{Path(study.settings.files[0]).name}",)
+
+
+def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table indexed by parameter, and perhaps quantity, in the unit of the files, with a column ``unit``."""
+    is_log = dict(zip(study.population.symbols, study.population.coordinates.is_log, strict=True))
+    scales = [
+        (1.0, "") if row.get("quantity") == "spread" and is_log[row["parameter"]] else _scale(study, row["parameter"])
+        for row in table.index.to_frame().to_dict("records")
+    ]
+    scaled = table.div([factor for factor, _ in scales], axis=0)
+    scaled.insert(0, "unit", [name for _, name in scales])
+    return scaled
 
 
 def readable_population(study: PopulationStudy) -> list[list[str]]:
