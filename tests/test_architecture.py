@@ -65,7 +65,7 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
 @pytest.mark.parametrize(
     "document",
     [
-        *["CONTRIBUTING.md", "docs/prediction.md"],
+        *["CONTRIBUTING.md", "docs/prediction.md", "docs/reading.md"],
         *(
             pytest.param(name, marks=pytest.mark.slow)
             for name in ("README.md", "docs/several-tests.md", "docs/expensive-models.md")

@@ -169,5 +169,7 @@ def test_a_fit_of_files_and_tables_is_that_of_their_experiments(is_file, tmp_pat
     expected = tq.fit(tq.read(FRAME, **options), discrepancy="none", noise_sd=1e-3)
     found = tq.fit(data, discrepancy="none", noise_sd=1e-3, **options)
     assert found.marginals["C10"].mean == expected.marginals["C10"].mean
+    laws = tq.fit_laws(data, ["neo-hookean"], discrepancy="none", noise_sd=1e-3, **options)
+    assert laws.fits["neo-hookean"].marginals["C10"].mean == expected.marginals["C10"].mean
     (of_many,) = tq.fit_many([[data]], discrepancy="none", noise_sd=1e-3, **options)
     assert of_many.marginals["C10"].mean == expected.marginals["C10"].mean

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
+import pint
 import pytest
 
 import tissuq as tq
 from marks import slow_but
 from tissuq.model.noise import noise_named, stress_level
 
+Q = pint.UnitRegistry().Quantity
+
 
 def test_a_number_is_known_noise_and_a_name_finds_its_kind():
     assert noise_named(0.3) == tq.KnownNoise(0.3)
+    for text in ("0.3 MPa", "300 kPa", "0.3 N/mm2", Q(300.0, "kPa")):
+        assert noise_named(text) == tq.KnownNoise(0.3)
+    assert noise_named(["200 kPa", 0.3]).sds == noise_named(Q([200.0, 300.0], "kPa")).sds == (0.2, 0.3)
+    for text, message in (("0.3", "'0.3' has no unit"), ("0.3 N", "is a force"), ("-1 kPa", "must be a positive")):
+        with pytest.raises(tq.InputError, match=message):
+            noise_named(text)
     assert isinstance(noise_named("unknown"), tq.UnknownNoise)
     assert isinstance(noise_named("proportional"), tq.ProportionalNoise)
     assert isinstance(noise_named("repeats"), tq.RepeatNoise)

@@ -29,6 +29,7 @@ __all__ = [
     "measured_in",
     "number_and_unit",
     "strain_factor",
+    "stress_in_mpa",
     "stress_unit",
     "stress_units_in",
     "unit_of",
@@ -150,6 +151,29 @@ def in_unit(table: pd.DataFrame, columns: Sequence[str], unit: str) -> pd.DataFr
 def headed(table: pd.DataFrame, unit: StressUnit) -> pd.DataFrame:
     """Return a table with the unit of its stresses at the head of its columns, as their name."""
     return table.rename_axis(columns=f"stresses in {unit.name}")
+
+
+def stress_in_mpa(stress: Any) -> Any:
+    """Return a stress in MPa that is a text with its unit or a quantity of pint; anything else as it is.
+
+    Raises
+    ------
+    InputError
+        When a text is a number without a unit, or its unit or that of a quantity is none of stress.
+
+    Examples
+    --------
+    >>> stress_in_mpa("0.02 kPa"), stress_in_mpa(0.5), stress_in_mpa("unknown")
+    (2e-05, 0.5, 'unknown')
+    """
+    if is_quantity(stress):
+        return stress.magnitude * stress_unit(unit_of(stress)).to_mpa
+    number, unit = number_and_unit(stress) if isinstance(stress, str) else (None, "")
+    if number is None:
+        return stress
+    if not unit:
+        raise InputError(f"'{stress}' has no unit: write it with one, such as '{stress} kPa', or as a number of MPa.")
+    return number * stress_unit(unit).to_mpa
 
 
 def strain_factor(text: str) -> float:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.smoothing import scatter, smoothed
+from tissuq.experiments.units import stress_in_mpa
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Uniform
 from tissuq.registry import find, plugins, variants
@@ -189,20 +190,21 @@ class AutoregressiveNoise(UnknownNoise):
     is_consecutive = True
 
 
-def noise_named(noise: float | Sequence[float] | str | Noise) -> Noise:
-    """Return the noise of that name, or of known standard deviation (MPa), or of one for each of several tests.
+def noise_named(noise: Any) -> Noise:
+    """Return the noise of that name, or of known standard deviation, or of one for each of several tests.
 
-    A noise is returned as it is.
+    A standard deviation is a number of MPa, a text with a unit, or a quantity of pint; a noise is returned as it is.
 
     Raises
     ------
     InputError
-        When no noise has that name, or the number is not positive.
+        When no noise has that name, or the number is not positive, or its unit is none of stress.
     """
+    noise = stress_in_mpa(noise)
     if isinstance(noise, Noise):
         return noise
     if isinstance(noise, (Sequence, np.ndarray)) and not isinstance(noise, str):
-        sds = tuple(float(KnownNoise(sd).value) for sd in noise)
+        sds = tuple(float(KnownNoise(stress_in_mpa(sd)).value) for sd in noise)
         return KnownNoises(float(np.exp(np.log(sds).mean())), sds)
     if not isinstance(noise, str):
         return KnownNoise(noise)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, Unpack
+from typing import Any, Unpack
 
 from tissuq.assessment.stable_posterior import modes_named
 from tissuq.errors import InputError
@@ -33,7 +33,7 @@ def fit(
     *,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
-    noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
+    noise_sd: float | str | Sequence[float | str] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
     tolerances: Tolerances | str | None = None,
@@ -55,10 +55,11 @@ def fit(
         an average of strain energies that leave the initial shear modulus alone, by the evidence.
     material : str or Material
         The material whose parameters are wanted.
-    noise_sd : float or "unknown"
-        Standard deviation of the measurement noise in MPa; unknown, as when nothing is said, makes it a parameter. For
-        several tests a sequence of numbers, one for each, is taken, too; where it is unknown, its ratios between the
-        tests are those of their scatter about smooth curves, and noise_sd is its geometric mean.
+    noise_sd : float, or str such as "0.02 kPa" or "unknown"
+        Standard deviation of the measurement noise, a number of MPa or a text with its unit (or a quantity of pint);
+        unknown, as when nothing is said, makes it a parameter. For several tests a sequence of numbers, one for each,
+        is taken, too; where it is unknown, its ratios between the tests are those of their scatter about smooth curves,
+        and noise_sd is its geometric mean.
     noise : str or Noise
         Another kind of noise instead: ``"proportional"`` (sd = noise_sd + noise_share |stress|), ``"repeats"`` (told
         by repeated measurements at the same stretch), ``"autoregressive"`` (errors of consecutive measurements
@@ -87,7 +88,7 @@ def fit(
         Of the draws.
     reading
         Options of `tissuq.read`, where files or tables are given, such as ``mode``, ``stress="P [kPa]"``, ``unit`` (of
-        the stresses; noise and priors are in MPa whatever it is), ``length="10 mm"``.
+        the stresses: noise and priors without a unit are in MPa whatever it is), ``length="10 mm"``.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def fit(
     >>> bool(low < 1.2 < high)
     True
     >>> table = {"lambda": [0.8, 0.9, 1.1, 1.2, 1.3], "P [kPa]": [-3.81, -1.67, 1.37, 2.53, 3.54]}
-    >>> tq.fit(table, discrepancy="none", noise_sd=1e-5)
+    >>> tq.fit(table, discrepancy="none", noise_sd="0.01 kPa")
     <Posterior of C10: neo-hookean, discrepancy none, 5 measurements, exact>
     """
     return fit_many(
@@ -137,7 +138,7 @@ def fit_many(
     *,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
-    noise_sd: float | Sequence[float] | Literal["unknown"] | None = None,
+    noise_sd: float | str | Sequence[float | str] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
     tolerances: Tolerances | str | None = None,

@@ -8,7 +8,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.errors import ConvergenceError, InputError, ModelError
-from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.experiment_file import PythonOptions, measurements
 from tissuq.experiments.units import in_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
-from tissuq.posterior.fitting import fit
+from tissuq.posterior.fitting import OPTIONS, fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predict_average, predict_band
 from tissuq.prediction.densities import leave_one_out
@@ -171,7 +171,7 @@ class LawComparison:
 
 
 def fit_laws(
-    experiment: Experiment | Sequence[Experiment],
+    experiment: Any,
     laws: str | Sequence[str | Material] = ALL_LAWS,
     *,
     priors: Mapping[str, Any] | None = None,
@@ -182,7 +182,7 @@ def fit_laws(
 
     Parameters
     ----------
-    experiment : Experiment or sequence of Experiment
+    experiment : Experiment, str, path or table, or sequence of these
         As of `tissuq.fit`.
     laws : str or sequence of str or Material
         ``"all"``: every law that is the same in all directions; or names, as `tissuq.fit` takes them, or laws.
@@ -218,7 +218,8 @@ def fit_laws(
     """
     if (method := options.get("method")) in WITHOUT_EVIDENCE:
         raise InputError(f"the method '{method}' gives no evidence, by which laws are weighted: use 'auto' or 'exact'.")
-    data = Experiment.of(experiment)
+    reading = {name: options.pop(name) for name in [*options] if name in PythonOptions.__annotations__}
+    data = measurements(experiment, OPTIONS, **cast(PythonOptions, reading))
     candidates, is_all = laws_named(laws), laws == ALL_LAWS
     fits, alone, seconds = dict[str, Posterior](), dict[str, Posterior](), dict[str, float]()
     skipped, symbols = dict[str, str](), {p.symbol for law in candidates.values() for p in law.parameters}
