@@ -188,10 +188,10 @@ def of_posterior(
         numbers["log evidence"] = Number(posterior.log_evidence, 1.0)
         numbers[STATED_ERROR] = Number(posterior.log_evidence_error or 0.0, 1.0)
     if at is not None:
-        numbers |= of_band("measurement", posterior.predict(at))
-        numbers |= of_band("material", posterior.predict(at, discrepancy=False, noise=False))
+        numbers |= of_band("measurement", posterior.predict(at, unit="MPa"))
+        numbers |= of_band("material", posterior.predict(at, discrepancy=False, noise=False, unit="MPa"))
     if other:
-        numbers |= of_band(other, posterior.predict(other_at, mode=other, noise=False))
+        numbers |= of_band(other, posterior.predict(other_at, mode=other, noise=False, unit="MPa"))
     if with_leave_one_out:
         left_out = posterior.data["leave_one_out"]["log_density"].to_numpy()
         numbers["leave-one-out"] = Number(float(left_out.sum()), 1.0)
