@@ -9,7 +9,7 @@ from scipy.stats import halfcauchy, multivariate_normal
 import tissuq as tq
 from autoregression import autoregressive_errors
 from marks import slow_but
-from tissuq.experiments.reading.experiment_file import STRESS_TYPES
+from tissuq.prediction.bands import STRESS_TYPES
 from tissuq.prediction.densities import leave_one_out
 from tissuq.prediction.moments import level_of_errors
 

@@ -43,8 +43,19 @@ OPTIONS: dict[str, Any] = {
         str | None,
         typer.Option(help="Unit of the stress column [the file's, or MPa]; for forces, the unit shown [kPa]."),
     ],
-    "stress_type": Annotated[str | None, typer.Option(help="engineering or cauchy [engineering].")],
-    "strain_unit": Annotated[str | None, typer.Option(help="Unit of a strain column: 1 or percent.")],
+    "stress_type": Annotated[
+        str | None,
+        typer.Option(
+            help="engineering, cauchy (true) or second-piola-kirchhoff [what the column's name says, or engineering]."
+        ),
+    ],
+    "strain_type": Annotated[
+        str | None,
+        typer.Option(help="engineering, true (logarithmic), green, almansi or angle (of shear) [likewise]."),
+    ],
+    "strain_unit": Annotated[
+        str | None, typer.Option(help="Unit of a strain column: 1 or percent; of an angle of shear: rad or deg.")
+    ],
     "force_unit": Annotated[str | None, typer.Option(help="Unit of a force column that states none, such as mN.")],
     "displacement_unit": Annotated[str | None, typer.Option(help="Unit of a displacement column that states none.")],
     "zero": Annotated[

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
+    "ANGLE",
     "AREA",
     "BRACKETS",
     "FORCE",
@@ -73,7 +75,7 @@ SYMBOLS = (
     | {"bar", "mbar", "atm"}
     | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
     | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
-    | {"V", "mV", "deg", "rad", "percent", "pct"}
+    | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
 )
 
 BRACKETS = "[](){}<>"
@@ -249,6 +251,7 @@ class Quantity:
 
 
 LENGTH = Quantity("length", "mm", {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4})
+ANGLE = Quantity("angle", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "degrees": pi / 180})
 AREA = Quantity("area", "mm2", {f"{unit}2": factor**2 for unit, factor in LENGTH.factors.items()})
 FORCE = Quantity(
     "force",
@@ -258,7 +261,7 @@ FORCE = Quantity(
 
 
 def measured_in(unit: str) -> str:
-    """Return what a usual unit is one of: stress, force, length, strain or time; nothing for others, and for none.
+    """Return what a usual unit is one of: stress, force, length, angle, strain or time; nothing for others and none.
 
     Examples
     --------
@@ -268,7 +271,7 @@ def measured_in(unit: str) -> str:
     compact = re.sub(r"\s+|\^|\*\*", "", unit).replace("²", "2")
     if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
         return "stress"
-    for quantity in (FORCE, LENGTH):
+    for quantity in (FORCE, LENGTH, ANGLE):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
     return "strain" if compact and compact.lower() in STRAIN_UNITS else "time" if compact.lower() in TIMES else ""

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Curve, Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading.experiment_file import STRESS_TYPES
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
@@ -23,6 +22,7 @@ from tissuq.prediction.moments import variance_of_noise
 from tissuq.prediction.stress import Stress
 
 __all__ = [
+    "STRESS_TYPES",
     "Band",
     "Mixtures",
     "asked_for",
@@ -38,6 +38,8 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
+STRESS_TYPES = ("engineering", "cauchy")
+"""What stresses are predicted as."""
 MAX_PAIRS, MIN_COMPONENTS = 5_000_000, 200
 """Number of pairs of Gaussians, over all points, of a score; number to which a mixture is thinned at the most."""
 SMOOTHING = 0.01

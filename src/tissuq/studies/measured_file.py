@@ -27,7 +27,8 @@ class ReadingSettings(BaseModel):
     mode: str | None = None
     columns: dict[str, str | int] = Field(default_factory=dict)
     stress_unit: str | None = None
-    stress_type: str = "engineering"
+    stress_type: str | None = None
+    strain_type: str | None = None
     strain_unit: str | None = None
     force_unit: str | None = None
     displacement_unit: str | None = None

@@ -84,6 +84,18 @@ class LoadingMode(ABC):
         """Return the states at points of the mode, on the path of its only stress."""
         return self.path.at(points)
 
+    def from_second_piola_kirchhoff(self, points: Any, stresses: Any) -> Any:
+        """Return engineering stresses P = F S (k, n) for second Piola-Kirchhoff stresses S (k, n).
+
+        Here along axes that are the principal ones, where F is the stretch along the axis of each stress.
+
+        Raises
+        ------
+        InputError
+            When the stresses of the mode do not determine them.
+        """
+        return np.stack([stress * path.cauchy_ratio(points) for path, stress in zip(self.paths, stresses, strict=True)])
+
     @property
     def is_curve(self) -> bool:
         """Whether it is one stress against one stretch."""

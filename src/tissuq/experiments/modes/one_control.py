@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tissuq.errors import InputError
 from tissuq.experiments.modes.mode import SHEAR, ControlPath, LoadingMode
 from tissuq.experiments.modes.path import Deformation, Path
 
@@ -93,6 +94,13 @@ class SimpleShear(LoadingMode):
     def paths(self) -> tuple[Path, ...]:
         return (_Shear(self),)
 
+    def from_second_piola_kirchhoff(self, points: Any, stresses: Any) -> Any:
+        raise InputError(
+            "in simple shear by an amount g the shear stress is P12 = S12 + g S22, so that the second Piola-Kirchhoff "
+            "stress S12 alone does not determine it. Give the engineering or Cauchy shear stress, or with the normal "
+            "stress S22 the mode simple-shear-normal."
+        )
+
 
 class _Shear(ControlPath):
     """A step of the shear, whose stress is engineering and Cauchy stress alike."""
@@ -131,3 +139,8 @@ class SimpleShearNormal(LoadingMode):
     @property
     def paths(self) -> tuple[Path, ...]:
         return _Shear(SimpleShear()), _Normal()
+
+    def from_second_piola_kirchhoff(self, points: Any, stresses: Any) -> Any:
+        """Return P12 = S12 + g S22 and P22 = S22."""
+        shear_stress, normal_stress = stresses
+        return np.stack([shear_stress + points * normal_stress, normal_stress])

@@ -11,6 +11,7 @@ from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
 from tissuq.experiments.reading.measures import MPA_ASSUMED
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
 from tissuq.experiments.reading.positions import ZERO_ASSUMED
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 
 __all__ = ["DOUBTFUL_UNIT", "assumptions"]
 
@@ -28,7 +29,8 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> tupl
             "kPa, or --stress-unit MPa."
         )
     if RATIO_ASSUMED in source:
-        largest = float(np.abs(measured.stretch - 1).max())
+        strain = STRAIN_MEASURES[choices[0].strain_type].strain
+        largest = float(np.abs(strain(measured.stretch)).max()) if strain else 0.0
         found.append(
             f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which "
             "it is: --strain-unit % or --strain-unit 1."

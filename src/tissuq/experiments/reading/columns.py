@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from tissuq.errors import InputError
@@ -14,12 +14,14 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.headings import (
     CYCLE_NAMES,
     DIMENSION_NAMES,
-    STRESS_NAMES,
     heading,
+    measure_in,
     on_axis,
     plain,
     role_names,
 )
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import measured_in
 
@@ -30,9 +32,19 @@ DEFORMATIONS = (*LENGTHENINGS, "shear")
 LOADS = ("stress", "force")
 DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement"}
 """What a column is that alone has such a unit."""
-NOT_ENGINEERING = re.compile(r"^(sigma|σ)(?!.*(eng|nom))|true|cauchy|piola|kirchhoff")
+NOT_ENGINEERING = re.compile(r"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){2})?$)|true|cauchy|piola|kirchhoff")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
-NEITHER_LOAD_NOR_DEFORMATION = re.compile(r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$")
+NOT_ENGINEERING_STRAIN = re.compile(r"^e( ?([1-3xyzrθ]|theta){2})?$|^e ?gl?$|lagrang|euler")
+"""Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
+SHEAR_STRESS = re.compile(r"shear|schub|scher|cisaillement|cortante|taglio|cisalhamento|τ|tau")
+OSCILLATION = re.compile(
+    r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
+)
+"""Names of what is measured in oscillations."""
+NEITHER_LOAD_NOR_DEFORMATION = re.compile(
+    r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$|pressure|druck$|pression|presi[oó]n|press[aã]o|"
+    r"压力|壓力|圧力|압력"
+)
 """Names of columns that are no rivals, whatever their unit."""
 
 
@@ -48,16 +60,52 @@ class ColumnChoice:
         What the deformation is: stretch, strain, displacement, (current) length or (amount of) shear.
     load : str
         What the other column holds: stress or force.
+    strain_type, stress_type : str
+        Which measure of strain, or of shear, and of stress.
     """
 
     deformation: int
     stress: int
     measure: str = "stretch"
     load: str = "stress"
+    strain_type: str = "engineering"
+    stress_type: str = "engineering"
+
+
+@dataclass(frozen=True)
+class _Contents:
+    """What the names of columns say they hold, without words for a measure, and that measure where they say one.
+
+    ``strain_type`` and ``stress_type`` are the measures that are asked for; none where the names decide.
+    """
+
+    quantities: Sequence[str]
+    measures: Sequence[str]
+    strain_type: str | None = None
+    stress_type: str | None = None
+
+    def fitting(self, *roles: str) -> list[int]:
+        """Return the columns that may have one of the roles: of several those of the measure that is wanted.
+
+        That is the one asked for, or else the engineering one, or what does not say another.
+        """
+        names = frozenset().union(*(role_names(role) for role in roles))
+        columns = [column for column, quantity in enumerate(self.quantities) if quantity in names]
+        wanted = self.stress_type if "stress" in roles else self.strain_type
+        for measures in (("", "engineering"),) if wanted is None else ((wanted,), ("",)):
+            preferred = [column for column in columns if self.measures[column] in measures]
+            if preferred:
+                return preferred
+        return columns
 
 
 def choose_columns(
-    table: Table, mode: LoadingMode, mapping: Mapping[str, str | int] | None, stress_type: str, axis: str | None
+    table: Table,
+    mode: LoadingMode,
+    mapping: Mapping[str, str | int] | None,
+    strain_type: str | None,
+    stress_type: str | None,
+    axis: str | None,
 ) -> dict[str, ColumnChoice]:
     """Return the columns of every stress of a mode, by what it is called; of a mode with one by an empty text.
 
@@ -73,8 +121,9 @@ def choose_columns(
     mapping : mapping or None
         From a role (stretch, strain, displacement, length or shear; stress or force) to the name of a column, or its
         number from 1.
-    stress_type : str
-        ``engineering`` or ``cauchy``: what a stress column may be called.
+    strain_type, stress_type : str or None
+        Which measures they are, by the names in `STRAIN_MEASURES` and `STRESS_MEASURES`; what the columns' names say
+        where none is given, and engineering where these say nothing.
     axis : str or None
         ``x`` or ``y``: whose columns are read from the file of a biaxial machine in a mode with one stress.
 
@@ -97,7 +146,7 @@ def choose_columns(
         if number and len(mode.controls) == 1:
             roles = roles | {choices[0].measure: choices[0].deformation + 1}
         with about_stress(number, labels, mode):
-            choices.append(_choice(table, roles, stress_type, axis_of_stress, is_shear))
+            choices.append(_choice(table, roles, (strain_type, stress_type), axis_of_stress, is_shear))
     if count > 1:
         _check_together(table, mode, choices)
     return dict(zip(labels, choices, strict=True))
@@ -143,7 +192,12 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
 
 def _axes_of(table: Table) -> list[str]:
     """Return the axes (x, y) of which the table has columns."""
-    return sorted({axis for axis, _ in (on_axis(heading(name).quantity) for name in table.names) if axis})
+    return sorted({axis for axis, _ in map(_contents_of, table.names) if axis})
+
+
+def _contents_of(name: str) -> tuple[str, str]:
+    """Return the axis that a column belongs to, and what its name says it holds without words for a measure."""
+    return on_axis(measure_in(heading(name).quantity)[0])
 
 
 def _mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
@@ -162,47 +216,49 @@ def _has_roles(mode: LoadingMode, mapping: Mapping[str, str | int]) -> bool:
 
 
 def _choice(
-    table: Table, mapping: Mapping[str, str | int], stress_type: str, axis: str | None, is_shear: bool
+    table: Table,
+    mapping: Mapping[str, str | int],
+    types: tuple[str | None, str | None],
+    axis: str | None,
+    is_shear: bool,
 ) -> ColumnChoice:
-    """Return the columns of one stress."""
+    """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
     _check_roles(table, mapping, is_shear)
-    quantities = _quantities(table, axis, mapping)
+    contents = _Contents(_quantities(table, axis, mapping), _measures(table), *types)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
         stress = find_column(table, load, mapping[load])
     else:
-        load = next((role for role in LOADS if _fitting(quantities, [role], stress_type)), "")
-        by_unit = None if load else _told_by_unit(table, quantities, LOADS)
-        load, stress = by_unit or (load, _recognise(table, quantities, [load or "force"], stress_type, LOADS))
+        load = next((role for role in LOADS if contents.fitting(role)), "")
+        by_unit = None if load else _told_by_unit(table, contents, LOADS)
+        load, stress = by_unit or (load, _recognise(table, contents, [load or "force"], LOADS))
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
     else:
         measures = ["shear"] if is_shear else ["stretch", "strain"]
         roles = ("shear",) if is_shear else LENGTHENINGS
-        if not is_shear and not _fitting(quantities, measures):
-            measures = ["displacement"] if _fitting(quantities, ["displacement"]) else ["length"]
-        is_named = is_shear or bool(_fitting(quantities, measures))
-        by_unit = None if is_named else _told_by_unit(table, quantities, tuple(DEFORMATIONS_OF_UNITS), stress)
+        if not is_shear and not contents.fitting(*measures):
+            measures = ["displacement"] if contents.fitting("displacement") else ["length"]
+        is_named = is_shear or bool(contents.fitting(*measures))
+        by_unit = None if is_named else _told_by_unit(table, contents, tuple(DEFORMATIONS_OF_UNITS), stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
         else:
-            deformation = _recognise(table, quantities, measures, stress_type, roles)
-            measure = next(name for name in measures if quantities[deformation] in role_names(name))
+            deformation = _recognise(table, contents, measures, roles)
+            measure = next(name for name in measures if contents.quantities[deformation] in role_names(name))
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
             f"give two columns. {_columns_there_are(table)}"
         )
-    choice = ColumnChoice(deformation, stress, measure, load)
-    _check_measures(table, choice, stress_type)
-    return choice
+    _check_test(table, stress, mapping, is_shear)
+    return _with_types(table, ColumnChoice(deformation, stress, measure, load), contents)
 
 
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
-    names = [on_axis(heading(name).quantity) for name in table.names]
-    axes = _axes_of(table)
+    names, axes = list(map(_contents_of, table.names)), _axes_of(table)
     if axis is not None and axis not in axes:
         raise InputError(
             f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
@@ -236,22 +292,22 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
         raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
 
 
-def _fitting(quantities: Sequence[str], roles: Sequence[str], stress_type: str = "engineering") -> list[int]:
-    names = frozenset().union(*(role_names(role, stress_type) for role in roles))
-    return [column for column, quantity in enumerate(quantities) if quantity in names]
+def _measures(table: Table) -> list[str]:
+    """Return the measures of strain or stress that the columns' names say; empty texts where they say none."""
+    return [measure_in(heading(name).quantity)[1] for name in table.names]
 
 
 def _told_by_unit(
-    table: Table, quantities: Sequence[str], kinds: Sequence[str], load: int | None = None
+    table: Table, contents: _Contents, kinds: Sequence[str], load: int | None = None
 ) -> tuple[str, int] | None:
     """Return the first kind of unit (stress, force, length, strain) that one column alone has, and that column.
 
     None where columns are left that could be meant as well: of a deformation, all that are neither of a load nor of
     time nor of a known dimension of the specimen. A stress that may be of another kind (sigma, true stress) is not
-    taken, and nothing that is called shear.
+    taken unless its kind is said, and nothing that is called shear.
     """
     columns_of: dict[str, list[int]] = {}
-    for column, quantity in enumerate(quantities):
+    for column, quantity in enumerate(contents.quantities):
         in_heading, beneath = table.stated_units(column)
         kind = measured_in(beneath or in_heading)
         is_rival = column != load and bool(quantity) and kind != "time" and not _is_of_something_else(quantity)
@@ -261,8 +317,8 @@ def _told_by_unit(
     for kind in kinds:
         columns = columns_of.get(kind, [])
         if len(columns) == 1 and (load is None or rivals == columns):
-            name = quantities[columns[0]]
-            is_open = kind == "stress" and NOT_ENGINEERING.search(name)
+            name = contents.quantities[columns[0]]
+            is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
             return None if is_open or name in role_names("shear") else (kind, columns[0])
     return None
 
@@ -276,17 +332,16 @@ def _is_of_something_else(quantity: str) -> bool:
 
 def _recognise(
     table: Table,
-    quantities: Sequence[str],
+    contents: _Contents,
     candidates: Sequence[str],
-    stress_type: str,
     roles: Sequence[str],
 ) -> int:
     """Return the one column whose name says that it has one of the candidate roles, of those that it may have."""
-    columns = _fitting(quantities, candidates, stress_type)
+    columns = contents.fitting(*candidates)
     if len(columns) > 1:
         raise _ambiguous(table, candidates, columns)
     if not columns:
-        hint = _stress_hint(table, stress_type) if "stress" in roles else _shear_hint(table, quantities, roles)
+        hint = _stress_hint(table, contents) if "stress" in roles else _shear_hint(table, contents, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         raise InputError(
             f"{table.file}: no column is recognised as {what}.{hint} "
@@ -295,19 +350,23 @@ def _recognise(
     return columns[0]
 
 
-def _stress_hint(table: Table, stress_type: str) -> str:
-    for kind, names in STRESS_NAMES.items():
-        columns = [column for column, name in enumerate(table.names) if heading(name).quantity in names]
-        if columns and kind != stress_type:
-            return (
-                f" Column {table.label(columns[0])} is a stress of the {kind} kind; "
-                f'to read it give stress_type="{kind}" (--stress-type {kind}).'
-            )
+def _stress_hint(table: Table, contents: _Contents) -> str:
+    for column, quantity in enumerate(contents.quantities):
+        in_heading, beneath = table.stated_units(column)
+        if measured_in(beneath or in_heading) == "stress" and NOT_ENGINEERING.search(quantity):
+            return f" Column {table.label(column)} may be a stress of several types. {_say_which('stress')}"
     return ""
 
 
-def _shear_hint(table: Table, quantities: Sequence[str], roles: Sequence[str]) -> str:
-    columns = [] if "shear" in roles else _fitting(quantities, ["shear"])
+def _say_which(kind: str) -> str:
+    """Return how to say which measure of strain or stress a column is."""
+    strains = [name for name, measure in STRAIN_MEASURES.items() if measure.stretch]
+    names = strains if kind == "strain" else list(STRESS_MEASURES)
+    return f"Say which it is with {kind}_type (--{kind}-type): {', '.join(names[:-1])} or {names[-1]}."
+
+
+def _shear_hint(table: Table, contents: _Contents, roles: Sequence[str]) -> str:
+    columns = [] if "shear" in roles else contents.fitting("shear")
     if not columns:
         return ""
     return f" Column {table.label(columns[0])} is an amount of shear; if it is simple shear, give --mode simple-shear."
@@ -337,30 +396,69 @@ def _how_to_say(table: Table, roles: Sequence[str]) -> str:
     return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{others}.'
 
 
-def _check_measures(table: Table, choice: ColumnChoice, stress_type: str) -> None:
-    """Refuse columns whose own names contradict what they are read as."""
-    stress_words = set(heading(table.names[choice.stress]).quantity.split())
-    if stress_type == "engineering" and stress_words & {"cauchy", "true"}:
-        raise InputError(
-            f"{table.place(choice.stress)} is named a Cauchy stress but read as an engineering stress. "
-            'Give stress_type="cauchy" (--stress-type cauchy), or rename the column.'
-        )
-    if stress_type == "cauchy" and stress_words & {"engineering", "nominal"}:
-        raise InputError(
-            f"{table.place(choice.stress)} is named an engineering stress but read as a Cauchy stress. "
-            'Leave out stress_type="cauchy" (--stress-type cauchy), or rename the column.'
-        )
-    strain_words = set(heading(table.names[choice.deformation]).quantity.split())
-    if choice.measure == "strain" and strain_words & {"stretch", "lambda", "λ"}:
+def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> ColumnChoice:
+    """Return a choice with the measures of its strain and stress: those asked for, or that the columns' names say.
+
+    Raises
+    ------
+    InputError
+        When a name contradicts what its column is read as, or it is open which measure it is.
+    """
+    strain_type = _type_of(table, choice.deformation, contents, "strain", contents.strain_type)
+    stress_type = _type_of(table, choice.stress, contents, "stress", contents.stress_type)
+    name, is_strain = contents.quantities[choice.deformation], choice.measure == "strain"
+    if is_strain and set(name.split()) & {"stretch", "lambda", "λ"}:
         raise InputError(
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."
         )
-    other_strains = strain_words & {"true", "log", "logarithmic", "hencky", "green", "almansi"}
-    if other_strains:
+    if strain_type and not is_strain and choice.measure != "shear":
         raise InputError(
-            f"{table.place(choice.deformation)} is not an engineering strain (stretch - 1), the only "
-            "strain that is converted. Add a column with the stretch to the file."
+            f"{table.place(choice.deformation)} is a {strain_type} strain, as its name or strain_type (--strain-type) "
+            f"says, but read as {choice.measure}. Leave strain_type out, or give the column as strain "
+            "(--column strain=NAME)."
+        )
+    if is_strain and not strain_type and NOT_ENGINEERING_STRAIN.search(name):
+        raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {_say_which('strain')}")
+    is_told = contents.strain_type or contents.stress_type
+    if is_strain and choice.load == "stress" and not is_told and (strain_type == "") != (stress_type == ""):
+        stated, unstated = ("strain", "stress") if strain_type else ("stress", "strain")
+        column, other = choice.stress, choice.deformation
+        if unstated == "strain":
+            column, other = other, column
+        if (strain_type or stress_type) != "engineering":
+            raise InputError(
+                f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
+                f"{table.label(other)} is {strain_type or stress_type}. {_say_which(unstated)}"
+            )
+    return replace(choice, strain_type=strain_type or "engineering", stress_type=stress_type or "engineering")
+
+
+def _type_of(table: Table, column: int, contents: _Contents, kind: str, wanted: str | None) -> str:
+    """Return the measure that a column is read as: the one asked for, which its name must not contradict."""
+    by_name = contents.measures[column]
+    if wanted and by_name and wanted != by_name:
+        raise InputError(
+            f"{table.place(column)} is named a {kind} of type '{by_name}' but read as '{wanted}'. Leave {kind}_type "
+            f"(--{kind}-type) out, or rename the column."
+        )
+    return wanted or by_name
+
+
+def _check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_shear: bool) -> None:
+    """Refuse a shear stress where nothing is sheared, and amplitudes of oscillations, which are no curve."""
+    quantities = [heading(name).quantity for name in table.names]
+    if not is_shear and "stress" not in mapping and SHEAR_STRESS.search(quantities[stress]):
+        raise InputError(
+            f"{table.place(stress)} is a shear stress. If the specimen was sheared, give --mode simple-shear and the "
+            "column of the amount of shear (--column shear=NAME)."
+        )
+    moduli = [k for k, name in enumerate(quantities) if OSCILLATION.search(name) and not table.is_constant(k)]
+    if moduli and not (mapping.keys() & LOADS and mapping.keys() & DEFORMATIONS):
+        raise InputError(
+            f"{table.file}: column {table.label(moduli[0])} is of oscillations, whose strains and stresses are "
+            "amplitudes and no curve of one test. If there is a curve all the same, say which columns it is in: "
+            "--column shear=NAME --column stress=NAME."
         )
 
 

@@ -26,11 +26,12 @@ from tissuq.experiments.reading.options import spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
 from tissuq.experiments.reading.stated_mode import DEFAULT_MODE, GIVEN, about_mode, mode_of
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.table import Column, Table, read_table
 
 __all__ = [
     "READING_OPTIONS",
-    "STRESS_TYPES",
     "PythonOptions",
     "Reading",
     "ReadingOptions",
@@ -43,7 +44,6 @@ __all__ = [
     "table_of",
 ]
 
-STRESS_TYPES = ("engineering", "cauchy")
 AXES = ("x", "y")
 
 
@@ -53,7 +53,8 @@ class ReadingOptions(TypedDict, total=False):
     mode: str | LoadingMode | None
     columns: Mapping[str, str | int] | None
     stress_unit: str | None
-    stress_type: str
+    stress_type: str | None
+    strain_type: str | None
     strain_unit: str | None
     force_unit: str | None
     displacement_unit: str | None
@@ -167,11 +168,16 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     stress_unit : str, optional
         Unit of the stresses; without it the file's own, and MPa when the file states none. For a file of forces,
         the unit in which people want to read the stresses, kPa unless given.
-    stress_type : str
-        ``engineering`` (force over undeformed area) or ``cauchy``, which is divided by the stretch; a shear
-        stress is the same in both.
+    stress_type : str, optional
+        ``engineering`` (force over undeformed area); ``cauchy``, which is divided by the stretch (a shear stress is the
+        same in both); or ``second-piola-kirchhoff``, which is multiplied by the deformation gradient. Without it what
+        the column's name says, and engineering where that says nothing.
+    strain_type : str, optional
+        ``engineering`` (stretch - 1, or the amount of shear), ``true`` (logarithmic), ``green``, ``almansi``, or
+        ``angle`` of shear; otherwise as `stress_type`.
     strain_unit : str, optional
-        ``%`` or ``1``, for a column of strains; without it the file's own, and 1 when it states none.
+        ``%`` or ``1``, for a column of strains; without it the file's own, and 1 when it states none. ``deg`` or
+        ``rad`` for angles of shear.
     force_unit, displacement_unit : str, optional
         Such as ``mN`` and ``um``, for columns of which the file states no unit.
     zero : str, optional
@@ -310,10 +316,10 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
         has_columns = bool(options.get("axis") or options.get("columns"))
         options["mode"], mode_source = mode_of(path, table, has_columns=has_columns)
     mode = checked_mode(options)
-    stress_type, name = options.get("stress_type", "engineering"), options.get("name")
-    is_positive = options.get("compression_positive", False)
+    name, is_positive = options.get("name"), options.get("compression_positive", False)
+    types = options.get("strain_type"), options.get("stress_type")
     with about_mode(mode.name, mode_source):
-        labelled_choices = choose_columns(table, mode, options.get("columns"), stress_type, options.get("axis"))
+        labelled_choices = choose_columns(table, mode, options.get("columns"), *types, options.get("axis"))
     choices = tuple(labelled_choices.values())
     dimensions = dimensions_of(table, options.get("dimensions"))
     try:
@@ -334,9 +340,15 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     if options.get("until_peak"):
         used = used.until_peak()
     check_stretches(used, choices)
-    if stress_type == "cauchy" and choices[0].measure != "shear":
-        recorded, used = _from_cauchy(mode, recorded), _from_cauchy(mode, used)
-        used = used.with_step("Cauchy stress divided by stretch to engineering stress")
+    stress_measure = _stress_measure(table, choices)
+    if stress_measure.engineering:
+        of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
+        recorded, used = (
+            replace(measured, stress=stress_measure.engineering(mode, _points(mode, stretch), measured.stress))
+            for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
+        )
+        if any(choice.measure != "shear" for choice in choices) or stress_measure.is_of_file:
+            used = used.with_step(stress_measure.step)
     if (every := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), every)
         used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
@@ -345,7 +357,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     sheet = table.file.removeprefix(str(path))
     experiment = Experiment(
         mode=mode,
-        stretch=_points(mode, used),
+        stretch=_points(mode, used.stretch),
         stress=np.ascontiguousarray(used.stress.T) if len(used.stress) > 1 else used.stress[0],
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
@@ -356,7 +368,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
 
 def checked_mode(options: ReadingOptions) -> LoadingMode:
     """Return the loading mode, once the options have been looked at that need no file."""
-    mode, stress_type = loading_mode(options.get("mode") or DEFAULT_MODE), options.get("stress_type", "engineering")
+    mode = loading_mode(options.get("mode") or DEFAULT_MODE)
     axis, every = options.get("axis"), options.get("every", 1)
     if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
         raise InputError(
@@ -373,8 +385,10 @@ def checked_mode(options: ReadingOptions) -> LoadingMode:
             f"preload (--preload) does not go with loading mode '{mode.name}', where it does not say which stress "
             "carries it. Leave it out, and count stretches in the file from where the specimen is taut."
         )
-    if stress_type not in STRESS_TYPES:
-        raise InputError(f"stress_type must be one of {', '.join(STRESS_TYPES)}, not '{stress_type}'.")
+    for option, measures in (("strain_type", STRAIN_MEASURES), ("stress_type", STRESS_MEASURES)):
+        name = options.get(option)
+        if name is not None and name not in measures:
+            raise InputError(f"{option} must be one of {', '.join(measures)}, not '{name}'.")
     if axis is not None and axis not in AXES:
         raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
     if not isinstance(every, int) or every < 1:
@@ -394,12 +408,11 @@ def _measured(
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
-    stress_type, stress_unit = options.get("stress_type", "engineering"), options.get("stress_unit")
     stretches, loads, stretch_steps = [], [], []
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
         with about_stress(number, labels, mode):
             stretch, step = stretch_of(table, choice, deformation, load, size, *units)
-            stress = stress_of(table, choice, load, size, stress_type, stress_unit, options.get("force_unit"))
+            stress = stress_of(table, choice, load, size, options.get("stress_unit"), options.get("force_unit"))
         stretches.append(stretch)
         stretch_steps.append(step)
         loads.append(stress)
@@ -415,12 +428,17 @@ def _measured(
     return measured.with_step(*stretch_steps).with_step(*(load.source for load in loads)), loads
 
 
-def _points(mode: LoadingMode, measured: MeasuredRows) -> Column:
-    """Return the points of the mode: the stretch, or a column for each control."""
-    return np.ascontiguousarray(measured.stretch.T) if len(mode.controls) > 1 else measured.stretch[0]
+def _points(mode: LoadingMode, stretch: Column) -> Column:
+    """Return the points of the mode for stretches (k, n): the stretch, or a column for each control."""
+    return np.ascontiguousarray(stretch.T) if len(mode.controls) > 1 else stretch[0]
 
 
-def _from_cauchy(mode: LoadingMode, measured: MeasuredRows) -> MeasuredRows:
-    points = _points(mode, measured)
-    pairs = zip(mode.paths, measured.stress, strict=True)
-    return replace(measured, stress=np.stack([stress / path.cauchy_ratio(points) for path, stress in pairs]))
+def _stress_measure(table: Table, choices: Sequence[ColumnChoice]) -> StressMeasure:
+    """Return the measure of the stresses, which is one."""
+    types = list(dict.fromkeys(choice.stress_type for choice in choices))
+    if len(types) > 1:
+        raise InputError(
+            f"{table.file}: the stresses are of different types ({' and '.join(types)}). Give columns of one type "
+            "(--column stress=NAME --column stress2=NAME)."
+        )
+    return STRESS_MEASURES[types[0]]

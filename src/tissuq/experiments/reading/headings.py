@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES, StrainMeasure
+from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.units import BRACKETS, looks_like_unit
 
 __all__ = [
@@ -12,10 +15,10 @@ __all__ = [
     "DIMENSION_NAMES",
     "ROLES",
     "SET_NAMES",
-    "STRESS_NAMES",
     "Heading",
     "heading",
     "is_of_specimens",
+    "measure_in",
     "on_axis",
     "on_lettered_axis",
     "plain",
@@ -47,16 +50,31 @@ ROLES = {
         "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
         "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft"
     ),
-}
-"""Names of columns by their role, as :func:`plain` writes them; those of stresses depend on the kind of stress."""
-
-STRESS_NAMES = {
-    "engineering": _names(
-        "stress, engineering stress, nominal stress, tensile stress, compressive stress, shear stress, spannung, "
-        "druckspannung, schubspannung"
+    "stress": _names(
+        "stress, tensile stress, compressive stress, shear stress, spannung, druckspannung, schubspannung"
     ),
-    "cauchy": _names("stress, cauchy stress, true stress, shear stress, schubspannung"),
 }
+"""Names of columns by their role, as :func:`plain` writes them, without the words for a measure of strain or stress."""
+
+NOUNS = {
+    "strain": _names(
+        "axial strain, longitudinal strain, e, déformation, deformación, deformação, deformazione, rek, töjning, "
+        "tøyning, 应变, 應變, ひずみ, 歪み, 歪, 변형률"
+    ),
+    "stress": _names(
+        "axial stress, longitudinal stress, s, sigma, σ, contrainte, tensión, esfuerzo, tensão, tensione, sforzo, "
+        "spanning, spänning, 应力, 應力, 応力, 응력"
+    ),
+}
+"""Further names of strain and stress that are known as such beside a word for a measure of them."""
+MEASURES: dict[str, list[StrainMeasure] | list[StressMeasure]] = {
+    "strain": [measure for measure in STRAIN_MEASURES.values() if measure.stretch],
+    "shear": [measure for measure in STRAIN_MEASURES.values() if measure.shear],
+    "stress": list(STRESS_MEASURES.values()),
+}
+"""Measures of what columns of a role hold."""
+SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
+"""Words for a measure that no noun need follow."""
 CYCLE_NAMES = _names("cycle, cycles, cycle count, cycle number, total cycles, total cycle count, zyklus, zyklen")
 SET_NAMES = _names("setname, set name, set")
 """Names of the column in which parts of a test are named."""
@@ -85,6 +103,10 @@ DIMENSION_NAMES = {
 AXES = {"x": "x", "y": "y", "1": "x", "2": "y"}
 """Axes of a biaxial machine, by how columns name them."""
 
+MEASURE_IN_BRACKETS = re.compile(
+    rf"\s*[\[(]({'|'.join(measure.words for kind in MEASURES.values() for measure in kind)})[\])]", re.IGNORECASE
+)
+"""As in ``Strain (true) [%]``."""
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[({<](?P<unit>[^\])}>]*)[\])}>]?"),
     re.compile(r"(?P<quantity>[^/]+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
@@ -108,7 +130,7 @@ class Heading:
 
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = COPY.sub("", name.strip())
+    name = MEASURE_IN_BRACKETS.sub(r" \1", COPY.sub("", name.strip())).strip()
     matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
     suffix = UNIT_AS_SUFFIX.fullmatch(name)
     is_unit = suffix is not None and looks_like_unit(suffix["unit"])
@@ -125,9 +147,37 @@ def plain(name: str) -> str:
     return re.sub(r"[\s_-]+", " ", name).strip().lower()
 
 
-def role_names(role: str, stress_type: str = "engineering") -> frozenset[str]:
+def role_names(role: str) -> frozenset[str]:
     """Return the names that columns of a role may have."""
-    return STRESS_NAMES[stress_type] if role == "stress" else ROLES[role]
+    return ROLES[role]
+
+
+def measure_in(quantity: str) -> tuple[str, str]:
+    """Return what a column holds without the words for a measure of strain or stress, and the name of that measure.
+
+    Examples
+    --------
+    >>> measure_in("wahre dehnung"), measure_in("pk2"), measure_in("true stress x"), measure_in("stress")
+    (('dehnung', 'true'), ('stress', 'second-piola-kirchhoff'), ('stress x', 'cauchy'), ('stress', ''))
+    """
+    for role, measures in MEASURES.items():
+        for measure in measures:
+            match = _words(measure.words).search(quantity)
+            if not match:
+                continue
+            noun = plain(f"{quantity[: match.start()]} {quantity[match.end() :]}".replace("()", ""))
+            axis, name = on_axis(noun)
+            if name in ROLES[role]:
+                return noun, measure.name
+            if name in NOUNS.get(role, ()) or (not noun and SAYS_ALONE.fullmatch(match[0])):
+                return f"{role} {axis}".strip(), measure.name
+    return quantity, ""
+
+
+@cache
+def _words(words: str) -> re.Pattern[str]:
+    """Return the pattern of words, not within others; those that are not of Latin letters may be."""
+    return re.compile(rf"(?<![a-zß-ÿ])(?:{words})(?![a-zß-ÿ])")
 
 
 def is_of_specimens(quantity: str) -> bool:
@@ -151,7 +201,7 @@ def on_axis(quantity: str) -> tuple[str, str]:
     >>> on_axis("xforce"), on_axis("stress y"), on_axis("stretch 1"), on_axis("load")
     (('x', 'force'), ('y', 'stress'), ('x', 'stretch'), ('', 'load'))
     """
-    names = frozenset().union(*ROLES.values(), *STRESS_NAMES.values(), ["size"])
+    names = frozenset().union(*ROLES.values(), ["size"])
     for axis, name in ((quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())):
         if axis in AXES and name in names:
             return AXES[axis], name

@@ -114,8 +114,8 @@ class Inspection:
         roles = {}
         for label, choice in zip(self.reading.used.labels, self.reading.choices, strict=True):
             suffix = f" of {label}" if label else ""
-            roles[choice.stress] = f"{choice.load}{suffix}"
-            roles[choice.deformation] = choice.measure + suffix * has_several_controls
+            roles[choice.stress] = f"{_typed(choice.stress_type)}{choice.load}{suffix}"
+            roles[choice.deformation] = _typed(choice.strain_type) + choice.measure + suffix * has_several_controls
         for column in range(len(table.names)):
             yield f"{table.label(column)} {'is ' + roles[column] if column in roles else 'not read'}"
 
@@ -192,6 +192,11 @@ def noise_between_neighbours(stretch: Column, stress: Column) -> float | None:
     line = weight * stress[:-2][is_between] + (1 - weight) * stress[2:][is_between]
     residual = (stress[1:-1][is_between] - line) / np.sqrt(1 + weight**2 + (1 - weight) ** 2)
     return float(1.4826 * np.median(np.abs(residual)))
+
+
+def _typed(measure: str) -> str:
+    """Return the name of a measure of strain or stress before what it is of; nothing of the engineering one."""
+    return "" if measure == "engineering" else f"{measure} "
 
 
 def _span(lines: Sequence[int]) -> str:

@@ -12,8 +12,9 @@ from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, initial_size
 from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
 from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_lengths, check_positions
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.units import FORCE, LENGTH, Quantity, number_and_unit
+from tissuq.experiments.units import ANGLE, FORCE, LENGTH, Quantity, number_and_unit
 
 __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of"]
 
@@ -70,22 +71,31 @@ def stretch_of(
             "out, or name the column of displacements: --column displacement=NAME."
         )
     is_strain = choice.measure == "strain"
-    if not is_strain:
+    if not is_strain and choice.strain_type != "angle":
         _refuse(table, choice, "strain_unit", strain_unit)
     declared = _declared_unit(table, choice.deformation)
     if not is_strain and not units.looks_like_unit(declared):
         declared = ""
-    factor = _strain_factor(table, choice, declared, strain_unit)
-    label = table.label(choice.deformation)
-    scaled = "" if factor == 1 else f" x {factor:g}"
+    label, is_shear = table.label(choice.deformation), choice.measure == "shear"
+    if choice.strain_type == "angle":
+        factor, unit_source = _factor(table, choice.deformation, ANGLE, "strain_unit", strain_unit)
+        scaled = f" in {unit_source}"
+    else:
+        factor = _strain_factor(table, choice, declared, strain_unit)
+        scaled = "" if factor == 1 else f" x {factor:g}"
     if is_strain:
         has_unit = bool(declared or strain_unit)
         check_strain(table, choice, values * factor, load, has_unit=has_unit)
         is_doubtful = not has_unit and np.abs(values).max() > DOUBTFUL_STRAIN
-        assumed = f" {RATIO_ASSUMED}" if is_doubtful else ""
-        return 1 + values * factor, f"stretch = 1 + column {label}{scaled}{assumed}"
-    what = "amount of shear" if choice.measure == "shear" else "stretch"
-    return values * factor, f"{what} = column {label}{scaled}"
+        scaled += f" {RATIO_ASSUMED}" if is_doubtful else ""
+    elif not is_shear:
+        return values * factor, f"stretch = column {label}{scaled}"
+    try:
+        converted, formula = STRAIN_MEASURES[choice.strain_type].converted(values * factor, is_shear)
+    except InputError as error:
+        raise InputError(f"{table.place(choice.deformation)}: {error}") from error
+    what = "amount of shear" if is_shear else "stretch"
+    return converted, f"{what} = {formula.format(f'column {label}{scaled}')}"
 
 
 def stress_of(
@@ -93,7 +103,6 @@ def stress_of(
     choice: ColumnChoice,
     values: Column,
     dimensions: Dimensions,
-    stress_type: str,
     stress_unit: str | None,
     force_unit: str | None,
 ) -> Load:
@@ -106,7 +115,7 @@ def stress_of(
     """
     label = table.label(choice.stress)
     if choice.load == "force":
-        if stress_type != "engineering":
+        if choice.stress_type != "engineering":
             raise InputError(
                 f"{table.place(choice.stress)} holds forces, which over the undeformed cross-section are engineering "
                 "stress. Leave stress_type (--stress-type) out."
@@ -124,7 +133,7 @@ def stress_of(
             "Leave it out, or name the column of forces: --column force=NAME."
         )
     unit, unit_source = _stress_unit(table, choice, stress_unit, float(np.abs(values).max()))
-    return Load(values * unit.to_mpa, unit, f"{stress_type} stress from column {label} in {unit_source}")
+    return Load(values * unit.to_mpa, unit, f"{choice.stress_type} stress from column {label} in {unit_source}")
 
 
 def _from_displacement(

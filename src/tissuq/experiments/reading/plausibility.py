@@ -12,6 +12,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
 
 __all__ = [
@@ -70,11 +71,19 @@ def with_compression_negative(
         is_positive = float((measured.stress * strain).sum()) > 0
         stress = -measured.stress if is_positive else measured.stress
         what = f"signs of {choice.measure} and {choice.load}" if is_positive else f"sign of {choice.measure}"
-        return replace(measured, stretch=1 - strain, stress=stress).with_step(
+        return replace(measured, stretch=_of_other_sign(measured.stretch, choice), stress=stress).with_step(
             f"{what} changed: compression is positive"
         )
     stress = np.where(strain < 0, -measured.stress, measured.stress)
     return replace(measured, stress=stress).with_step("sign changed at stretch < 1")
+
+
+def _of_other_sign(stretch: Column, choice: ColumnChoice) -> Column:
+    """Return the stretches whose strains have the other sign, in the measure of the file."""
+    measure = STRAIN_MEASURES[choice.strain_type]
+    if measure.strain is None:
+        return stretch
+    return measure.converted(-measure.strain(stretch), is_shear=False)[0]
 
 
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:

@@ -6,7 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from tissuq.experiments.reading.columns import LENGTHENINGS, LOADS
-from tissuq.experiments.reading.headings import AXES, heading, is_of_specimens, on_lettered_axis, plain, role_names
+from tissuq.experiments.reading.headings import (
+    AXES,
+    heading,
+    is_of_specimens,
+    measure_in,
+    on_lettered_axis,
+    plain,
+    role_names,
+)
 from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
@@ -31,7 +39,7 @@ class _Role(NamedTuple):
     test: str
 
 
-def columns_side_by_side(table: Table, stress_type: str, *, is_shear: bool) -> list[ColumnsOfTest]:
+def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: bool) -> list[ColumnsOfTest]:
     """Return the columns of every test where a table has several beside one another; nothing where it has one.
 
     They are a stress or force for each test, and a deformation for each or one for all. Their names are the same, or
@@ -69,14 +77,16 @@ def _columns_of_first(candidates: Sequence[str], roles: Sequence[_Role]) -> tupl
     return "", []
 
 
-def _role(name: str, roles: Sequence[str], stress_type: str) -> _Role:
+def _role(name: str, roles: Sequence[str], stress_type: str | None) -> _Role:
     """Return which of some roles a column has by its name, and the test that the name tells."""
     quantity = heading(name).quantity
     if on_lettered_axis(quantity)[0]:
         return _Role("", "")
     for words, test in _parts(quantity):
+        quantity_alone, measure = measure_in(words)
         for role in roles:
-            if words in role_names(role, stress_type):
+            wanted = stress_type if role == "stress" else None
+            if quantity_alone in role_names(role) and measure in ("", wanted or "engineering"):
                 return _Role(role, test)
     return _Role("", "")
 

@@ -138,11 +138,11 @@ def _side_by_side(
     """Yield the tests whose columns stand beside one another; the table itself where it has those of one."""
     stated, source = mode_of(path, table, names)
     mode = checked_mode({**options, "mode": options.get("mode") or stated})
-    stress_type, columns = options.get("stress_type", "engineering"), options.get("columns")
+    stress_type, columns = options.get("stress_type"), options.get("columns")
     tests = [] if columns else columns_side_by_side(table, stress_type, is_shear=mode.controls == (SHEAR,))
     if not tests or len(mode.stresses) > 1:
         with about_mode(mode.name, GIVEN if options.get("mode") else source):
-            choose_columns(table, mode, columns, stress_type, options.get("axis"))
+            choose_columns(table, mode, columns, options.get("strain_type"), stress_type, options.get("axis"))
         yield table, path, options, names
         return
     for test in tests:

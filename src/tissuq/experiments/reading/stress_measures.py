@@ -1,0 +1,72 @@
+"""Measures of stress that files hold, a row of a registry each: its names, and the engineering stress for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes import LoadingMode
+
+__all__ = ["STRESS_MEASURES", "StressMeasure"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StressMeasure:
+    """A measure of stress.
+
+    Parameters
+    ----------
+    name : str
+        What ``stress_type`` calls it.
+    words : str
+        Regular expression of the words in a heading, in lower case, that say it.
+    engineering : callable, optional
+        The engineering stresses (k, n) for a loading mode, its points (n,) or (n, c), and stresses (k, n) of this
+        measure; none where they are the same.
+    step : str
+        How, in words.
+    is_of_file : bool
+        Whether stretches count from where they do in the file, and not from where a preload makes the specimen taut.
+    """
+
+    name: str
+    words: str
+    engineering: Callable[[LoadingMode, FloatArray, FloatArray], FloatArray] | None = None
+    step: str = ""
+    is_of_file: bool = False
+
+
+def _from_cauchy(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> FloatArray:
+    return np.asarray(stress / np.stack([path.cauchy_ratio(points) for path in mode.paths]))
+
+
+STRESS_MEASURES = {
+    measure.name: measure
+    for measure in (
+        StressMeasure(
+            name="engineering",
+            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|"
+            r"pk ?1|(1st|first|1\.) (pk|piola( kirchhoff)?)",
+        ),
+        StressMeasure(
+            name="cauchy",
+            words=r"cauchy|true|kirchhoff|wahre?[rs]?|vraie?|verdader[ao]|ver[ao]|verdadeir[ao]|werkelijke|真实|真實|真",
+            engineering=_from_cauchy,
+            step="Cauchy stress divided by stretch to engineering stress",
+        ),
+        StressMeasure(
+            name="second-piola-kirchhoff",
+            words=r"(2nd|second|2\.|zweite) (pk|piola( kirchhoff)?)|pk ?2|2 ?pk|pk ii",
+            engineering=lambda mode, points, stress: mode.from_second_piola_kirchhoff(points, stress),
+            step="second Piola-Kirchhoff stress times the deformation gradient to engineering stress",
+            is_of_file=True,
+        ),
+    )
+}
+"""Every measure of stress by its name: force over undeformed area P, over deformed area P F' and F^-1 P (no change of
+volume)."""
