@@ -36,7 +36,8 @@ OPTIONS: dict[str, Any] = {
         list[str] | None,
         typer.Option(
             help="ROLE=COLUMN for stretch, strain, displacement or length, and stress or force, such as "
-            "stretch=Strain; repeat. Of a second axis or stress: stretch2 ... force2."
+            "stretch=Strain; of the spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 "
+            "... sem2."
         ),
     ],
     "stress_unit": Annotated[
@@ -61,6 +62,12 @@ OPTIONS: dict[str, Any] = {
     "zero": Annotated[
         str | None,
         typer.Option(help="Value from which displacements are counted ('35.2 mm'), or first: that of the first row."),
+    ],
+    "mean_of": Annotated[
+        int | None,
+        typer.Option(
+            help="Number of specimens that the stresses are means of, for a column of standard deviations [the file's]."
+        ),
     ],
     "length": Annotated[
         str | None, typer.Option(help="Undeformed length, such as '20 mm' [the file's]; in mode biaxial that along x.")

@@ -36,6 +36,8 @@ class Curve:
         What the mode controls.
     stress : (n,) array, MPa
         Engineering stress.
+    standard_error : (n,) array, MPa
+        Of a stress that is the mean of several specimens; zero of one that is not.
     name, source, stress_unit, specimen : str
         Those of the test.
     """
@@ -44,6 +46,7 @@ class Curve:
     channel: int
     points: FloatArray
     stress: FloatArray
+    standard_error: FloatArray
     name: str
     source: str
     stress_unit: str
@@ -92,6 +95,9 @@ class Experiment:
     specimen : str
         Which specimen it was, where several tests are fitted together: those of one specimen share its errors of area
         and length. Without a name every test counts as one of a specimen of its own.
+    standard_error : array like ``stress``, in the same unit, optional
+        Standard errors of stresses that are means of several specimens. `tissuq.fit` takes them as the size of an error
+        that is smooth along the curve (`Tolerances`), as neighbouring points of a mean curve err alike.
 
     Attributes
     ----------
@@ -131,6 +137,7 @@ class Experiment:
         source: str = "",
         stress_unit: str | None = None,
         specimen: str = "",
+        standard_error: ArrayLike | None = None,
     ) -> None:
         mode = loading_mode(mode)
         values, unit = _in_mpa(stress, stress_unit)
@@ -140,9 +147,14 @@ class Experiment:
                 f"experiment '{name}': {len(points)} stretches but {len(stresses)} stresses; "
                 "give one stress for every stretch."
             )
-        columns = enumerate(stresses.reshape(len(stresses), -1).T)
+        errors = np.zeros_like(stresses)
+        if standard_error is not None:
+            errors = _checked("standard error", _in_mpa(standard_error, stress_unit)[0], mode.stresses)
+            if errors.shape != stresses.shape or (errors < 0).any():
+                raise InputError(f"experiment '{name}': give one standard error for every stress, none negative.")
+        columns = zip(stresses.reshape(len(stresses), -1).T, errors.reshape(len(stresses), -1).T, strict=True)
         labels = name, source, unit, specimen
-        curves = tuple(Curve(mode, channel, points, column, *labels) for channel, column in columns)
+        curves = tuple(Curve(mode, channel, points, *column, *labels) for channel, column in enumerate(columns))
         object.__setattr__(self, "curves", curves)
 
     @classmethod
@@ -256,6 +268,14 @@ class Experiment:
         columns = [curve.stress for curve in self._only_test]
         return columns[0] if len(columns) == 1 else np.column_stack(columns)
 
+    @cached_property
+    def standard_error(self) -> FloatArray:
+        """The standard error of every measured stress as the mean of several specimens (size,), curve by curve, MPa.
+
+        Zero where it is of one.
+        """
+        return np.concatenate([curve.standard_error for curve in self.curves])
+
     @property
     def _only_test(self) -> tuple[Curve, ...]:
         """The curves of the only test."""
@@ -298,8 +318,9 @@ class Experiment:
 
     def where(self, selected: NDArray[Any]) -> Experiment:
         """Return only some measurements of a test: a mask (n,), or numbers of its rows."""
+        columns = "points", "stress", "standard_error"
         curves = (
-            replace(curve, points=curve.points[selected], stress=curve.stress[selected]) for curve in self._only_test
+            replace(curve, **{name: getattr(curve, name)[selected] for name in columns}) for curve in self._only_test
         )
         return self._of_curves(curves)
 
@@ -329,10 +350,14 @@ class Experiment:
                 f"experiment '{experiment.name}' is {experiment.mode.name} and experiment '{self.name}' "
                 f"{self.mode.name}: only measurements in the same loading mode can be added."
             )
-        stretch, stress = (
-            np.concatenate(pair) for pair in ((self.stretch, experiment.stretch), (self.stress, experiment.stress))
+        columns = [
+            (test.stretch, test.stress, test.standard_error.reshape(test.stress.T.shape).T)
+            for test in (self, experiment)
+        ]
+        stretch, stress, error = map(np.concatenate, zip(*columns, strict=True))
+        joined = Experiment(
+            self.mode, stretch, stress, self.name, self.source, specimen=self.specimen, standard_error=error
         )
-        joined = Experiment(self.mode, stretch, stress, self.name, self.source, specimen=self.specimen)
         return joined.labelled(stress_unit=self.stress_unit)
 
 

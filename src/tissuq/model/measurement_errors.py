@@ -30,6 +30,8 @@ CORRELATION_SHARE = 1 / 3
 """Correlation length of a smooth error over the range of the strain of its test."""
 PROCESS_NODES = 12
 """Number of places along a test from which a smooth error is interpolated; its variance is right to 1e-6."""
+SHARE_DEGREE = 2
+"""Degree of the polynomial of the strain that a standard error over the stress is taken for."""
 MIN_NODE_EIGENVALUE = 1e-6
 """Eigenvalue, relative to the largest, below which a direction of the errors there is left out."""
 
@@ -49,6 +51,8 @@ class ErrorPoints:
         Of the stress along each control; zero where no error needs it.
     largest : float, MPa
         The largest stress of the test: that at these points, unless given.
+    standard_error : (..., n) array, MPa
+        Of stresses that are means of several specimens; zero of others.
     """
 
     mode: LoadingMode
@@ -56,6 +60,7 @@ class ErrorPoints:
     stress: FloatArray
     slope: FloatArray | float = 0.0
     largest: float | None = None
+    standard_error: FloatArray | float = 0.0
 
     def moved(self, displacement: FloatArray) -> Any:
         """Return what displacements of the controls, shaped as ``stretch``, add to the stresses, (..., n, c).
@@ -174,11 +179,54 @@ class SmoothError(MeasurementError):
     shared = "test"
 
     def effect(self, points: ErrorPoints) -> Any:
-        strain = points.stretch - points.mode.reference
-        distance = strain if strain.ndim == 1 else np.linalg.norm(strain, axis=1)
-        root = _process_root(distance, CORRELATION_SHARE * float(np.ptp(distance)))
-        stresses_of_mode = np.shape(points.stress)[-1] // len(distance)
-        return np.asarray(points.stress)[..., None] * np.kron(np.eye(stresses_of_mode), root)
+        return np.asarray(points.stress)[..., None] * _smooth_root(points)
+
+
+class MeanError(MeasurementError):
+    """Of the mean of several specimens, as large as the standard errors that its file states.
+
+    Half of its variance is that of one number times the standard error, the other half a process as of `SmoothError`:
+    specimens differ in stiffness, and in the shape of their curves. Independent from point to point, the standard
+    errors would tell as much more as there are points.
+
+    The standard errors are smoothed: they are taken as the stress times a parabola of the strain. What they scatter
+    about it belongs to the same specimens as what the stresses do, and would pull these to where it is small.
+    """
+
+    name = "mean"
+    description = "times the standard error of the mean, smooth along the curve"
+    shared = "test"
+
+    def effect(self, points: ErrorPoints) -> Any:
+        smooth = _smooth_root(points)
+        as_a_whole = np.ones((len(smooth), 1))
+        return _smooth_standard_error(points)[..., None] * np.sqrt(0.5) * np.hstack([as_a_whole, smooth])
+
+
+def _smooth_standard_error(points: ErrorPoints) -> FloatArray:
+    """Return the standard error (..., n) as the absolute stress times a parabola of the strain, for each stress."""
+    stress = np.abs(points.stress)
+    if not np.any(points.standard_error):
+        return np.zeros_like(stress)
+    strain = _distance(points)
+    powers = np.kron(np.eye(stress.shape[-1] // len(strain)), strain[:, None] ** np.arange(SHARE_DEGREE + 1))
+    columns = stress[..., None] * powers
+    shares, *_ = np.linalg.lstsq(columns, points.standard_error, rcond=None)
+    return np.asarray(np.maximum(columns @ shares, 0.0))
+
+
+def _smooth_root(points: ErrorPoints) -> FloatArray:
+    """Return a root (n, q) of the correlation of an error that is smooth along each stress of a test."""
+    distance = _distance(points)
+    root = _process_root(distance, CORRELATION_SHARE * float(np.ptp(distance)))
+    stresses_of_mode = np.shape(points.stress)[-1] // len(distance)
+    return np.asarray(np.kron(np.eye(stresses_of_mode), root))
+
+
+def _distance(points: ErrorPoints) -> FloatArray:
+    """Return the strain (n,) of points, or how far they are strained where the mode has several controls."""
+    strain = points.stretch - points.mode.reference
+    return np.asarray(strain if strain.ndim == 1 else np.linalg.norm(strain, axis=1))
 
 
 def _process_root(places: FloatArray, length: float) -> FloatArray:

@@ -117,6 +117,9 @@ class Tolerances:
         Of every single stretch: independent errors of the displacement, which count as noise where the curve is steep.
     resolution : float
         Relative to the largest stress of a test, of every single stress: resolution of the load cell, digits of a file.
+    mean : float
+        Of the mean of several specimens, times the standard errors of the data (`Experiment.standard_error`); smooth
+        along the curve. By default 1 where the data have them.
     **sizes : float
         Of further errors, such as a `MeasurementError` of your own, by their names.
 
@@ -304,7 +307,8 @@ class FittedErrors:
         for test in experiment.tests:
             part = slice(start, start + test.size)
             slope = 0.0 if self.slopes is None else self.slopes[part, : len(test.mode.controls)]
-            points.append(ErrorPoints(test.mode, test.stretch, self.curve[part], slope))
+            error = test.standard_error
+            points.append(ErrorPoints(test.mode, test.stretch, self.curve[part], slope, standard_error=error))
             start += test.size
         return points
 

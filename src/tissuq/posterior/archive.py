@@ -65,7 +65,8 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
             {
                 "stretch": (("point", "control")[: test.stretch.ndim], test.stretch, {"units": "1"}),
                 "stress": (("point", "stress_of_mode")[: test.stress.ndim], test.stress, {"units": "MPa"}),
-            },
+            }
+            | _standard_error_of(test),
             attrs={"mode": test.mode.name} | {label: getattr(test, label) for label in LABELS},
         )
     return groups
@@ -115,9 +116,18 @@ def _recorded_model(
     return model if model.priors == priors else replace(model, chosen_priors=priors)
 
 
+def _standard_error_of(test: Experiment) -> dict[str, Any]:
+    """Return the standard errors of a test as an array, where it has some."""
+    if not test.standard_error.any():
+        return {}
+    return {"standard_error": ("measurement", test.standard_error, {"units": "MPa"})}
+
+
 def _test(group: Group) -> Experiment:
     labels = {label: str(group.attrs[label]) for label in LABELS}
-    return Experiment(str(group.attrs["mode"]), group.arrays["stretch"], group.arrays["stress"]).labelled(**labels)
+    stretch, stress = group.arrays["stretch"], group.arrays["stress"]
+    error = group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T
+    return Experiment(str(group.attrs["mode"]), stretch, stress, standard_error=error).labelled(**labels)
 
 
 def _plain_noise(noise: Noise) -> str | float | list[float]:

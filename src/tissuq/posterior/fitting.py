@@ -15,10 +15,10 @@ from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.model.tolerances import ESTIMANDS, Tolerances
+from tissuq.model.tolerances import AS_TESTED, ESTIMANDS, Tolerances
 from tissuq.parameters.priors import Prior
 from tissuq.parameters.seeds import check_seed
-from tissuq.posterior.plug_in import default_tolerances
+from tissuq.posterior.plug_in import default_tolerances, with_standard_errors
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import METHODS, Method, Solver
 
@@ -73,7 +73,7 @@ def fit(
         ``Tolerances("specimen", slack=0)``. By default they are of the specimen, or where tests are of several, of the
         tissue; as tested where the noise of one test is known, or a discrepancy that is no energy alone takes up errors
         of the test. Unless they are stated as numbers, the spreads between specimens and tests are as large as several
-        tests tell.
+        tests tell. Standard errors of means that the data state are in all of them but ``"as-tested"``.
     method : str
         ``"exact"``: closed form and quadrature over at most three nonlinear parameters.
         ``"nuts"``: the linear parameters in closed form, the no-U-turn sampler over the others.
@@ -192,8 +192,11 @@ def fit_many(
 
     def model_of(data: Experiment) -> StatisticalModel:
         model = StatisticalModel(data, *options, tolerances or Tolerances())
-        if tolerances is None and (default := default_tolerances(model)):
-            model = replace(model, tolerances=default)
+        standard = default_tolerances(model) if tolerances is None else tolerances
+        if tolerances is None or tolerances.estimand not in ("", AS_TESTED):
+            standard = with_standard_errors(model, standard)
+        if standard.stated != model.tolerances.stated:
+            model = replace(model, tolerances=standard)
         if model.tolerances.has_standard_spreads:
             model = solver.with_spreads_of_tests(model)
         return solver.with_probable_noise(model)

@@ -15,13 +15,14 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, at_noise, with_known_noise
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.measurement_errors import MeanError
 from tissuq.model.noise import AutoregressiveNoise, UnknownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.statistics import CHUNK
-from tissuq.model.tolerances import BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
+from tissuq.model.tolerances import AS_TESTED, BETWEEN_SPECIMENS, SPECIMEN, TISSUE, Tolerances, specimens_of
 from tissuq.prediction.moments import level_of_errors, mean_curve_and_slopes
 
-__all__ = ["ErrorEstimates", "default_tolerances"]
+__all__ = ["ErrorEstimates", "default_tolerances", "with_standard_errors"]
 
 FloatArray = NDArray[np.float64]
 
@@ -262,6 +263,19 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
         return BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)
     is_told = len(model.experiment.tests) == 1 and (not model.noise.parameters or model.experiment.size > CHUNK)
     return Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
+
+
+def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tolerances:
+    """Return tolerances, the default ones or those of an estimand, with the standard errors that the data state.
+
+    The same where there are none, the noise is known or more than one number, or a discrepancy takes up such errors.
+    """
+    noise, sizes = model.noise, tolerances.stated
+    is_open = len(noise.parameters) == 1 and not (model.is_correlated or noise.shares_discrepancy)
+    if not is_open or MeanError.name in sizes or not model.experiment.standard_error.any():
+        return tolerances
+    estimand = "" if tolerances.estimand == AS_TESTED else tolerances.estimand
+    return Tolerances(estimand, **(sizes | {MeanError.name: 1.0}))
 
 
 def _have_one_path(experiment: Experiment) -> bool:

@@ -237,10 +237,12 @@ def write_data(folder: Path, experiment: Experiment, unit: StressUnit | None = N
     headers = ["test", "mode", "measured"] if len(experiment.curves) > 1 else []
     with (folder / "data.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*headers, "stretch", stress])
+        has_errors = bool(experiment.standard_error.any())
+        writer.writerow([*headers, "stretch", stress, *[stress.replace("stress", "standard_error")] * has_errors])
         for curve in experiment.curves:
             label_columns = map(repeat, (curve.name, curve.mode.name, curve.quantity)[: len(headers)])
-            values = curve.abscissa.tolist(), (curve.stress / to_mpa).tolist()
+            stresses = [curve.stress, *[curve.standard_error] * has_errors]
+            values = curve.abscissa.tolist(), *((column / to_mpa).tolist() for column in stresses)
             writer.writerows(zip(*label_columns, *values, strict=False))
 
 

@@ -33,6 +33,7 @@ class ReadingSettings(BaseModel):
     force_unit: str | None = None
     displacement_unit: str | None = None
     zero: str | None = None
+    mean_of: int | None = Field(None, ge=2)
     dimensions: dict[str, str] = Field(default_factory=dict)
     only: dict[str, str | int] = Field(default_factory=dict)
     compression_positive: bool = False

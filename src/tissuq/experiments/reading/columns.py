@@ -16,20 +16,32 @@ from tissuq.experiments.reading.headings import (
     DIMENSION_NAMES,
     heading,
     measure_in,
+    of_spread,
     on_axis,
     plain,
     role_names,
+    without_mean,
 )
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import measured_in
 
-__all__ = ["DEFORMATIONS", "LOADS", "ColumnChoice", "about_stress", "choose_columns", "find_column"]
+__all__ = [
+    "DEFORMATIONS",
+    "LOADS",
+    "ColumnChoice",
+    "about_stress",
+    "choose_columns",
+    "find_column",
+    "mapping_of_each_stress",
+]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 DEFORMATIONS = (*LENGTHENINGS, "shear")
 LOADS = ("stress", "force")
+SPREAD_ROLES = ("sem", "sd", "n")
+"""Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
 DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement"}
 """What a column is that alone has such a unit."""
 NOT_ENGINEERING = re.compile(r"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){2})?$)|true|cauchy|piola|kirchhoff")
@@ -135,7 +147,7 @@ def choose_columns(
     count, is_shear = len(mode.stresses), mode.controls == (SHEAR,)
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
-    mappings = _mapping_of_each_stress(mode, mapping)
+    mappings = mapping_of_each_stress(mode, mapping)
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
     if not is_of_axes and not all(_has_roles(mode, roles) for roles in mappings[1:]):
         raise _roles_missing(table, mode)
@@ -192,18 +204,25 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
 
 def _axes_of(table: Table) -> list[str]:
     """Return the axes (x, y) of which the table has columns."""
-    return sorted({axis for axis, _ in map(_contents_of, table.names) if axis})
+    return sorted({axis for axis, _ in (on_axis(name) for name, _ in _names(table)) if axis})
 
 
-def _contents_of(name: str) -> tuple[str, str]:
-    """Return the axis that a column belongs to, and what its name says it holds without words for a measure."""
-    return on_axis(measure_in(heading(name).quantity)[0])
+def _names(table: Table) -> list[tuple[str, str]]:
+    """Return what the columns' names say they hold, and the measure of strain or stress; empty texts of spreads.
+
+    Beside columns of a spread without words for a mean.
+    """
+    quantities = [heading(name).quantity for name in table.names]
+    is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]
+    if any(is_spread):
+        quantities = [without_mean(quantity) or quantity for quantity in quantities]
+    return [("", "") if of_spread else measure_in(name) for name, of_spread in zip(quantities, is_spread, strict=True)]
 
 
-def _mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
+def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:
     """Return the roles of every stress: those of the second end in 2; with one control it has only a stress."""
     mappings = [dict(mapping or {})]
-    roles = (*DEFORMATIONS, *LOADS) if len(mode.controls) > 1 else ("stress",)
+    roles = (*(DEFORMATIONS + LOADS if len(mode.controls) > 1 else ("stress",)), *SPREAD_ROLES)
     for number in range(2, len(mode.stresses) + 1):
         numbered = [role for role in roles if f"{role}{number}" in mappings[0]]
         mappings.append({role: mappings[0].pop(f"{role}{number}") for role in numbered})
@@ -224,7 +243,7 @@ def _choice(
 ) -> ColumnChoice:
     """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
     _check_roles(table, mapping, is_shear)
-    contents = _Contents(_quantities(table, axis, mapping), _measures(table), *types)
+    contents = _Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
         stress = find_column(table, load, mapping[load])
@@ -258,7 +277,7 @@ def _choice(
 
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
-    names, axes = list(map(_contents_of, table.names)), _axes_of(table)
+    names, axes = [on_axis(name) for name, _ in _names(table)], _axes_of(table)
     if axis is not None and axis not in axes:
         raise InputError(
             f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
@@ -274,7 +293,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
 
 
 def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:
-    unknown = [role for role in mapping if role not in DEFORMATIONS + LOADS]
+    unknown = [role for role in mapping if role not in DEFORMATIONS + LOADS + SPREAD_ROLES]
     if unknown:
         raise InputError(
             f"{table.file}: a column cannot be given as '{unknown[0]}'. Give stretch, strain, displacement or length, "
@@ -290,11 +309,6 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
     if unfit:
         deformation = "an amount of shear" if is_shear else "a stretch, strain, displacement or length"
         raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
-
-
-def _measures(table: Table) -> list[str]:
-    """Return the measures of strain or stress that the columns' names say; empty texts where they say none."""
-    return [measure_in(heading(name).quantity)[1] for name in table.names]
 
 
 def _told_by_unit(

@@ -16,7 +16,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns
+from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns, mapping_of_each_stress
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
@@ -25,6 +25,7 @@ from tissuq.experiments.reading.measures import Load, stress_of, stretch_of
 from tissuq.experiments.reading.options import spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
+from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_mode import DEFAULT_MODE, GIVEN, about_mode, mode_of
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
@@ -59,6 +60,7 @@ class ReadingOptions(TypedDict, total=False):
     force_unit: str | None
     displacement_unit: str | None
     zero: str | None
+    mean_of: int | None
     dimensions: Mapping[str, str] | None
     only: Mapping[str, str | int] | None
     compression_positive: bool
@@ -120,6 +122,8 @@ class Reading:
     warnings : tuple of str
     mode_source : str
         Where the loading mode comes from.
+    spreads : tuple of Spread
+        Standard errors of each stress, where it is the mean of several specimens.
     """
 
     experiment: Experiment
@@ -130,6 +134,7 @@ class Reading:
     cycles: tuple[Cycle, ...]
     warnings: tuple[str, ...]
     mode_source: str = ""
+    spreads: tuple[Spread, ...] = ()
 
     @cached_property
     def used_cycles(self) -> list[Cycle]:
@@ -184,6 +189,9 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         From which value displacements are counted, such as ``35.2 mm``, or ``first`` for that of the first row: there
         the specimen has its undeformed length. Without it from 0, or from the first row where
         they begin away from 0 with little load.
+    mean_of : int, optional
+        Of how many specimens the stresses are means; without it the file's column ``n``. Standard errors of the
+        experiment come from a column of them (``sem``), or of standard deviations (``sd``) of so many specimens.
     dimensions : mapping, optional
         Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
         Without it those in the lines above the table. Only displacements and forces need them. In the mode
@@ -323,13 +331,13 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     choices = tuple(labelled_choices.values())
     dimensions = dimensions_of(table, options.get("dimensions"))
     try:
-        measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
+        measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
     except InputError:
         columns = dict.fromkeys(column for choice in choices for column in (choice.deformation, choice.stress))
         if (complete := table.without_missing(list(columns))) is table:
             raise
         table = complete
-        measured, loads = _measured(table, mode, labelled_choices, dimensions, options)
+        measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
     check_one_specimen(table, choices, measured.course)
     recorded = with_compression_negative(measured, choices, is_positive)
     cycles = find_cycles(table, recorded.course)
@@ -344,7 +352,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
         recorded, used = (
-            replace(measured, stress=stress_measure.engineering(mode, _points(mode, stretch), measured.stress))
+            _converted(mode, stress_measure, measured, _points(mode, stretch))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
         )
         if any(choice.measure != "shear" for choice in choices) or stress_measure.is_of_file:
@@ -358,12 +366,14 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     experiment = Experiment(
         mode=mode,
         stretch=_points(mode, used.stretch),
-        stress=np.ascontiguousarray(used.stress.T) if len(used.stress) > 1 else used.stress[0],
+        stress=_of_stresses(used.stress),
+        standard_error=_of_stresses(used.standard_error),
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
     ).labelled(stress_unit=loads[0].unit.name)
-    warnings_of_file = (*table.notes, *dimensions.warnings)
-    return Reading(experiment, table, choices, recorded, used, tuple(cycles), warnings_of_file, mode_source)
+    problems = (spread.problem for spread in spreads if spread.problem)
+    warnings_of_file = *table.notes, *dimensions.warnings, *problems
+    return Reading(experiment, table, choices, recorded, used, tuple(cycles), warnings_of_file, mode_source, spreads)
 
 
 def checked_mode(options: ReadingOptions) -> LoadingMode:
@@ -391,6 +401,9 @@ def checked_mode(options: ReadingOptions) -> LoadingMode:
             raise InputError(f"{option} must be one of {', '.join(measures)}, not '{name}'.")
     if axis is not None and axis not in AXES:
         raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
+    mean_of = options.get("mean_of")
+    if mean_of is not None and (not isinstance(mean_of, int) or mean_of < 2):
+        raise InputError(f"mean_of (--mean-of) must be a number of specimens, 2 or more, not {mean_of!r}.")
     if not isinstance(every, int) or every < 1:
         raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
     return mode
@@ -402,17 +415,19 @@ def _measured(
     choices: Mapping[str, ColumnChoice],
     dimensions: Dimensions,
     options: ReadingOptions,
-) -> tuple[MeasuredRows, list[Load]]:
-    """Return every row as stretch and stress of the kind that the file gives, and how each stress was obtained."""
+) -> tuple[MeasuredRows, list[Load], tuple[Spread, ...]]:
+    """Return every row as stretch and stress of the kind that the file gives, each stress, and its standard errors."""
     labels, columns = tuple(choices), list(choices.values())
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
-    stretches, loads, stretch_steps = [], [], []
+    stretches, loads, stretch_steps, spreads = [], [], [], []
+    mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
         with about_stress(number, labels, mode):
             stretch, step = stretch_of(table, choice, deformation, load, size, *units)
             stress = stress_of(table, choice, load, size, options.get("stress_unit"), options.get("force_unit"))
+            spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
         stretches.append(stretch)
         stretch_steps.append(step)
         loads.append(stress)
@@ -421,16 +436,33 @@ def _measured(
         rows=np.arange(len(table.rows)),
         stretch=np.stack(stretches),
         stress=np.stack([load.stress for load in loads]),
+        standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
         labels=labels,
     )
     for name, value in (options.get("only") or {}).items():
         measured = measured.with_step(f"only rows with '{value}' in column '{name}'")
-    return measured.with_step(*stretch_steps).with_step(*(load.source for load in loads)), loads
+    measured = measured.with_step(*stretch_steps).with_step(*(load.source for load in loads))
+    if any(spread.source for spread in spreads):
+        measured = measured.with_step(*(spread.source for spread in spreads))
+    return measured, loads, tuple(spreads)
+
+
+def _of_stresses(columns: Column) -> Column:
+    """Return columns (k, n) of the stresses as an experiment takes them."""
+    return np.ascontiguousarray(columns.T) if len(columns) > 1 else columns[0]
 
 
 def _points(mode: LoadingMode, stretch: Column) -> Column:
     """Return the points of the mode for stretches (k, n): the stretch, or a column for each control."""
     return np.ascontiguousarray(stretch.T) if len(mode.controls) > 1 else stretch[0]
+
+
+def _converted(mode: LoadingMode, measure: StressMeasure, measured: MeasuredRows, points: Column) -> MeasuredRows:
+    """Return rows whose stresses of a measure, and their standard errors, are engineering ones."""
+    if measure.engineering is None:
+        return measured
+    stress, error = (measure.engineering(mode, points, each) for each in (measured.stress, measured.standard_error))
+    return replace(measured, stress=stress, standard_error=np.abs(error))
 
 
 def _stress_measure(table: Table, choices: Sequence[ColumnChoice]) -> StressMeasure:

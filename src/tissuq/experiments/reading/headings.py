@@ -15,14 +15,18 @@ __all__ = [
     "DIMENSION_NAMES",
     "ROLES",
     "SET_NAMES",
+    "SPREADS",
     "Heading",
     "heading",
+    "is_of_count",
     "is_of_specimens",
     "measure_in",
+    "of_spread",
     "on_axis",
     "on_lettered_axis",
     "plain",
     "role_names",
+    "without_mean",
 ]
 
 
@@ -75,6 +79,22 @@ MEASURES: dict[str, list[StrainMeasure] | list[StressMeasure]] = {
 """Measures of what columns of a role hold."""
 SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
 """Words for a measure that no noun need follow."""
+SPREADS = {"sem": "standard error", "sd": "standard deviation"}
+"""What columns beside a mean may hold, by their roles."""
+SPREAD_WORDS = {
+    "sem": r"sem|s\.e\.m\.?|se|std\.? ?err(or)?|stderr|standard error|standardfehler|erreur type|error est[áa]ndar|"
+    r"errore standard|erro padr[ãa]o|标准误差?|標準誤差?",
+    "sd": r"sd|s\.d\.?|std\.? ?dev(iation)?\.?|std\.?|stdev\.?|st\.? ?dev\.?|standard deviation|standardabweichung|"
+    r"stabw\.?|[ée]cart type|desviaci[óo]n (est[áa]ndar|t[íi]pica)|deviazione standard|desvio padr[ãa]o|标准差|"
+    r"標準偏差",
+    "open": r"±|\+/|^\+$|error|err|fehler|uncertainty",
+}
+"""Words for them, and those that leave open which it is."""
+MEAN_WORDS = r"mean|average|avg\.?|averaged|mittelwert|mittlere[rs]?|moyenne?|media|medio|promedio|m[ée]dia|平均"
+COUNT_NAMES = re.compile(
+    r"n|count|sample size|(number|no\.?|#) of (specimens|samples|tests)|specimens|samples|anzahl( proben)?"
+)
+"""Names of a column that tells of how many specimens a mean is."""
 CYCLE_NAMES = _names("cycle, cycles, cycle count, cycle number, total cycles, total cycle count, zyklus, zyklen")
 SET_NAMES = _names("setname, set name, set")
 """Names of the column in which parts of a test are named."""
@@ -172,6 +192,32 @@ def measure_in(quantity: str) -> tuple[str, str]:
             if name in NOUNS.get(role, ()) or (not noun and SAYS_ALONE.fullmatch(match[0])):
                 return f"{role} {axis}".strip(), measure.name
     return quantity, ""
+
+
+def of_spread(quantity: str) -> tuple[str, str]:
+    """Return what a column holds beside a mean, ``sem``, ``sd`` or ``open``, and of what; empty texts for others.
+
+    Examples
+    --------
+    >>> of_spread("stress std dev"), of_spread("sem"), of_spread("±"), of_spread("stress")
+    (('sd', 'stress'), ('sem', ''), ('open', ''), ('', ''))
+    """
+    for kind, words in SPREAD_WORDS.items():
+        match = _words(words).search(quantity)
+        if match:
+            noun = without_mean(f"{quantity[: match.start()]} {quantity[match.end() :]}")
+            return kind, plain(re.sub(r"\bof( the)?\b", " ", noun))
+    return "", ""
+
+
+def without_mean(quantity: str) -> str:
+    """Return what a column holds without words for a mean."""
+    return plain(_words(MEAN_WORDS).sub(" ", quantity))
+
+
+def is_of_count(quantity: str) -> bool:
+    """Tell whether a column of that name tells of how many specimens a mean is."""
+    return COUNT_NAMES.fullmatch(quantity) is not None
 
 
 @cache

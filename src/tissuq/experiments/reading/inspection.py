@@ -12,6 +12,7 @@ import numpy as np
 from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 from tissuq.experiments.reading.experiment_file import PythonOptions, Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.headings import SPREADS
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import stress_unit
@@ -97,6 +98,11 @@ class Inspection:
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
         yield "stretch", f"{spans['stretch']}{again}"
         yield "stress", f"{spans['stress']} (engineering stress, tension positive)"
+        if used.standard_error.any():
+            pairs = zip(used.standard_error, used.stress, strict=True)
+            shares = [float(np.sqrt((error**2).mean() / (stress**2).mean())) for error, stress in pairs]
+            words = [f"{share:.2g} of the stress" if share else "" for share in shares]
+            yield "error", f"{'; '.join(labelled(used.labels, words))} (standard error of the mean)"
         noise = [self._noise(sd, stress) for sd, stress in zip(self.noise_sds, used.stress, strict=True)]
         yield "noise", "; ".join(labelled(used.labels, noise))
 
@@ -112,6 +118,9 @@ class Inspection:
         table = self.reading.table
         has_several_controls = len(self.reading.experiment.mode.controls) > 1
         roles = {}
+        for spread in self.reading.spreads:
+            if spread.column is not None and not spread.problem:
+                roles[spread.column] = f"{SPREADS[spread.kind]} of the stress"
         for label, choice in zip(self.reading.used.labels, self.reading.choices, strict=True):
             suffix = f" of {label}" if label else ""
             roles[choice.stress] = f"{_typed(choice.stress_type)}{choice.load}{suffix}"

@@ -36,6 +36,8 @@ class MeasuredRows:
     stretch : (k, n) array, dimensionless
         That along the axis of each stress, or the amount of shear.
     stress : (k, n) array, MPa
+    standard_error : (k, n) array, MPa
+        Of stresses that are means of several specimens; zero of others.
     labels : tuple of k str
         What the stresses are called; an empty text where there is one.
     steps : tuple of str
@@ -47,6 +49,7 @@ class MeasuredRows:
     rows: NDArray[np.intp]
     stretch: Column
     stress: Column
+    standard_error: Column
     labels: tuple[str, ...] = ("",)
     steps: tuple[str, ...] = ()
     dropped: tuple[Dropped, ...] = ()
@@ -75,8 +78,8 @@ class MeasuredRows:
         """Return some of the rows, in their order."""
         if len(rows) == len(self):
             return self
-        stretch, stress = self.stretch[:, rows], self.stress[:, rows]
-        return replace(self, table=self.table.taken(rows), rows=self.rows[rows], stretch=stretch, stress=stress)
+        columns = {name: getattr(self, name)[:, rows] for name in ("stretch", "stress", "standard_error")}
+        return replace(self, table=self.table.taken(rows), rows=self.rows[rows], **columns)
 
     def kept(self, rows: NDArray[np.intp], reason: str) -> MeasuredRows:
         """Return some of the rows, the others dropped for a reason."""

@@ -29,13 +29,15 @@ LARGEST_ASSUMED_STRESS = 100.0
 class Load:
     """The stress (MPa), the unit in which people want to read it, and how it was obtained.
 
-    ``area`` (mm²) is that by which forces were divided; None where the file gives stresses.
+    ``area`` (mm²) is that by which forces were divided; None where the file gives stresses. ``scale`` is what one unit
+    of the column is in MPa.
     """
 
     stress: Column
     unit: units.StressUnit
     source: str
     area: float | None = None
+    scale: float = 1.0
 
 
 def stretch_of(
@@ -124,7 +126,7 @@ def stress_of(
         area = dimensions.area
         source = f"engineering stress = column {label} in {unit_source} / {area.value:g} mm2 ({area.source})"
         shown = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES)
-        return Load(values * factor / area.value, shown, source, area.value)
+        return Load(values * factor / area.value, shown, source, area.value, factor / area.value)
     sections = sorted(dimensions.set_by_user - {"length"})
     if sections or force_unit is not None:
         unneeded = sections[0] if sections else "force_unit"
@@ -133,7 +135,8 @@ def stress_of(
             "Leave it out, or name the column of forces: --column force=NAME."
         )
     unit, unit_source = _stress_unit(table, choice, stress_unit, float(np.abs(values).max()))
-    return Load(values * unit.to_mpa, unit, f"{choice.stress_type} stress from column {label} in {unit_source}")
+    source = f"{choice.stress_type} stress from column {label} in {unit_source}"
+    return Load(values * unit.to_mpa, unit, source, scale=unit.to_mpa)
 
 
 def _from_displacement(

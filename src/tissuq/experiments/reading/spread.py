@@ -1,0 +1,172 @@
+"""Standard deviations and errors beside the mean stress of several specimens: their columns, and the error of that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import ndtri, stdtrit
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.columns import ColumnChoice, find_column
+from tissuq.experiments.reading.headings import SPREADS, heading, is_of_count, of_spread, role_names
+from tissuq.experiments.reading.measures import Load
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.units import FORCE, measured_in, stress_unit
+
+__all__ = ["Spread", "spread_of"]
+
+UPPER = 0.975
+"""Upper end of an interval of 95 %."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Standard errors (n,) of the mean stress, MPa, their column, what that holds, and how they were obtained.
+
+    ``problem`` says why a column is not used; where there is none, ``column`` is None.
+    """
+
+    column: int | None = None
+    kind: str = ""
+    standard_error: Column | None = None
+    source: str = ""
+    problem: str = ""
+
+    def standard_errors(self, count: int) -> Column:
+        """Return the standard errors of so many rows, zero where there are none."""
+        return np.zeros(count) if self.standard_error is None else self.standard_error
+
+
+def spread_of(
+    table: Table, choice: ColumnChoice, mapping: Mapping[str, str | int], load: Load, mean_of: int | None
+) -> Spread:
+    """Return the standard errors of a column of stresses that are means of several specimens.
+
+    A column of standard errors goes before one of standard deviations, which over sqrt(n) are standard errors. Those of
+    n specimens are themselves uncertain: they are multiplied by the 97.5 % quantile of Student's t with n - 1 degrees
+    of freedom over that of the normal distribution, so that normal errors of this size are as wide. A column that is
+    known by its name and cannot be used is passed over, with the problem.
+
+    Parameters
+    ----------
+    table : Table
+    choice : ColumnChoice
+        The stress, and what it is drawn against.
+    mapping : mapping
+        From the roles ``sem``, ``sd`` and ``n`` to columns that are given.
+    load : Load
+    mean_of : int, optional
+        The number of specimens.
+
+    Raises
+    ------
+    InputError
+        When a column that is given cannot be used.
+    """
+    given = next((kind for kind in SPREADS if kind in mapping), None)
+    if given:
+        column = find_column(table, given, mapping[given])
+        return _with_errors(table, choice, Spread(column, given), mapping, load, mean_of)
+    spread = _recognised(table, choice)
+    if spread.column is None and mean_of is not None:
+        raise InputError(
+            f"{table.file}: mean_of={mean_of} (--mean-of) is for standard deviations beside a mean, and no column is "
+            "recognised as such. Say which it is (--column sd=NAME), or leave it out."
+        )
+    if spread.column is None or spread.problem:
+        return spread
+    try:
+        return _with_errors(table, choice, spread, mapping, load, mean_of)
+    except InputError as error:
+        return replace(spread, problem=f"{error} So the column is not used.")
+
+
+def _recognised(table: Table, choice: ColumnChoice) -> Spread:
+    """Return the column whose name says that it is of the spread of the stresses: of several the next to the right."""
+    found: dict[str, list[int]] = {}
+    for column, name in enumerate(table.names):
+        kind, of_what = of_spread(heading(name).quantity)
+        in_heading, beneath = table.stated_units(column)
+        is_of_load = measured_in(beneath or in_heading) in ("", choice.load) and of_what in (
+            "",
+            *role_names(choice.load),
+        )
+        if kind and is_of_load and not table.is_constant(column):
+            found.setdefault(kind, []).append(column)
+    for kind in (*SPREADS, ""):
+        columns = found.get(kind or "open", [])
+        following = [column for column in columns if column > choice.stress]
+        if columns:
+            column = min(following or columns)
+            label, key = table.label(column), table.key(column)
+            problem = (
+                f"column {label} may hold standard deviations or standard errors of the stress, and is not used. Say "
+                f"which: --column 'sem={key}', or --column 'sd={key}' with the number of specimens (--mean-of 6)."
+            )
+            return Spread(column, kind, problem="" if kind else problem)
+    return Spread()
+
+
+def _with_errors(
+    table: Table,
+    choice: ColumnChoice,
+    spread: Spread,
+    mapping: Mapping[str, str | int],
+    load: Load,
+    mean_of: int | None,
+) -> Spread:
+    """Return the spread with its standard errors."""
+    column = spread.column or 0
+    label, (values,) = table.label(column), table.numbers([column])
+    if (values < 0).any():
+        row = int(np.argmax(values < 0))
+        raise InputError(
+            f"{table.place(column, row)}: {values[row]:g} is negative, which no {SPREADS[spread.kind]} is."
+        )
+    count, count_source = _count(table, mapping, mean_of)
+    scale, unit_source = _scale(table, choice, column, load)
+    source = f"standard error of the mean = column {label} in {unit_source}"
+    if count is not None:
+        of_sd = np.sqrt(count) if spread.kind == "sd" else 1.0
+        values = values / of_sd * stdtrit(count - 1, UPPER) / ndtri(UPPER)
+        over = " / sqrt(n)" if spread.kind == "sd" else ""
+        source += f"{over} x t(n - 1)/1.96 (Student's t at 97.5 %), n = {count_source}"
+    elif spread.kind == "sd":
+        raise InputError(
+            f"{table.place(column)} is taken for standard deviations between specimens. How far their mean may be off "
+            "is the standard error, sd / sqrt(n): give the number of specimens (--mean-of 6), or if these are standard "
+            f"errors --column 'sem={table.key(column)}'."
+        )
+    return replace(spread, standard_error=values * scale, source=source)
+
+
+def _count(table: Table, mapping: Mapping[str, str | int], mean_of: int | None) -> tuple[Column | None, str]:
+    """Return the number of specimens in every row, or of all, and where it comes from; None where nobody says it."""
+    if mean_of is not None:
+        return np.array(float(mean_of)), f"{mean_of} (as given)"
+    columns = [column for column, name in enumerate(table.names) if is_of_count(heading(name).quantity)]
+    if "n" in mapping:
+        columns = [find_column(table, "n", mapping["n"])]
+    if len(columns) != 1:
+        return None, ""
+    (counts,) = table.numbers(columns)
+    is_count = bool((counts == np.round(counts)).all() and counts.min() >= 2)
+    is_number_of_row = len(counts) > 1 and bool((np.diff(counts) == 1).all())
+    if not is_count or is_number_of_row:
+        if "n" in mapping:
+            raise InputError(f"{table.place(columns[0])} holds no numbers of specimens, which are 2 or more.")
+        return None, ""
+    return counts, f"column {table.label(columns[0])}"
+
+
+def _scale(table: Table, choice: ColumnChoice, column: int, load: Load) -> tuple[float, str]:
+    """Return what one unit of a column of spreads is in MPa, and where its unit comes from."""
+    in_heading, beneath = table.stated_units(column)
+    unit = beneath or in_heading
+    if measured_in(unit) != choice.load:
+        return load.scale, f"the unit of {table.label(choice.stress)}"
+    if load.area is not None:
+        return FORCE.factor(unit) / load.area, f"{unit} / {load.area:g} mm2"
+    return stress_unit(unit).to_mpa, f"{unit} (from the file)"
