@@ -133,7 +133,7 @@ def test_what_cannot_be_a_height_is_refused(tmp_path, rows, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"zero": "35.2"}, "zero must be 'first', or a position with its unit"),
+        ({"zero": "35.2"}, "zero must be 'first', or a length with its unit"),
         ({"zero": "1 N"}, "'N' is not a unit of length"),
         ({"zero": "first", "columns": {"length": 1}}, "read as length, but zero='first' is given"),
     ],

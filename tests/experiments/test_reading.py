@@ -238,7 +238,7 @@ def test_a_strain_given_as_stretch_is_answered_with_how_to_say_it(written):
         ({"stress": 0}, "no column '0'"),
         ({"strain": 1, "stretch": 1}, "both stretch and strain"),
         ({"strain": 2, "stress": 2}, "cannot be both strain and stress"),
-        ({"torque": "Stress"}, "cannot be given as 'torque'"),
+        ({"energy": "Stress"}, "cannot be given as 'energy'"),
         ({"force": 2, "stress": 3}, "both stress and force"),
     ],
 )
@@ -297,7 +297,7 @@ def test_a_heading_with_millipascal_is_asked_about(written):
         ),
         (
             {"stress_type": "Kirchhoff"},
-            "stress_type must be one of engineering, cauchy, second-piola-kirchhoff, not 'Kirchhoff'",
+            "stress_type must be one of engineering, cauchy, second-piola-kirchhoff, torsion, not 'Kirchhoff'",
         ),
         ({"compression_positive": True}, "the stress is already negative in the file"),
         ({"skip_rows": -1}, "skip_rows must be a number of lines"),

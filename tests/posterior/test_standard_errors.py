@@ -59,7 +59,7 @@ def test_a_posterior_keeps_them_in_its_file(tmp_path):
 
 
 def test_intervals_of_a_mean_of_four_specimens_hold_the_mean_of_all():
-    """With the standard errors in 91 to 95 %, without them in 52 to 65 %: either bound fails once in a thousand times."""
+    """With the standard errors in 91 % at least, without them in 65 % at most: a bound fails in less than 3 %."""
     random, held = np.random.default_rng(5), np.zeros(2)
     for _ in range(40):
         moduli = 0.05 * np.exp(0.3 * random.standard_normal(4) - 0.045)
@@ -70,5 +70,5 @@ def test_intervals_of_a_mean_of_four_specimens_hold_the_mean_of_all():
         for number, known in enumerate((error, None)):
             low, high = fitted(curves.mean(axis=0), known).summary().loc["C10", ["hdi_low", "hdi_high"]]
             held[number] += low < 0.05 < high
-    assert held[0] >= 33
-    assert held[1] <= 33
+    assert held[0] >= 32
+    assert held[1] <= 31

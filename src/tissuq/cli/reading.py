@@ -35,9 +35,9 @@ OPTIONS: dict[str, Any] = {
     "column": Annotated[
         list[str] | None,
         typer.Option(
-            help="ROLE=COLUMN for stretch, strain, displacement or length, and stress or force, such as "
-            "stretch=Strain; of the spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 "
-            "... sem2."
+            help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, "
+            "such as stretch=Strain; of the spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: "
+            "stretch2 ... sem2."
         ),
     ],
     "stress_unit": Annotated[
@@ -47,7 +47,8 @@ OPTIONS: dict[str, Any] = {
     "stress_type": Annotated[
         str | None,
         typer.Option(
-            help="engineering, cauchy (true) or second-piola-kirchhoff [what the column's name says, or engineering]."
+            help="engineering, cauchy (true), second-piola-kirchhoff, or torsion (as rheometers state it for a disc) "
+            "[what the column's name says, or engineering]."
         ),
     ],
     "strain_type": Annotated[

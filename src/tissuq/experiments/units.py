@@ -22,6 +22,7 @@ __all__ = [
     "LENGTH",
     "MASSES",
     "NUMBER",
+    "TORQUE",
     "Quantity",
     "StressUnit",
     "headed",
@@ -75,6 +76,7 @@ SYMBOLS = (
     | {"bar", "mbar", "atm"}
     | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
     | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
+    | {"Nm", "mNm", "uNm", "nNm", "kNm", "Ncm", "mNcm", "Nmm", "mNmm"}
     | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
 )
 
@@ -204,10 +206,12 @@ class Quantity:
     name: str
     unit: str
     factors: Mapping[str, float]
+    ignored: str = r"[\s^]"
+    """What may stand within a unit."""
 
     def factor_or_none(self, text: str) -> float | None:
         """Return what one unit of that name is in the unit of this quantity; None for other quantities."""
-        return self.factors.get(re.sub(r"[\s^]", "", text).replace("µ", "u").replace("μ", "u").replace("²", "2"))
+        return self.factors.get(re.sub(self.ignored, "", text).replace("µ", "u").replace("μ", "u").replace("²", "2"))
 
     def factor(self, text: str) -> float:
         """Return what one unit of that name is in the unit of this quantity.
@@ -258,10 +262,21 @@ FORCE = Quantity(
     "N",
     {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
 )
+TORQUE = Quantity(
+    "torque",
+    "N mm",
+    {
+        f"{force}{length}": FORCE.factors[force] * LENGTH.factors[length]
+        for force in ("N", "mN", "uN", "kN")
+        for length in ("m", "cm", "mm")
+    }
+    | {"nNm": 1e-6},
+    ignored=r"[\s^.·⋅*-]",
+)
 
 
 def measured_in(unit: str) -> str:
-    """Return what a usual unit is one of: stress, force, length, angle, strain or time; nothing for others and none.
+    """Return what a usual unit is one of: stress, force, length, angle, torque, strain or time; nothing for others.
 
     Examples
     --------
@@ -271,7 +286,7 @@ def measured_in(unit: str) -> str:
     compact = re.sub(r"\s+|\^|\*\*", "", unit).replace("²", "2")
     if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
         return "stress"
-    for quantity in (FORCE, LENGTH, ANGLE):
+    for quantity in (FORCE, LENGTH, ANGLE, TORQUE):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
     return "strain" if compact and compact.lower() in STRAIN_UNITS else "time" if compact.lower() in TIMES else ""

@@ -38,24 +38,26 @@ __all__ = [
 ]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
-DEFORMATIONS = (*LENGTHENINGS, "shear")
-LOADS = ("stress", "force")
+SHEARS = ("shear", "twist")
+DEFORMATIONS = (*LENGTHENINGS, *SHEARS)
+LOADS = ("stress", "torque", "force")
 SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
-DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement"}
+DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
 """What a column is that alone has such a unit."""
 NOT_ENGINEERING = re.compile(r"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){2})?$)|true|cauchy|piola|kirchhoff")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
 NOT_ENGINEERING_STRAIN = re.compile(r"^e( ?([1-3xyzrθ]|theta){2})?$|^e ?gl?$|lagrang|euler")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
 SHEAR_STRESS = re.compile(r"shear|schub|scher|cisaillement|cortante|taglio|cisalhamento|τ|tau")
+NORMAL = re.compile(r"normal|axial|^f ?[nz]$")
 OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
 )
 """Names of what is measured in oscillations."""
+PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$|pressure|druck$|pression|presi[oó]n|press[aã]o|"
-    r"压力|壓力|圧力|압력"
+    r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$|" + PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
 
@@ -69,9 +71,9 @@ class ColumnChoice:
     deformation, stress : int
         The columns.
     measure : str
-        What the deformation is: stretch, strain, displacement, (current) length or (amount of) shear.
+        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear or twist.
     load : str
-        What the other column holds: stress or force.
+        What the other column holds: stress, torque or force.
     strain_type, stress_type : str
         Which measure of strain, or of shear, and of stress.
     """
@@ -131,8 +133,8 @@ def choose_columns(
         The table to choose from.
     mode : LoadingMode
     mapping : mapping or None
-        From a role (stretch, strain, displacement, length or shear; stress or force) to the name of a column, or its
-        number from 1.
+        From a role (stretch, strain, displacement, length, shear or twist; stress, torque or force) to the name of a
+        column, or its number from 1.
     strain_type, stress_type : str or None
         Which measures they are, by the names in `STRAIN_MEASURES` and `STRESS_MEASURES`; what the columns' names say
         where none is given, and engineering where these say nothing.
@@ -248,19 +250,23 @@ def _choice(
     if load:
         stress = find_column(table, load, mapping[load])
     else:
-        load = next((role for role in LOADS if contents.fitting(role)), "")
-        by_unit = None if load else _told_by_unit(table, contents, LOADS)
-        load, stress = by_unit or (load, _recognise(table, contents, [load or "force"], LOADS))
+        loads = LOADS if is_shear else tuple(role for role in LOADS if role != "torque")
+        load = next((role for role in loads if contents.fitting(role)), "")
+        by_unit = None if load else _told_by_unit(table, contents, loads)
+        load, stress = by_unit or (load, _recognise(table, contents, [load or "force"], loads))
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
     else:
         measures = ["shear"] if is_shear else ["stretch", "strain"]
-        roles = ("shear",) if is_shear else LENGTHENINGS
+        roles = SHEARS if load == "torque" else ("shear",) if is_shear else LENGTHENINGS
+        if load == "torque" and not contents.fitting("shear"):
+            measures = ["twist"]
         if not is_shear and not contents.fitting(*measures):
             measures = ["displacement"] if contents.fitting("displacement") else ["length"]
-        is_named = is_shear or bool(contents.fitting(*measures))
-        by_unit = None if is_named else _told_by_unit(table, contents, tuple(DEFORMATIONS_OF_UNITS), stress)
+        is_named = bool(contents.fitting(*measures)) or (is_shear and load != "torque")
+        kinds = ("angle",) if is_shear else ("strain", "length")
+        by_unit = None if is_named else _told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
         else:
@@ -305,9 +311,13 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
             raise InputError(
                 f"{table.file}: columns are given for both {' and '.join(chosen_roles)}; give only one of them."
             )
-    unfit = (set(DEFORMATIONS) - {"shear"} if is_shear else {"shear"}) & set(mapping)
+    unfit = (set(LENGTHENINGS) if is_shear else {*SHEARS, "torque"}) & set(mapping)
     if unfit:
-        deformation = "an amount of shear" if is_shear else "a stretch, strain, displacement or length"
+        deformation = (
+            "an amount of shear, or the twist and torque of a disc"
+            if is_shear
+            else "a stretch, strain, displacement or length"
+        )
         raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
 
 
@@ -330,7 +340,7 @@ def _told_by_unit(
     rivals = [column for kind, columns in columns_of.items() if kind not in LOADS for column in columns]
     for kind in kinds:
         columns = columns_of.get(kind, [])
-        if len(columns) == 1 and (load is None or rivals == columns):
+        if len(columns) == 1 and (load is None or rivals == columns or kind == "angle"):
             name = contents.quantities[columns[0]]
             is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
             return None if is_open or name in role_names("shear") else (kind, columns[0])
@@ -367,6 +377,13 @@ def _recognise(
 def _stress_hint(table: Table, contents: _Contents) -> str:
     for column, quantity in enumerate(contents.quantities):
         in_heading, beneath = table.stated_units(column)
+        if quantity in role_names("torque"):
+            return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
+        if PRESSURE.search(quantity):
+            return (
+                f" Column {table.label(column)} is a pressure. For a tube, convert it to stresses with "
+                "ThinTube.engineering_stresses in Python, and give these with --mode thin-tube."
+            )
         if measured_in(beneath or in_heading) == "stress" and NOT_ENGINEERING.search(quantity):
             return f" Column {table.label(column)} may be a stress of several types. {_say_which('stress')}"
     return ""
@@ -426,6 +443,13 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."
         )
+    if choice.load == "torque":
+        if stress_type:
+            raise InputError(
+                f"{table.place(choice.stress)} is read as a torque, which is no {stress_type} stress. Leave "
+                "stress_type (--stress-type) out, or give the column as stress (--column stress=NAME)."
+            )
+        stress_type = "torsion"
     if strain_type and not is_strain and choice.measure != "shear":
         raise InputError(
             f"{table.place(choice.deformation)} is a {strain_type} strain, as its name or strain_type (--strain-type) "
@@ -462,6 +486,11 @@ def _type_of(table: Table, column: int, contents: _Contents, kind: str, wanted: 
 def _check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_shear: bool) -> None:
     """Refuse a shear stress where nothing is sheared, and amplitudes of oscillations, which are no curve."""
     quantities = [heading(name).quantity for name in table.names]
+    if is_shear and not mapping.keys() & LOADS and NORMAL.search(quantities[stress]):
+        raise InputError(
+            f"{table.place(stress)} is normal to the sheared planes, and no column is recognised as a shear stress, a "
+            "shear force or a torque. Say which it is: --column stress=NAME, force=NAME or torque=NAME."
+        )
     if not is_shear and "stress" not in mapping and SHEAR_STRESS.search(quantities[stress]):
         raise InputError(
             f"{table.place(stress)} is a shear stress. If the specimen was sheared, give --mode simple-shear and the "
@@ -500,7 +529,7 @@ def _check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnCho
         return
     for choice in choices:
         for column, content in ((choice.deformation, choice.measure), (choice.stress, choice.load)):
-            if content in ("displacement", "length", "force"):
+            if content in ("displacement", "length", "twist", "force", "torque"):
                 raise InputError(
                     f"{table.place(column)} holds a {content}, and in loading mode '{mode.name}' columns are read as "
                     "stretch, strain or shear, and as stress. Convert it, and give its column as one of them."

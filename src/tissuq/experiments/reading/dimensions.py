@@ -63,6 +63,25 @@ class Dimensions:
         return self.sizes["length"]
 
     @property
+    def radius(self) -> Dimension:
+        """That of the disc that a rheometer twists.
+
+        Raises
+        ------
+        InputError
+            When it is not known.
+        """
+        self._refuse_ambiguous("diameter")
+        if "diameter" not in self.sizes:
+            raise InputError(
+                f"{self.file}: to turn a torque and a twist into stress and shear at the rim of a disc give its "
+                'diameter (--diameter "20 mm"; in Python dimensions={"diameter": "20 mm"}), and its height as --length '
+                '"2 mm".'
+            )
+        diameter = self.sizes["diameter"]
+        return Dimension(diameter.value / 2, f"half the diameter {diameter.source}")
+
+    @property
     def area(self) -> Dimension:
         """The undeformed cross-section.
 

@@ -15,6 +15,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns, mapping_of_each_stress
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
@@ -165,8 +166,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         How the specimen was loaded. Without it as a comment in the file (``# mode: planar``), its name or its columns
         say: both axes of a biaxial machine, or an amount of shear; else uniaxial.
     columns : mapping, optional
-        From ``stretch``, ``strain``, ``displacement``, ``length`` (the current one, or the height) or ``shear`` (the
-        amount of shear), and ``stress`` or ``force``,
+        From ``stretch``, ``strain``, ``displacement``, ``length`` (the current one, or the height), ``shear`` (the
+        amount of shear) or ``twist`` (of a disc), and ``stress``, ``force`` or ``torque``,
         to the name of a column or its number from 1. Columns with usual names (with a unit or not) need none. The
         second axis or stress of a loading mode that has two is ``stretch2`` ... ``force2``; columns with x and y in
         their names need none in the mode ``biaxial``.
@@ -175,8 +176,9 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         the unit in which people want to read the stresses, kPa unless given.
     stress_type : str, optional
         ``engineering`` (force over undeformed area); ``cauchy``, which is divided by the stretch (a shear stress is the
-        same in both); or ``second-piola-kirchhoff``, which is multiplied by the deformation gradient. Without it what
-        the column's name says, and engineering where that says nothing.
+        same in both); ``second-piola-kirchhoff``, which is multiplied by the deformation gradient; or ``torsion``, the
+        stress 2 T / (pi R^3) that rheometers state for the rim of a disc. Without it what the column's name says, and
+        engineering where that says nothing.
     strain_type : str, optional
         ``engineering`` (stretch - 1, or the amount of shear), ``true`` (logarithmic), ``green``, ``almansi``, or
         ``angle`` of shear; otherwise as `stress_type`.
@@ -355,7 +357,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
             _converted(mode, stress_measure, measured, _points(mode, stretch))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
         )
-        if any(choice.measure != "shear" for choice in choices) or stress_measure.is_of_file:
+        if mode.controls != (SHEAR,) or stress_measure.name != "cauchy":
             used = used.with_step(stress_measure.step)
     if (every := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), every)
@@ -461,8 +463,10 @@ def _converted(mode: LoadingMode, measure: StressMeasure, measured: MeasuredRows
     """Return rows whose stresses of a measure, and their standard errors, are engineering ones."""
     if measure.engineering is None:
         return measured
-    stress, error = (measure.engineering(mode, points, each) for each in (measured.stress, measured.standard_error))
-    return replace(measured, stress=stress, standard_error=np.abs(error))
+    stress, error = measure.engineering(mode, points, measured.stress), measured.standard_error
+    if error.any():
+        error = np.abs(measure.engineering(mode, points, error))
+    return replace(measured, stress=stress, standard_error=error)
 
 
 def _stress_measure(table: Table, choices: Sequence[ColumnChoice]) -> StressMeasure:

@@ -41,6 +41,11 @@ ROLES = {
         "epsilon, ε"
     ),
     "shear": _names("shear, amount of shear, shear strain, gamma, γ"),
+    "twist": _names(
+        "twist, twist angle, angle of twist, torsion angle, rotation, rotation angle, angle, angular displacement, "
+        "angular position, deflection angle, encoder, drehwinkel, verdrehwinkel, torsionswinkel, auslenkwinkel, "
+        "angle de torsion, ángulo de torsión, angolo di torsione, ângulo de torção, 扭转角, ねじり角"
+    ),
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
@@ -53,6 +58,10 @@ ROLES = {
     "force": _names(
         "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
         "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft"
+    ),
+    "torque": _names(
+        "torque, axial torque, drehmoment, moment, torsionsmoment, couple, couple de torsion, par, par de torsión, "
+        "momento torsor, momento torcente, coppia, torque de torção, 扭矩, トルク"
     ),
     "stress": _names(
         "stress, tensile stress, compressive stress, shear stress, spannung, druckspannung, schubspannung"

@@ -123,7 +123,8 @@ class Inspection:
                 roles[spread.column] = f"{SPREADS[spread.kind]} of the stress"
         for label, choice in zip(self.reading.used.labels, self.reading.choices, strict=True):
             suffix = f" of {label}" if label else ""
-            roles[choice.stress] = f"{_typed(choice.stress_type)}{choice.load}{suffix}"
+            measure = _typed(choice.stress_type) if choice.load == "stress" else ""
+            roles[choice.stress] = f"{measure}{choice.load}{suffix}"
             roles[choice.deformation] = _typed(choice.strain_type) + choice.measure + suffix * has_several_controls
         for column in range(len(table.names)):
             yield f"{table.label(column)} {'is ' + roles[column] if column in roles else 'not read'}"

@@ -14,13 +14,16 @@ from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUM
 from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_lengths, check_positions
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.units import ANGLE, FORCE, LENGTH, Quantity, number_and_unit
+from tissuq.experiments.reading.torsion import apparent_stress
+from tissuq.experiments.units import ANGLE, FORCE, LENGTH, TORQUE, Quantity, number_and_unit
 
 __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of"]
 
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"
+NOTABLE_TWIST = 0.05
+"""Share of its range by which a twist may begin away from 0."""
 LARGEST_ASSUMED_STRESS = 100.0
 """Largest stress, MPa, of a soft material: numbers beyond it that have no unit are not taken as MPa."""
 
@@ -57,6 +60,8 @@ def stretch_of(
     InputError
         When units contradict each other or are missing, or the length of the specimen is not known.
     """
+    if choice.measure == "twist":
+        return _from_twist(table, choice, values, dimensions, strain_unit, zero)
     if choice.measure == "displacement":
         return _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
     if zero is not None:
@@ -116,6 +121,12 @@ def stress_of(
         When units contradict each other or are missing, or the cross-section of the specimen is not known.
     """
     label = table.label(choice.stress)
+    if choice.load == "torque":
+        factor, unit_source = _factor(table, choice.stress, TORQUE, "force_unit", force_unit)
+        radius = dimensions.radius
+        source = f"apparent stress 2 T / (pi R^3): T = column {label} in {unit_source}, R = {_in_words(radius)}"
+        scale = float(apparent_stress(np.array(factor), radius.value))
+        return Load(values * scale, units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), source, scale=scale)
     if choice.load == "force":
         if choice.stress_type != "engineering":
             raise InputError(
@@ -154,13 +165,37 @@ def _from_displacement(
     displacement, label = values * factor, table.label(choice.deformation)
     start, counted = 0.0, ""
     if zero is not None:
-        start = float(displacement[0]) if zero == FIRST_ROW else _zero(zero)
+        start = float(displacement[0]) if zero == FIRST_ROW else _position(zero, LENGTH)
         counted = f", counted from {start:g} mm ({'its first row' if zero == FIRST_ROW else 'as given'})"
     elif in_column is None and check_positions(table, choice, displacement, load, length.value):
         start = float(displacement[0])
         counted = f", counted from {start:g} mm {ZERO_ASSUMED}"
     source = f"column {label} in {unit_source}{counted} / {length.value:g} mm (length {length.source})"
     return 1 + (displacement - start) / length.value, f"stretch = 1 + {source}"
+
+
+def _from_twist(
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None, zero: str | None
+) -> tuple[Column, str]:
+    """Return the amount of shear at the rim of a disc, and how it was obtained."""
+    factor, unit_source = _factor(table, choice.deformation, ANGLE, "strain_unit", unit)
+    radius, height, twist = dimensions.radius, dimensions.length, values * factor
+    start, counted = 0.0, ""
+    if zero is not None:
+        start = float(twist[0]) if zero == FIRST_ROW else _position(zero, ANGLE)
+        counted = f", counted from {start:g} rad ({'its first row' if zero == FIRST_ROW else 'as given'})"
+    elif abs(twist[0]) > NOTABLE_TWIST * float(np.ptp(twist)):
+        raise InputError(
+            f"{table.place(choice.deformation, 0)}: the twist begins at {values[0]:g}, not at 0. If the disc is "
+            "undeformed there give --zero first, if at 0 --zero '0 rad'."
+        )
+    source = f"column {table.label(choice.deformation)} in {unit_source}{counted}"
+    sizes = f"R = {_in_words(radius)}, H = {_in_words(height)}"
+    return (twist - start) * radius.value / height.value, f"amount of shear at the rim = {source} x R / H: {sizes}"
+
+
+def _in_words(dimension: Dimension) -> str:
+    return f"{dimension.value:g} mm ({dimension.source})"
 
 
 def _from_length(
@@ -178,12 +213,14 @@ def _from_length(
     )
 
 
-def _zero(text: str) -> float:
-    """Return the position from which displacements are counted, mm."""
+def _position(text: str, quantity: Quantity) -> float:
+    """Return the position from which displacements, or the angle from which twists are counted."""
     number, unit = number_and_unit(text)
     if number is None or not unit:
-        raise InputError(f"zero must be 'first', or a position with its unit such as '35.2 mm', not '{text}'.")
-    return number * LENGTH.factor(unit)
+        raise InputError(
+            f"zero must be 'first', or a {quantity.name} with its unit such as '35.2 {quantity.unit}', not '{text}'."
+        )
+    return number * quantity.factor(unit)
 
 
 def _declared_unit(table: Table, column: int) -> str:

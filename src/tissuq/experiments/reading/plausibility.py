@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.columns import SHEARS, ColumnChoice
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
@@ -53,7 +53,7 @@ def with_compression_negative(
         When it does but the stretches are all above 1, or a column's name says compression and nobody says its sign.
     """
     choice = choices[0]
-    if choice.measure == "shear":
+    if choice.measure in SHEARS:
         if compression_positive:
             raise InputError("compression_positive=True (--compression-positive) has no meaning for a shear stress.")
         return measured
@@ -89,7 +89,7 @@ def _of_other_sign(stretch: Column, choice: ColumnChoice) -> Column:
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
     """Refuse columns of stretches that are not positive, or that are strains by their size."""
     for choice, stretch in zip(choices, measured.stretch, strict=True):
-        if choice.measure != "shear":
+        if choice.measure not in SHEARS:
             _check_stretch(measured.table, choice, stretch)
 
 
@@ -98,7 +98,7 @@ def check_signs(measured: MeasuredRows, choices: Sequence[ColumnChoice], compres
 
     Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
     """
-    if choices[0].measure == "shear":
+    if choices[0].measure in SHEARS:
         _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0])
         return
     change = measured.stretch - 1

@@ -65,6 +65,8 @@ def spread_of(
     InputError
         When a column that is given cannot be used.
     """
+    if choice.stress_type == "torsion":
+        return Spread()
     given = next((kind for kind in SPREADS if kind in mapping), None)
     if given:
         column = find_column(table, given, mapping[given])

@@ -90,8 +90,13 @@ def _mode_of_columns(table: Table) -> tuple[str, str]:
     loads = role_names("stress") | role_names("force")
     if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
         return "biaxial", "columns of both axes"
-    is_shear = not deformations & set(quantities) and len(role_names("shear") & set(quantities)) == 1
-    return ("simple-shear", "a column of shear") if is_shear else ("", "")
+    stretches, shears, twists = (
+        names & set(quantities) for names in (deformations, role_names("shear"), role_names("twist"))
+    )
+    if not stretches and len(shears) == 1:
+        return "simple-shear", "a column of shear"
+    is_disc = not stretches and len(twists) == 1 and len(role_names("torque") & set(quantities)) == 1
+    return ("simple-shear", "columns of twist and torque") if is_disc else ("", "")
 
 
 def mode_in_comment(file: Path) -> str:

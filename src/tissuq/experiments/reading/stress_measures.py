@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.torsion import rim_stress
 
 __all__ = ["STRESS_MEASURES", "StressMeasure"]
 
@@ -45,6 +48,14 @@ def _from_cauchy(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> F
     return np.asarray(stress / np.stack([path.cauchy_ratio(points) for path in mode.paths]))
 
 
+def _from_torsion(mode: LoadingMode, points: FloatArray, stress: FloatArray) -> FloatArray:
+    if mode.controls != (SHEAR,) or len(mode.stresses) > 1:
+        raise InputError(
+            "stress_type='torsion' (--stress-type torsion) is for a twisted disc: give --mode simple-shear."
+        )
+    return rim_stress(points, stress[0])[None]
+
+
 STRESS_MEASURES = {
     measure.name: measure
     for measure in (
@@ -66,7 +77,13 @@ STRESS_MEASURES = {
             step="second Piola-Kirchhoff stress times the deformation gradient to engineering stress",
             is_of_file=True,
         ),
+        StressMeasure(
+            name="torsion",
+            words=r"apparent|scheinbare?|apparente?",
+            engineering=_from_torsion,
+            step="apparent stress at the rim of a twisted disc times (3 + d ln T / d ln g)/4 to the stress there",
+        ),
     )
 }
-"""Every measure of stress by its name: force over undeformed area P, over deformed area P F' and F^-1 P (no change of
-volume)."""
+"""Every measure of stress by its name: force over undeformed area P, over deformed area P F', F^-1 P (no change of
+volume), and 2 T / (pi R^3) of the torque T of a disc with the radius R."""
