@@ -146,6 +146,12 @@ def test_a_preload_does_not_change_the_area_that_the_second_stress_is_over(tmp_p
         ("log strain", ("strain", "true")),
         ("ln strain", ("strain", "true")),
         ("hencky", ("strain", "true")),
+        ("log. dehnung", ("dehnung", "true")),
+        ("ln λ", ("strain", "true")),
+        ("contrainte de cauchy", ("stress", "cauchy")),
+        ("deformación real", ("strain", "true")),
+        ("tensión real", ("stress", "cauchy")),
+        ("pkii", ("stress", "second-piola-kirchhoff")),
         ("natural strain", ("strain", "true")),
         ("strain true", ("strain", "true")),
         ("wahre dehnung", ("dehnung", "true")),
@@ -236,6 +242,9 @@ def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
             "does not tell a stretch",
         ),
         ("strain,Shear stress [MPa]", {}, "is a shear stress"),
+        ("TrueStrain (%),Engineering stress (MPa)", {}, "may be a strain of several types"),
+        ("stretch,TrueStress (MPa)", {}, "'TrueStress (MPa)' may be a stress of several types"),
+        ("stretch,TrueStress (MPa)", {"columns": {"stress": 2}}, "'TrueStress (MPa)' may be a stress of several types"),
         ("Strain,Pressure (MPa)", {}, "no column is recognised as stress"),
         ("Strain,Innendruck (MPa)", {}, "is a pressure. For a tube"),
         ("Strain (%),Stress (MPa),Storage modulus (Pa)", {}, "is of oscillations"),
@@ -264,3 +273,39 @@ def test_inspect_says_the_measures_and_how_they_are_converted(tmp_path):
     assert "'True strain [%]' is true strain, 'True stress [MPa]' is cauchy stress" in text
     assert "stretch = exp(column 'True strain [%]' x 0.01)" in text
     assert "Cauchy stress divided by stretch to engineering stress" in text
+
+
+OTHER_STRAINS = {
+    "true": "True strain, TrueStrain, trueStrain (%), Strain_true, strain true [%], ε_true, ε_log (%), Log. strain, "
+    "e_log, ln(lambda), ln λ, Hencky, ln_strain (%), Dehnung (wahr) [%], log. Dehnung, déf. log (%), Strain [ln], "
+    "Deformación real (%), logarithmic_strain, True_Strain_%, eps_true, true eps (mm/mm), εt (%), e_ln (%)",
+    "green": "Green strain, GreenStrain (%), E_green, Green-Lagrange, Green–Lagrange strain (%), E11 (%), Exx, E (-), "
+    "E_xx [-], Lagrange strain (%), Lagrangian strain (mm/mm), E_GL, Green–St. Venant strain",
+}
+OTHER_STRESSES = {
+    "cauchy": "True stress (MPa), TrueStress (MPa), Cauchy stress [MPa], sigma (MPa), σ (MPa), Stress_true_MPa, "
+    "Cauchy (MPa), σ11 (MPa), sigma_xx [MPa], t11 (MPa), contrainte de Cauchy (MPa), esfuerzo verdadero (MPa), "
+    "τ (MPa), Tensión real (MPa), 真应力 (MPa), Kirchhoff stress (MPa)",
+    "second-piola-kirchhoff": "2nd PK (MPa), PK2 (MPa), S (MPa), S11 (MPa), S_11 [MPa], 2PK stress (MPa), S2PK (MPa), "
+    "Piola-Kirchhoff stress (MPa), stress_PK2 (MPa), Sxx (MPa), 2. PK-Spannung (MPa), PKII (MPa)",
+}
+
+
+@pytest.mark.parametrize(
+    ("strain", "stress", "measures"),
+    [
+        *((name, stress, (measure, "engineering")) for measure, names in OTHER_STRAINS.items()
+          for name in names.split(", ") for stress in ("Stress (MPa)", "Engineering stress (MPa)")),
+        *((strain, name, ("engineering", measure)) for measure, names in OTHER_STRESSES.items()
+          for name in names.split(", ") for strain in ("Strain", "Engineering strain")),
+    ],
+)  # fmt: skip
+def test_no_other_measure_is_read_as_the_engineering_one_without_a_word(tmp_path, strain, stress, measures):
+    values = components(UNIAXIAL, *measures, (0, 0))
+    factor = 100 if "%" in strain else 1
+    try:
+        data = read_experiment(written(tmp_path, **{strain: factor * values[0], stress: values[1]}))
+    except InputError:
+        return
+    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
+    np.testing.assert_allclose(data.stress, P11, atol=1e-9)

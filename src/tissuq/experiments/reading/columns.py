@@ -45,9 +45,14 @@ SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
 DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
 """What a column is that alone has such a unit."""
-NOT_ENGINEERING = re.compile(r"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){2})?$)|true|cauchy|piola|kirchhoff")
+OTHER_MEASURE = (
+    r"true|cauchy|piola|kirchhoff|pk|log|hencky|green|almansi|lagrang|euler|wahr|vrai|r[ée]elle|verdader|real\b|"
+    r"真|对数|対数"
+)
+"""Within names of a strain or stress that is, or may be, another one than the engineering one."""
+NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
-NOT_ENGINEERING_STRAIN = re.compile(r"^e( ?([1-3xyzrθ]|theta){2})?$|^e ?gl?$|lagrang|euler")
+NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
 SHEAR_STRESS = re.compile(r"shear|schub|scher|cisaillement|cortante|taglio|cisalhamento|τ|tau")
 NORMAL = re.compile(r"normal|axial|^f ?[nz]$")
@@ -458,6 +463,8 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
         )
     if is_strain and not strain_type and NOT_ENGINEERING_STRAIN.search(name):
         raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {_say_which('strain')}")
+    if choice.load == "stress" and not stress_type and re.search(OTHER_MEASURE, contents.quantities[choice.stress]):
+        raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {_say_which('stress')}")
     is_told = contents.strain_type or contents.stress_type
     if is_strain and choice.load == "stress" and not is_told and (strain_type == "") != (stress_type == ""):
         stated, unstated = ("strain", "stress") if strain_type else ("stress", "strain")

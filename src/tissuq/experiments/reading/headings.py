@@ -71,8 +71,8 @@ ROLES = {
 
 NOUNS = {
     "strain": _names(
-        "axial strain, longitudinal strain, e, déformation, deformación, deformação, deformazione, rek, töjning, "
-        "tøyning, 应变, 應變, ひずみ, 歪み, 歪, 변형률"
+        "axial strain, longitudinal strain, e, λ, lambda, déformation, deformación, deformação, deformazione, rek, "
+        "töjning, tøyning, 应变, 應變, ひずみ, 歪み, 歪, 변형률"
     ),
     "stress": _names(
         "axial stress, longitudinal stress, s, sigma, σ, contrainte, tensión, esfuerzo, tensão, tensione, sforzo, "
@@ -86,6 +86,8 @@ MEASURES: dict[str, list[StrainMeasure] | list[StressMeasure]] = {
     "stress": list(STRESS_MEASURES.values()),
 }
 """Measures of what columns of a role hold."""
+LINK = re.compile(r"\(\)|\b(de|di|of|nach|selon|according to)\b")
+"""What may stand between such a word and the noun."""
 SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
 """Words for a measure that no noun need follow."""
 SPREADS = {"sem": "standard error", "sd": "standard deviation"}
@@ -173,7 +175,7 @@ def heading(name: str) -> Heading:
 
 def plain(name: str) -> str:
     """Return a name in lower case with blanks for hyphens and underscores."""
-    return re.sub(r"[\s_-]+", " ", name).strip().lower()
+    return re.sub(r"[\s_–-]+", " ", name).strip().lower()
 
 
 def role_names(role: str) -> frozenset[str]:
@@ -194,7 +196,7 @@ def measure_in(quantity: str) -> tuple[str, str]:
             match = _words(measure.words).search(quantity)
             if not match:
                 continue
-            noun = plain(f"{quantity[: match.start()]} {quantity[match.end() :]}".replace("()", ""))
+            noun = plain(LINK.sub(" ", f"{quantity[: match.start()]} {quantity[match.end() :]}"))
             axis, name = on_axis(noun)
             if name in ROLES[role]:
                 return noun, measure.name

@@ -95,8 +95,8 @@ STRAIN_MEASURES = {
         ),
         StrainMeasure(
             name="true",
-            words=r"true|log|logar\w*|ln|hencky|natural|wahre?[rs]?|vraie?|verdader[ao]|ver[ao]|verdadeir[ao]|werkelijke|"
-            r"真实|真實|真|对数|對數|対数",
+            words=r"true|log\.?|logar\w*|ln|hencky|natural|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|"
+            r"verdadeir[ao]|werkelijke|真实|真實|真|对数|對數|対数",
             stretch=np.exp,
             strain=np.log,
             formula="exp({})",

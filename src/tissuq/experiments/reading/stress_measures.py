@@ -66,13 +66,14 @@ STRESS_MEASURES = {
         ),
         StressMeasure(
             name="cauchy",
-            words=r"cauchy|true|kirchhoff|wahre?[rs]?|vraie?|verdader[ao]|ver[ao]|verdadeir[ao]|werkelijke|真实|真實|真",
+            words=r"cauchy|true|kirchhoff|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|verdadeir[ao]|"
+            r"werkelijke|真实|真實|真",
             engineering=_from_cauchy,
             step="Cauchy stress divided by stretch to engineering stress",
         ),
         StressMeasure(
             name="second-piola-kirchhoff",
-            words=r"(2nd|second|2\.|zweite) (pk|piola( kirchhoff)?)|pk ?2|2 ?pk|pk ii",
+            words=r"(2nd|second|2\.|zweite) (pk|piola( kirchhoff)?)|pk ?2|s? ?2 ?pk|pk ?ii",
             engineering=lambda mode, points, stress: mode.from_second_piola_kirchhoff(points, stress),
             step="second Piola-Kirchhoff stress times the deformation gradient to engineering stress",
             is_of_file=True,
