@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any
@@ -40,6 +40,8 @@ class Curve:
         Of a stress that is the mean of several specimens; zero of one that is not.
     name, source, stress_unit, specimen : str
         Those of the test.
+    least_errors : mapping of str to float
+        Those of the test.
     """
 
     mode: LoadingMode
@@ -51,6 +53,7 @@ class Curve:
     source: str
     stress_unit: str
     specimen: str
+    least_errors: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.stress)
@@ -98,6 +101,10 @@ class Experiment:
     standard_error : array like ``stress``, in the same unit, optional
         Standard errors of stresses that are means of several specimens. `tissuq.fit` takes them as the size of an error
         that is smooth along the curve (`Tolerances`), as neighbouring points of a mean curve err alike.
+    least_errors : mapping of str to float, optional
+        Standard deviations that errors of the test have at least, as the measurements themselves show, by their names
+        in `tissuq.Tolerances`: ``{"slack": 0.01}`` where load begins at a stretch known to 0.01. Unless tolerances are
+        stated as numbers, those of a fit are as large. The attribute is of several tests the largest ones.
 
     Attributes
     ----------
@@ -138,6 +145,7 @@ class Experiment:
         stress_unit: str | None = None,
         specimen: str = "",
         standard_error: ArrayLike | None = None,
+        least_errors: Mapping[str, float] | None = None,
     ) -> None:
         mode = loading_mode(mode)
         values, unit = _in_mpa(stress, stress_unit)
@@ -153,7 +161,7 @@ class Experiment:
             if errors.shape != stresses.shape or (errors < 0).any():
                 raise InputError(f"experiment '{name}': give one standard error for every stress, none negative.")
         columns = zip(stresses.reshape(len(stresses), -1).T, errors.reshape(len(stresses), -1).T, strict=True)
-        labels = name, source, unit, specimen
+        labels = name, source, unit, specimen, dict(least_errors or {})
         curves = tuple(Curve(mode, channel, points, *column, *labels) for channel, column in enumerate(columns))
         object.__setattr__(self, "curves", curves)
 
@@ -244,6 +252,12 @@ class Experiment:
     def specimen(self) -> str:
         """Which specimen it was; of several tests see that of each."""
         return self.curves[0].specimen if len(self.tests) == 1 else ""
+
+    @property
+    def least_errors(self) -> dict[str, float]:
+        """Standard deviations that errors of the tests have at least, by their names: the largest of all tests."""
+        pairs = [pair for curve in self.curves for pair in curve.least_errors.items()]
+        return {name: max(size for same, size in pairs if same == name) for name, _ in pairs}
 
     @cached_property
     def shows_direction(self) -> bool:
@@ -356,7 +370,14 @@ class Experiment:
         ]
         stretch, stress, error = map(np.concatenate, zip(*columns, strict=True))
         joined = Experiment(
-            self.mode, stretch, stress, self.name, self.source, specimen=self.specimen, standard_error=error
+            self.mode,
+            stretch,
+            stress,
+            self.name,
+            self.source,
+            specimen=self.specimen,
+            standard_error=error,
+            least_errors=self.least_errors,
         )
         return joined.labelled(stress_unit=self.stress_unit)
 

@@ -147,6 +147,7 @@ class Tolerances:
         all_sizes = {**(ESTIMANDS[estimand].sizes if estimand else {}), **sizes}
         kinds = {**variants(MeasurementError), **{name: type(error) for name, error in errors.items()}}
         self.estimand = estimand or ("" if any(all_sizes.values()) else AS_TESTED)
+        self._numbers = frozenset(sizes)
         self._stated = {name: float(all_sizes[name]) for name in kinds if name in all_sizes}
         self._sizes = {name: size for name, size in self._stated.items() if size}
         self._errors = {name: kinds[name]() for name in self._sizes}
@@ -203,6 +204,27 @@ class Tolerances:
     def with_sizes(self, **sizes: float) -> Tolerances:
         """Return the same tolerances but for these sizes."""
         return Tolerances(self.estimand, **(self._stated | sizes))
+
+    def at_least(self, sizes: Mapping[str, float]) -> Tolerances:
+        """Return the same with errors at least as large, but for those that were stated as numbers.
+
+        Where there are none at all, the intervals are of the specimen as tested, and none is added.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> tq.Tolerances("specimen", length=0).at_least({"slack": 0.02, "length": 0.02, "resolution": 0.001})
+        Tolerances('specimen', length=0.0, slack=0.02)
+        """
+        larger = {name: size for name, size in sizes.items() if size > self._sizes.get(name, 0.0)}
+        larger = {name: size for name, size in larger.items() if name not in self._numbers}
+        return self.with_sizes(**larger) if self and larger else self
+
+    def account_of(self, least_errors: Mapping[str, float]) -> str:
+        """Return in words which errors are as large as the measurements themselves show; empty where none is."""
+        names = [name for name, size in least_errors.items() if self._sizes.get(name) == size]
+        sizes = " and ".join(f"{name} of {self._sizes[name]:.2g}" for name in names)
+        return f"the tolerance {sizes} is as large as the measurements show" if names else ""
 
     def with_factor(self, factor: float) -> Tolerances:
         """Return the same tolerances with the spreads between specimens and tests times a factor."""

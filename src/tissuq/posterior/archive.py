@@ -67,7 +67,8 @@ def _model_groups(model: StatisticalModel) -> dict[str, LabelledGroup]:
                 "stress": (("point", "stress_of_mode")[: test.stress.ndim], test.stress, {"units": "MPa"}),
             }
             | _standard_error_of(test),
-            attrs={"mode": test.mode.name} | {label: getattr(test, label) for label in LABELS},
+            attrs={"mode": test.mode.name, "least_errors": json.dumps(test.least_errors)}
+            | {label: getattr(test, label) for label in LABELS},
         )
     return groups
 
@@ -126,8 +127,11 @@ def _standard_error_of(test: Experiment) -> dict[str, Any]:
 def _test(group: Group) -> Experiment:
     labels = {label: str(group.attrs[label]) for label in LABELS}
     stretch, stress = group.arrays["stretch"], group.arrays["stress"]
-    error = group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T
-    return Experiment(str(group.attrs["mode"]), stretch, stress, standard_error=error).labelled(**labels)
+    errors = {
+        "standard_error": group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T,
+        "least_errors": json.loads(group.attrs.get("least_errors", "{}")),
+    }
+    return Experiment(str(group.attrs["mode"]), stretch, stress, **errors).labelled(**labels)
 
 
 def _plain_noise(noise: Noise) -> str | float | list[float]:

@@ -70,7 +70,8 @@ def fit(
     tolerances : Tolerances or str
         By how much whole tests may be off, and so what the intervals are of: ``"as-tested"``, ``"specimen"`` or
         ``"tissue"`` (`tissuq.estimands`), or sizes such as ``Tolerances(stress=0.1, length=0.02)`` or
-        ``Tolerances("specimen", slack=0)``. By default they are of the specimen, or where tests are of several, of the
+        ``Tolerances("specimen", slack=0)``. Sizes that are not stated as numbers are at least the ``least_errors`` of
+        the experiment. By default they are of the specimen, or where tests are of several, of the
         tissue; as tested where the noise of one test is known, or a discrepancy that is no energy alone takes up errors
         of the test. Unless they are stated as numbers, the spreads between specimens and tests are as large as several
         tests tell. Standard errors of means that the data state are in all of them but ``"as-tested"``.
@@ -191,11 +192,12 @@ def fit_many(
     solver = Solver(method, modes_named(stable_in), int(seed))
 
     def model_of(data: Experiment) -> StatisticalModel:
-        model = StatisticalModel(data, *options, tolerances or Tolerances())
-        standard = default_tolerances(model) if tolerances is None else tolerances
+        stated = (tolerances or Tolerances()).at_least(data.least_errors)
+        model = StatisticalModel(data, *options, stated)
+        standard = default_tolerances(model) if tolerances is None else stated
         if tolerances is None or tolerances.estimand not in ("", AS_TESTED):
             standard = with_standard_errors(model, standard)
-        if standard.stated != model.tolerances.stated:
+        if standard.stated != stated.stated:
             model = replace(model, tolerances=standard)
         if model.tolerances.has_standard_spreads:
             model = solver.with_spreads_of_tests(model)

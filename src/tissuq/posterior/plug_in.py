@@ -253,16 +253,17 @@ def default_tolerances(model: StatisticalModel) -> Tolerances:
 
     Those of the specimen, or where tests are of several, of the tissue. None where something else takes up errors of
     the test (a discrepancy with errors of its own, noise that is more than one number), of one test with known noise,
-    and of very many measurements.
+    and of very many measurements. Errors that the measurements themselves show are included at least as large.
     """
     if model.is_correlated or model.noise.depends_on_level or model.noise.shares_discrepancy:
         return Tolerances()
     discrepancy = model.discrepancy
     takes_up_errors = model.noise.is_consecutive or discrepancy.is_scattered or not discrepancy.is_energy
     if specimens_of(model.experiment).shape[1] > 1:
-        return BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)
+        return (BETWEEN_SPECIMENS if takes_up_errors else Tolerances(TISSUE)).at_least(model.experiment.least_errors)
     is_told = len(model.experiment.tests) == 1 and (not model.noise.parameters or model.experiment.size > CHUNK)
-    return Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
+    usual = Tolerances() if is_told or takes_up_errors else Tolerances(SPECIMEN)
+    return usual.at_least(model.experiment.least_errors)
 
 
 def with_standard_errors(model: StatisticalModel, tolerances: Tolerances) -> Tolerances:

@@ -119,7 +119,8 @@ class Posterior:
         >>> tq.fit(data, discrepancy="none", noise_sd=0.02).how
         'C10 integrated in closed form; nothing left to integrate'
         """
-        return "; ".join(filter(None, (self.solution.reason, self.model.fitted_errors.account)))
+        seen = self.model.tolerances.account_of(self.model.experiment.least_errors)
+        return "; ".join(filter(None, (self.solution.reason, self.model.fitted_errors.account, seen)))
 
     @property
     def diagnostics(self) -> Diagnostics | None:
