@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -140,15 +142,18 @@ def test_a_slip_after_which_more_is_borne_is_said_and_takes_no_part_in_slack(ins
     stress = np.where(np.arange(200) < 100, 1, 0.7) * stress + noise
     (note,) = inspected(stretch, stress).warnings
     assert note.startswith("after line 101 (stretch 1.199)")
-    assert note.endswith("delete the rows from there on.")
-    assert inspected(stretch[:100], stress[:100]).warnings == ()
+    assert note.endswith("to leave them out give --leave-out 102:201.")
+    inspection = inspected(stretch, stress, leave_out="102:201")
+    assert inspection.warnings == ()
+    np.testing.assert_allclose(inspection.reading.experiment.stretch, stretch[:100], atol=1e-6)
+    assert "100 dropped: in lines to leave out" in str(inspection)
 
 
 def test_a_hold_is_said_and_the_advice_leaves_it_out(inspected):
     (stretch, stress), left = up(), 1 - 0.3 * -np.expm1(-np.linspace(0, 5, 41)[1:])
     curve = np.concatenate([stretch, np.full(40, 1.4)]), np.concatenate([stress, left * stress[-1]])
     (note,) = inspected(*curve).warnings
-    assert note.startswith("in lines 61 to 101 the stretch rests while the stress falls by up to 28% of the largest")
+    assert note.startswith("in lines 61:101 the stretch rests while the stress falls by up to 28% of the largest")
     assert "--until-peak" in note
     inspection = inspected(*curve, until_peak=True)
     assert inspection.warnings == ()
@@ -162,8 +167,10 @@ def test_holds_before_the_largest_stress_are_said_with_their_lines(inspected):
     stress = np.concatenate([[*np.linspace(neo_hookean(a), neo_hookean(b), 10), *neo_hookean(b) * left]
                              for a, b in zip(starts, steps, strict=True)])  # fmt: skip
     (note,) = inspected(stretch, stress).warnings
-    assert all(f"{start} to " in note.partition(" the stretch rests")[0] for start in (11, 61, 111, 161))
-    assert "delete these rows" in note
+    assert all(f"{start}:" in note.partition(" the stretch rests")[0] for start in (11, 61, 111, 161))
+    inspection = inspected(stretch, stress, leave_out=re.search(r"--leave-out (\S+)\.$", note)[1])
+    assert inspection.warnings == ()
+    assert len(inspection.reading.experiment) == 33
 
 
 def test_until_peak_goes_with_a_cycle_and_a_preload(inspected):

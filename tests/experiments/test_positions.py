@@ -4,6 +4,7 @@ import pytest
 import tissuq as tq
 from machine_files import neo_hookean
 from tissuq.errors import InputError
+from tissuq.experiments.reading.experiment_file import read_file
 
 LENGTH, AREA = 20.0, 10.0
 SPECIMEN = {"length": "20 mm", "area": "10 mm2"}
@@ -141,3 +142,43 @@ def test_what_cannot_be_a_height_is_refused(tmp_path, rows, words):
 def test_a_zero_that_cannot_be_meant_is_refused(tmp_path, options, words):
     with pytest.raises(InputError, match=words):
         tq.read_experiment(written(tmp_path, ramp(1.3), 35.2), dimensions=SPECIMEN, **options)
+
+
+def compliant(tmp_path, compliance, sign=1):
+    """A specimen of 20 mm whose grips move further than it by 0.05 mm for every N, 10 N at 4 mm."""
+    true = np.linspace(0, 4, 41)
+    force = 2.5 * true
+    path = tmp_path / "test.csv"
+    rows = "".join(f"{1000 * (d + 0.05 * f):.4f},{sign * f / 1000:.7f}\n" for d, f in zip(true, force, strict=True))
+    path.write_text("Displacement (um),Load (kN)\n" + rows)
+    return true, read_file(path, dimensions={"length": "20 mm", "area": "10 mm2"}, compliance=compliance)
+
+
+@pytest.mark.parametrize("compliance", ["0.05 mm/N", "50 um/N", "50 mm/kN"])
+def test_what_the_machine_gives_way_is_taken_off_displacements(tmp_path, compliance):
+    true, reading = compliant(tmp_path, compliance)
+    np.testing.assert_allclose(reading.experiment.stretch, 1 + true / 20, rtol=1e-6)
+    assert reading.used.steps[0].endswith("of the machine's compliance times the force")
+
+
+@pytest.mark.parametrize("compliance", ["0.05", "0.05 mm", "-1 mm/N", "0.05 N/mm", "mm/N"])
+def test_a_compliance_that_is_none_is_refused(tmp_path, compliance):
+    with pytest.raises(InputError, match=r"length|mass|unit"):
+        compliant(tmp_path, compliance)
+
+
+def test_a_machine_gives_way_in_the_direction_of_its_force_whatever_the_signs(tmp_path):
+    true = np.linspace(0, 4, 41)
+    path = tmp_path / "test.csv"
+    rows = "".join(f"{d + 0.05 * f:.5f},{-f:.5f}\n" for d, f in zip(true, 2.5 * true, strict=True))
+    path.write_text("Displacement (mm),Load (N)\n" + rows)
+    options = {"dimensions": {"length": "20 mm", "area": "10 mm2"}, "compression_positive": True}
+    data = read_file(path, compliance="0.05 mm/N", **options).experiment
+    np.testing.assert_allclose(data.stretch, 1 - true / 20, rtol=1e-5)
+
+
+def test_a_compliance_is_refused_where_the_file_gives_strain_or_stress(tmp_path):
+    path = tmp_path / "test.csv"
+    path.write_text("strain,stress [kPa]\n0,0\n0.1,1\n0.2,2\n")
+    with pytest.raises(InputError, match="is read as strain and stress"):
+        read_file(path, compliance="0.5 um/N")

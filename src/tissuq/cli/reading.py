@@ -88,8 +88,19 @@ OPTIONS: dict[str, Any] = {
     ],
     "cycle": Annotated[str | None, typer.Option(help="Use only this cycle: first, last or its number [all].")],
     "branch": Annotated[str | None, typer.Option(help="Use only loading or unloading [both].")],
+    "compliance": Annotated[
+        str | None, typer.Option(help="Of the machine ('0.5 um/N'): what it gives way is taken off displacements.")
+    ],
+    "leave_out": Annotated[str | None, typer.Option(help="Lines of the file to leave out, such as 31,45:50.")],
     "preload": Annotated[
-        str | None, typer.Option(help="Force or stress at which the specimen is taut ('0.05 N'): stretch 1 is there.")
+        str | None,
+        typer.Option(
+            help="Force or stress at which the specimen is taut ('0.05 N'), or auto, where load begins: stretch 1 is "
+            "there."
+        ),
+    ],
+    "stretch_range": Annotated[
+        str | None, typer.Option(help="LOW:HIGH, the only stretches to use, such as 1:1.2 [all].")
     ],
     "until_peak": Annotated[
         bool | None, typer.Option("--until-peak", help="Leave out the rows after the largest stress.")
@@ -112,7 +123,7 @@ def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = 
     That gets them as the settings of a file's reading. ``names`` are those of options that the command itself has
     another use for.
     """
-    names = {name: name for name in OPTIONS} | dict(names or {})
+    names = {name: name for name in OPTIONS} | {"stretch_range": "stretch"} | dict(names or {})
     signature = signature_of(command, eval_str=True)
     position = list(signature.parameters).index("read_as")
     parameters = list(signature.parameters.values())
@@ -138,6 +149,8 @@ def _settings(values: dict[str, Any]) -> dict[str, Any]:
     columns = once_each("--column", map(_role, values.pop("column") or []))
     only = once_each("--only", map(_cell, values.pop("only") or []))
     stated = {name: value for name, value in dimensions.items() if value}
+    if (text := values.pop("stretch_range")) is not None:
+        values["stretch_range"] = _range(text)
     return values | {"dimensions": stated or None, "columns": columns or None, "only": only or None}
 
 
@@ -148,6 +161,14 @@ def resolve(file: Path) -> Path:
     if file.exists() or str(file) not in datasets.names():
         return file
     return datasets.path(str(file))
+
+
+def _range(text: str) -> tuple[float, float]:
+    low, _, high = text.partition(":")
+    try:
+        return float(low), float(high)
+    except ValueError as error:
+        raise InputError(f"--stretch needs LOW:HIGH, such as 1:1.2, not '{text}'.") from error
 
 
 def _role(text: str) -> tuple[str, str | int]:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["compare", "design", "export", "predict", "show"]
 
 
-@partial(reading.reads_files, names={"stress_type": "data_stress_type"})
+@partial(reading.reads_files, names={"stress_type": "data_stress_type", "stretch_range": "data_stretch"})
 def predict(
     run: RunFolder = None,
     mode: Annotated[

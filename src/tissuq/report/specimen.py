@@ -8,6 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tissuq.assessment import Assessment
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
@@ -62,6 +64,22 @@ __all__ = [
     "write_inspection",
     "write_specimen_run",
 ]
+
+
+LETTERS = 13
+"""Size of letters in the figure of an inspection, which is looked at on small screens, too; points."""
+_BROAD: dict[str, Any] = {"ls": "-", "lw": 9, "alpha": 0.45, "solid_capstyle": "round"}
+_RING: dict[str, Any] = {"ls": "", "marker": "o", "ms": 14, "mfc": "none", "mew": 2.5}
+REGIONS: dict[str, dict[str, Any]] = {
+    "slack": _BROAD | {"color": "#E69F00"},
+    "rupture": _BROAD | {"color": "#D55E00"},
+    "hold": _BROAD | {"color": "#CC79A7"},
+    "saturation": _BROAD | {"color": "#009E73"},
+    "slip": _RING | {"color": "#D55E00"},
+    "outlier": _RING | {"color": "#CC79A7"},
+    "drift": _RING | {"color": "#009E73", "marker": "s"},
+}
+"""How the regions of a test are marked."""
 
 
 def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
@@ -255,32 +273,45 @@ def write_inspection(inspections: Sequence[Inspection], folder: Path) -> None:
 
 
 def curve_figure(inspection: Inspection) -> Figure:
-    """Return two panels: every row of the file with those that are used, and these as they would be fitted.
+    """Return two panels: every row of the file with what happened in the test, and the rows as they would be fitted.
 
     Of a loading mode with two stresses, two for each.
     """
     reading = inspection.reading
     count = len(reading.used.labels)
-    with new_figure(9.2, 3.9 * count) as figure:
-        for number, (recorded_axis, fitted_axis) in enumerate(figure.subplots(count, 2, squeeze=False)):
-            _draw_stress(recorded_axis, fitted_axis, reading, number)
+    with new_figure(6.4 * count, 8.4) as figure:
+        axes = figure.subplots(2, count, squeeze=False)
+        for number, (recorded_axis, fitted_axis) in enumerate(axes.T):
+            _draw_recorded(recorded_axis, reading, number)
+            _draw_fitted(fitted_axis, reading, number)
     return figure
 
 
-def _draw_stress(recorded_axis: Axes, fitted_axis: Axes, reading: Reading, number: int) -> None:
+def _draw_recorded(axis: Axes, reading: Reading, number: int) -> None:
     used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
     stretch, stress = reading.recorded.stretch[number], reading.recorded.stress[number] / unit.to_mpa
-    prefix = f"{used.labels[number]}, " if used.labels[number] else ""
-    controls = reading.experiment.mode.controls
-    name = controls[0].name if len(controls) == 1 else "stretch"
-    recorded_axis.plot(stretch, stress, "-", color=BASE, lw=0.8, label="all rows")
-    recorded_axis.plot(stretch[used.rows], stress[used.rows], ".", color=BAND, ms=3, label="rows used")
-    recorded_axis.set_title(f"{prefix}as recorded")
-    recorded_axis.legend(fontsize=9)
-    fitted_axis.axhline(0, color=BASE, lw=0.6)
-    fitted_axis.axvline(controls[0].reference, color=BASE, lw=0.6)
-    fitted_axis.plot(used.stretch[number], used.stress[number] / unit.to_mpa, ".", color=INK, ms=3)
-    fitted_axis.set_title(f"{prefix}to be fitted: {len(used)} rows")
-    for axis in (recorded_axis, fitted_axis):
-        axis.set_xlabel(name)
-        axis.set_ylabel(f"engineering stress [{unit.name}]")
+    axis.plot(stretch, stress, "-", color=BASE, lw=1, label="all rows")
+    axis.plot(stretch[used.rows], stress[used.rows], ".", color=BAND, ms=4, label="rows used")
+    for region in reading.regions[number]:
+        if len(region.rows):
+            marked = np.full(len(stress), np.nan)  # gaps between runs of rows
+            marked[used.rows[region.rows]] = stress[used.rows[region.rows]]
+            axis.plot(stretch, marked, label=region.kind, **REGIONS[region.kind])
+    _label(axis, reading, number, "as recorded")
+    axis.legend(fontsize=LETTERS)
+
+
+def _draw_fitted(axis: Axes, reading: Reading, number: int) -> None:
+    used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
+    axis.axhline(0, color=BASE, lw=0.8)
+    axis.axvline(reading.experiment.mode.controls[0].reference, color=BASE, lw=0.8)
+    axis.plot(used.stretch[number], used.stress[number] / unit.to_mpa, ".", color=INK, ms=4)
+    _label(axis, reading, number, f"to be fitted: {len(used)} rows")
+
+
+def _label(axis: Axes, reading: Reading, number: int, title: str) -> None:
+    label, controls = reading.used.labels[number], reading.experiment.mode.controls
+    axis.set_title(f"{label}, {title}" if label else title, fontsize=LETTERS + 1)
+    axis.set_xlabel(controls[0].name if len(controls) == 1 else "stretch", fontsize=LETTERS)
+    axis.set_ylabel(f"engineering stress [{reading.experiment.stress_unit}]", fontsize=LETTERS)
+    axis.tick_params(labelsize=LETTERS)

@@ -39,7 +39,10 @@ class ReadingSettings(BaseModel):
     compression_positive: bool = False
     cycle: str | int | None = None
     branch: str | None = None
+    compliance: str | None = None
+    leave_out: str | None = None
     preload: str | None = None
+    stretch_range: tuple[float, float] | None = None
     until_peak: bool = False
     every: int = Field(1, ge=1)
     axis: str | None = None

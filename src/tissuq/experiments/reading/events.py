@@ -1,15 +1,17 @@
-"""What ends an elastic test: rupture, where the load falls on the way on, and holds, where it relaxes at rest."""
+"""What disturbs an elastic test: rupture and slips, where the load falls on the way on, and holds, where it relaxes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tissuq.experiments.reading.averages import averaged
+from tissuq.experiments.reading.averages import averaged, scatter_of_neighbours
 from tissuq.experiments.reading.table import Column
 
-__all__ = ["Event", "find_holds", "find_rupture"]
+__all__ = ["Event", "find_holds", "find_rupture", "find_slips"]
 
 RUPTURE_FALL, SUDDEN_FALL = 0.2, 0.5
 """Shares of the largest stress by which it falls at a rupture: while the test goes on, and within a few rows."""
@@ -23,8 +25,21 @@ REST, BEND = 0.01, 0.2
 """Share of the range of stretches within which a test rests, and share of that by which it may turn meanwhile."""
 HOLD_FALL, HOLD_ROWS, HOLD_SHARE = 0.04, 8, 0.04
 """Share of the largest stress that is lost in a hold, and rows and share of all rows that it has at least."""
+RESOLUTION = 1e-3
+"""Share of the largest stress to which lines between points are right."""
 SCATTERS = 4.0
 """Times the median step between rows by which the stress must fall in a hold."""
+WINDOWS, GAPS = (3, 4, 6, 9, 14, 20), (1, 2, 3)
+"""Points on either side of a slip from which lines are drawn up to it, and points that it takes."""
+FEWEST_ROWS = 24
+"""Rows in which a slip shows."""
+SLIP, SLIP_SCATTERS, LOCAL = 0.015, 6.0, 0.5
+"""Share of the largest stress, and standard errors, by which it falls in a slip; share of that in the slip itself."""
+STEPS, UNIFORM_SD = 1.5, 12**-0.5
+"""Steps of the load, where they are coarse, by which it falls at least; standard deviation of an error that is even
+over one."""
+SLIP_ADVANCE = 0.25
+"""Share of the median step of the stretch by which it goes on in a slip at least."""
 MOST_POINTS = 400
 """Points into which the rows are averaged at most."""
 
@@ -61,6 +76,61 @@ def find_rupture(stretch: Column, stress: Column, reference: float = 1.0) -> Eve
         if len(lasting) == LASTING_ROWS and (lasting > RUPTURE_FALL).all():
             return Event(int(ends[at_peak[row] + 1]), len(stretch), float(fall[row:].max()))
     return None
+
+
+def find_slips(stretch: Column, stress: Column, step: float = 0.0) -> list[Event]:
+    """Return where the stress falls suddenly, by how much it then lies below where it was going, on a loading branch.
+
+    Lines through the points before and after are drawn up to the fall from both sides. Stresses are multiples of a
+    step, where that is coarse.
+    """
+    if len(stretch) < FEWEST_ROWS or not np.abs(stress).max() > 0:
+        return []
+    step_of_load = step / float(np.abs(stress).max())
+    ends, (course, load) = averaged(MOST_POINTS, stretch, stress / stress[np.argmax(np.abs(stress))])
+    course = np.abs(course - course[0])
+    count, advance_of_point = len(load), float(np.median(np.diff(course)))
+    scatter = max(scatter_of_neighbours(load), RESOLUTION, UNIFORM_SD * step_of_load)
+    least = max(SLIP, STEPS * step_of_load)
+    clarity, fall, width = np.zeros(count), np.zeros(count), np.ones(count, dtype=np.intp)
+    for points in [points for points in WINDOWS if points <= max(WINDOWS[2], count // 10)]:
+        for gap in GAPS:
+            before = np.arange(points - 1, count - gap - points + 1)  # the last point before the fall
+            after, advance = before + gap, course[before + gap] - course[before]
+            middle = (course[before] + course[after]) / 2
+            left = _line_at(course, load, points, before - points + 1, middle)
+            right = _line_at(course, load, points, after, middle)
+            drop, error = left.value - right.value, scatter * np.hypot(left.error, right.error)
+            local = load[before] + np.minimum(left.slope, right.slope) * advance - load[after]
+            is_slip = (drop > least) & (local > LOCAL * drop) & (load[after] < load[before])
+            is_slip &= advance > SLIP_ADVANCE * gap * advance_of_point
+            is_clearer = is_slip & (drop > error * np.maximum(clarity[before], SLIP_SCATTERS))
+            clearer = before[is_clearer]
+            clarity[clearer], fall[clearer], width[clearer] = (drop / error)[is_clearer], drop[is_clearer], gap
+    slips = []
+    while (place := int(np.argmax(clarity))) and clarity[place]:
+        slips.append(Event(int(ends[place + 1]), int(ends[place + width[place]]) + 1, float(fall[place])))
+        clarity[max(0, place - WINDOWS[-1]) : place + WINDOWS[-1] + 1] = 0.0
+    return sorted(slips, key=lambda slip: slip.start)
+
+
+class _Line(NamedTuple):
+    """Slopes of lines through points, their values at places, and the standard errors of these for noise of one."""
+
+    slope: Column
+    value: Column
+    error: Column
+
+
+def _line_at(course: Column, load: Column, points: int, starts: NDArray[np.intp], places: Column) -> _Line:
+    """Return the lines through so many points each, from starts on, at places of the course."""
+    windows = np.lib.stride_tricks.sliding_window_view
+    ways, loads = windows(course, points)[starts], windows(load, points)[starts]
+    centre, mean = ways.mean(axis=1), loads.mean(axis=1)
+    away = ways - centre[:, None]
+    size = np.maximum((away**2).sum(axis=1), np.finfo(float).tiny)
+    slope = (away * (loads - mean[:, None])).sum(axis=1) / size
+    return _Line(slope, mean + slope * (places - centre), np.sqrt(1 / points + (places - centre) ** 2 / size))
 
 
 def find_holds(stretch: Column, stress: Column) -> list[Event]:

@@ -22,9 +22,18 @@ from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
-from tissuq.experiments.reading.measures import Load, stress_of, stretch_of
+from tissuq.experiments.reading.measures import Load, stress_of, stretch_of, without_machine
 from tissuq.experiments.reading.options import spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
+from tissuq.experiments.reading.regions import (
+    AUTO,
+    Region,
+    TestedStress,
+    least_errors,
+    regions_of,
+    slack_error,
+    tested_stresses,
+)
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_mode import DEFAULT_MODE, GIVEN, about_mode, mode_of
@@ -67,7 +76,10 @@ class ReadingOptions(TypedDict, total=False):
     compression_positive: bool
     cycle: str | int | None
     branch: str | None
+    compliance: str | None
+    leave_out: str | None
     preload: str | None
+    stretch_range: Sequence[float] | None
     until_peak: bool
     every: int
     axis: str | None
@@ -121,6 +133,8 @@ class Reading:
     cycles : tuple of Cycle
         Of the recorded rows.
     warnings : tuple of str
+    tested : tuple of TestedStress
+        Each stress of these rows.
     mode_source : str
         Where the loading mode comes from.
     spreads : tuple of Spread
@@ -134,13 +148,19 @@ class Reading:
     used: MeasuredRows
     cycles: tuple[Cycle, ...]
     warnings: tuple[str, ...]
+    tested: tuple[TestedStress, ...]
     mode_source: str = ""
     spreads: tuple[Spread, ...] = ()
 
-    @cached_property
-    def used_cycles(self) -> list[Cycle]:
+    @property
+    def used_cycles(self) -> Sequence[Cycle]:
         """The cycles of the rows of the experiment."""
-        return find_cycles(self.used.table, self.used.course)
+        return self.tested[0].cycles
+
+    @cached_property
+    def regions(self) -> list[list[Region]]:
+        """What happened in the test besides elastic loading, as each stress shows it."""
+        return [regions_of(tested) for tested in self.tested]
 
 
 def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
@@ -209,9 +229,16 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         ``first``, ``last`` or the number (from 1) of the only cycle to use; all unless given.
     branch : str, optional
         ``loading`` or ``unloading``: the only branch to use.
+    compliance : str, optional
+        Of the machine, a length over a force such as ``0.5 um/N``: displacements are less by what it gives under load.
+    leave_out : str, optional
+        Lines of the file whose rows to leave out, such as ``31,45:50``.
     preload : str, optional
         Force or stress with its unit (``0.05 N``, ``1 kPa``) at which the specimen counts as taut: stretches are
-        counted from there, and rows that carry less are dropped.
+        counted from there, and rows that carry less are dropped. Or ``auto``: they are counted from where load begins,
+        as far as slack shows, with an uncertainty that becomes one of the ``least_errors``.
+    stretch_range : pair of float, optional
+        Lowest and highest stretch, or amount of shear, of the rows to use, as counted from the preload.
     until_peak : bool
         Leave out the rows after the largest stress of those that are left: rupture, relaxation, unloading.
     every : int
@@ -344,9 +371,18 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     recorded = with_compression_negative(measured, choices, is_positive)
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
-    if (preload := options.get("preload")) is not None:
+    if (lines := options.get("leave_out")) is not None:
+        used = used.without_lines(lines)
+    reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
+    if (preload := options.get("preload")) == AUTO:
+        slacks = [tested.slack for tested in tested_stresses(used, mode, shown)]
+        used = used.loaded(slacks, reference)
+        errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
+    elif preload is not None:
         thresholds = [preload_stress(preload, load.area) for load in loads]
-        used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak)
+        used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference)
+    if (stretch_range := options.get("stretch_range")) is not None:
+        used = used.within(*stretch_range)
     if options.get("until_peak"):
         used = used.until_peak()
     check_stretches(used, choices)
@@ -364,7 +400,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
         used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
     check_signs(used, choices, is_positive)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
-    sheet = table.file.removeprefix(str(path))
+    sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(
         mode=mode,
         stretch=_points(mode, used.stretch),
@@ -372,10 +408,11 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
         standard_error=_of_stresses(used.standard_error),
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
-    ).labelled(stress_unit=loads[0].unit.name)
+        least_errors=errors | least_errors(tested),
+    ).labelled(stress_unit=shown.name)
     problems = (spread.problem for spread in spreads if spread.problem)
-    warnings_of_file = *table.notes, *dimensions.warnings, *problems
-    return Reading(experiment, table, choices, recorded, used, tuple(cycles), warnings_of_file, mode_source, spreads)
+    notes = *table.notes, *dimensions.warnings, *problems
+    return Reading(experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads)
 
 
 def checked_mode(options: ReadingOptions) -> LoadingMode:
@@ -401,6 +438,10 @@ def checked_mode(options: ReadingOptions) -> LoadingMode:
         name = options.get(option)
         if name is not None and name not in measures:
             raise InputError(f"{option} must be one of {', '.join(measures)}, not '{name}'.")
+    if (stretch_range := options.get("stretch_range")) is not None and not _is_range(stretch_range):
+        raise InputError(
+            f"stretch_range (--stretch) must be a lowest and a highest stretch such as 1:1.2, not {stretch_range!r}."
+        )
     if axis is not None and axis not in AXES:
         raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
     mean_of = options.get("mean_of")
@@ -409,6 +450,10 @@ def checked_mode(options: ReadingOptions) -> LoadingMode:
     if not isinstance(every, int) or every < 1:
         raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
     return mode
+
+
+def _is_range(pair: Sequence[float]) -> bool:
+    return len(pair) == 2 and bool(np.isfinite(pair).all()) and pair[0] < pair[1]
 
 
 def _measured(
@@ -423,15 +468,17 @@ def _measured(
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
+    compliance = options.get("compliance"), options.get("force_unit")
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
         with about_stress(number, labels, mode):
+            deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
             stretch, step = stretch_of(table, choice, deformation, load, size, *units)
             stress = stress_of(table, choice, load, size, options.get("stress_unit"), options.get("force_unit"))
             spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
         stretches.append(stretch)
-        stretch_steps.append(step)
+        stretch_steps.append(f"{step}{given_way}")
         loads.append(stress)
     measured = MeasuredRows(
         table=table,

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import chain
 
 import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.modes.mode import STRETCH, Control
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.events import find_holds, find_rupture
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
-from tissuq.experiments.reading.slack import find_slack
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["data_warnings"]
@@ -30,9 +28,8 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
-SHOWN = 20
-"""Number of holds whose lines are said."""
-UNTIL_PEAK = "to leave out what follows the largest stress give --until-peak."
+DISTURBED = {"rupture", "hold", "slip", "drift"}
+"""What makes loading and unloading differ without hysteresis."""
 
 
 def data_warnings(reading: Reading) -> tuple[str, ...]:
@@ -40,7 +37,13 @@ def data_warnings(reading: Reading) -> tuple[str, ...]:
     labels = reading.used.labels
     texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
     assumed = assumptions(reading.used, reading.choices)
-    return (*assumed, *reading.warnings, *filter(None, chain.from_iterable(texts)))
+    kinds = dict.fromkeys(region.kind for regions in reading.regions for region in regions)
+    happened = (labelled(labels, [_of_kind(regions, kind) for regions in reading.regions]) for kind in kinds)
+    return (*assumed, *reading.warnings, *filter(None, chain.from_iterable((*happened, *texts))))
+
+
+def _of_kind(regions: Sequence[Region], kind: str) -> str:
+    return " ".join(region.text for region in regions if region.kind == kind)
 
 
 def _size(reading: Reading, number: int) -> str:
@@ -66,40 +69,8 @@ def _cycles(reading: Reading, number: int) -> str:
     return f"all {count} cycles are used; {advice}."
 
 
-def _rupture(reading: Reading, number: int) -> str:
-    used, course, stress = reading.used, reading.used.course, reading.used.stress[number]
-    control, peak, table = _control(reading), int(np.argmax(np.abs(stress))), used.table
-    for cycle in reading.used_cycles:
-        rows = cycle.rows("loading")
-        if rupture := find_rupture(course[rows], stress[rows], control.reference):
-            row, rows = rows[rupture.start - 1], rows[rows <= peak]
-            is_before_peak = find_rupture(course[rows], stress[rows], control.reference) is not None
-            return (
-                f"after {table.counted} {table.lines[row]} ({control.name} {course[row]:.4g}) the stress falls by "
-                f"{rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
-                f"{'delete the rows from there on.' if is_before_peak else UNTIL_PEAK}"
-            )
-    return ""
-
-
-def _holds(reading: Reading, number: int) -> str:
-    used, stress = reading.used, reading.used.stress[number]
-    holds = find_holds(used.course, stress)
-    if not holds or _rupture(reading, number):
-        return ""
-    lines, peak = used.table.lines, int(np.argmax(np.abs(stress)))
-    where = ", ".join(f"{lines[hold.start]} to {lines[hold.stop - 1]}" for hold in holds[:SHOWN])
-    more = f" and {len(holds) - SHOWN} more" if len(holds) > SHOWN else ""
-    is_before_peak = any(hold.stop <= peak for hold in holds)
-    return (
-        f"in {used.table.counted}s {where}{more} the stretch rests while the stress falls by up to "
-        f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; "
-        f"{'delete these rows.' if is_before_peak else UNTIL_PEAK}"
-    )
-
-
 def _hysteresis(reading: Reading, number: int) -> str:
-    if _rupture(reading, number) or _holds(reading, number):
+    if DISTURBED.intersection(region.kind for region in reading.regions[number]):
         return ""
     course, stress = reading.used.course, reading.used.stress[number]
     cycle = reading.used_cycles[-1]
@@ -122,7 +93,7 @@ def _hysteresis(reading: Reading, number: int) -> str:
 
 def _reference(reading: Reading, number: int) -> str:
     stretch, stress = reading.used.stretch[number], reading.used.stress[number]
-    unit, control = stress_unit(reading.experiment.stress_unit), _control(reading)
+    unit, control = stress_unit(reading.experiment.stress_unit), reading.tested[number].control
     mode, points = reading.experiment.mode, reading.experiment.stretch
     change = np.abs((points - mode.reference).reshape(len(stress), -1)).max(axis=1)
     nearest = int(np.argmin(change))
@@ -137,41 +108,6 @@ def _reference(reading: Reading, number: int) -> str:
         f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell. "
         f"A hyperelastic material has no stress at {control.name} {control.reference:g}."
     )
-
-
-def _slack(reading: Reading, number: int) -> str:
-    used, mode = reading.used, reading.experiment.mode
-    if any("the preload" in step for step in used.steps):
-        return ""
-    loading = reading.used_cycles[0].rows("loading")
-    rupture = find_rupture(used.course[loading], used.stress[number][loading], _control(reading).reference)
-    loading = loading[: rupture.start if rupture else None]
-    loading = loading[: int(np.argmax(np.abs(used.stress[number][loading]))) + 1]
-    slack = find_slack(used.stretch[number][loading], used.stress[number][loading])
-    if slack is None:
-        return ""
-    unit = stress_unit(reading.experiment.stress_unit)
-    if len(mode.stresses) == 1 or mode.machine_axes:
-        preload = f"{_rounded_up(slack.preload / unit.to_mpa):g} {unit.name}"
-        advice = f'to count from where it is taut give --preload "{preload}", which drops these rows.'
-    else:
-        advice = "count stretches in the file from where it is taut."
-    return (
-        f"the first {slack.rows} rows carry no load that shows, up to {mode.controls[0].name} {slack.stretch:.4g}: "
-        f"slack, or a toe too soft to measure; {advice}"
-    )
-
-
-def _control(reading: Reading) -> Control:
-    """Return what the course of a test is of: the mode's control, or the mean stretch where there are several."""
-    controls = reading.experiment.mode.controls
-    return controls[0] if len(controls) == 1 else STRETCH
-
-
-def _rounded_up(value: float) -> float:
-    """Return a positive number with two digits that is not smaller."""
-    digit = 10.0 ** (np.floor(np.log10(value)) - 1)
-    return float(np.ceil(1.02 * value / digit) * digit)
 
 
 def _many(reading: Reading, number: int) -> str:
@@ -206,11 +142,8 @@ CHECKS: tuple[Callable[[Reading, int], str], ...] = (
     _size,
     _stretch_size,
     _cycles,
-    _rupture,
-    _holds,
     _hysteresis,
     _reference,
-    _slack,
     _many,
     _other_axis,
 )

@@ -9,10 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, MASSES, number_and_unit, stress_unit
 
-__all__ = ["Dropped", "MeasuredRows", "labelled", "preload_stress"]
+__all__ = ["COUNTED_FROM", "Dropped", "MeasuredRows", "labelled", "preload_stress"]
+
+COUNTED_FROM = "stretch counted from"
+"""How the step begins that says where the specimen is undeformed."""
+STRETCH_MARGIN = 1e-5
+"""Share by which a stretch may lie beyond those that are asked for: they are printed with six digits."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,79 @@ class MeasuredRows:
         kept = self.kept(np.arange(peak + 1), "after the largest stress")
         return kept.with_step(f"only rows up to the largest stress, in {self.table.counted} {self.table.lines[peak]}")
 
-    def taut(self, preload: str, thresholds: Sequence[float], peak: int) -> MeasuredRows:
+    def without_lines(self, lines: str) -> MeasuredRows:
+        """Return the rows but those of some lines of the file, such as ``31,45:50``.
+
+        Raises
+        ------
+        InputError
+            When this is not a list of lines, or some of them hold no row that is used.
+        """
+        numbers, is_left_out = np.array(self.table.lines), np.zeros(len(self), dtype=bool)
+        for part in str(lines).split(","):
+            ends = part.split(":")
+            if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
+                raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
+            found = (numbers >= int(ends[0])) & (numbers <= int(ends[-1]))
+            if not found.any():
+                raise InputError(
+                    f"{self.table.file}: there is no row to leave out in line {part.strip()}; rows are in lines "
+                    f"{numbers.min()} to {numbers.max()}."
+                )
+            is_left_out |= found
+        if is_left_out.all():
+            raise InputError(f"{self.table.file}: no row is left without lines {lines}.")
+        kept = self.kept(np.flatnonzero(~is_left_out), "in lines to leave out")
+        return kept.with_step(f"without the rows in lines {lines}")
+
+    def within(self, low: float, high: float) -> MeasuredRows:
+        """Return the rows whose stretches, all of them, lie from one to another.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        margin = STRETCH_MARGIN * (1 + abs(high))
+        is_within = ((self.stretch >= low - margin) & (self.stretch <= high + margin)).all(axis=0)
+        if not is_within.any():
+            raise InputError(
+                f"{self.table.file}: no row has a stretch from {low:g} to {high:g}; they are from "
+                f"{self.stretch.min():.6g} to {self.stretch.max():.6g}."
+            )
+        kept = self.kept(np.flatnonzero(is_within), f"stretch not from {low:g} to {high:g}")
+        return kept.with_step(f"only rows at stretches from {low:g} to {high:g}")
+
+    def loaded(self, slacks: Sequence[Slack | None], reference: float) -> MeasuredRows:
+        """Return the rows from where load begins on every axis, with stretches counted from there.
+
+        Parameters
+        ----------
+        slacks : sequence of Slack or None
+            Where load begins; None where the file's own zero stays.
+        reference : float
+            The stretch of the undeformed specimen, or 0 for an amount of shear.
+        """
+        if not any(slacks):
+            return self.with_step("no slack shows, so the stretch is counted as in the file")
+        starts = np.array([[slack.stretch if slack else reference] for slack in slacks])
+        way = np.sign(self.stretch[np.arange(len(slacks)), np.abs(self.stress).argmax(axis=1)][:, None] - starts)
+        is_loaded = [way[k] * (self.stretch[k] - starts[k]) >= 0 if slack else True for k, slack in enumerate(slacks)]
+        used = self.kept(np.flatnonzero(np.all(np.broadcast_arrays(*is_loaded), axis=0)), "before load begins")
+        sentences = [
+            f"{COUNTED_FROM} {slack.stretch:.6g}, where load begins (estimated; standard deviation {slack.sd:.2g}, "
+            "which the tolerance slack includes)"
+            if slack
+            else "no slack shows"
+            for slack in slacks
+        ]
+        return used._counted_from(starts, reference).with_step(*sentences)
+
+    def _counted_from(self, starts: Column, reference: float) -> MeasuredRows:
+        """Return the rows with stretches, or amounts of shear, counted from others (k, 1)."""
+        return replace(self, stretch=self.stretch / starts if reference else self.stretch - starts)
+
+    def taut(self, preload: str, thresholds: Sequence[float], peak: int, reference: float = 1.0) -> MeasuredRows:
         """Return the rows in which every axis carries the preload, with stretches counted from where it first does.
 
         That is where the absolute stress last rises through its threshold (MPa) on the way to the row ``peak``,
@@ -110,6 +188,12 @@ class MeasuredRows:
         """
         pairs = enumerate(thresholds)
         starts = [_TautStart.of(self, number, preload, threshold, peak) for number, threshold in pairs]
+        if reference and (not_positive := next((start for start in starts if start.stretch <= 0), None)):
+            raise InputError(
+                f"{self.table.file}: where the preload {preload} is reached ({not_positive.place_in_words}), the "
+                f"stretch is {not_positive.stretch:g}, not positive. Check the length of the specimen and the column "
+                "of displacements."
+            )
         is_after = np.arange(len(self)) >= np.array([[start.row] for start in starts])
         carries = is_after & (np.abs(self.stress) >= np.array(thresholds)[:, None])
         is_taut = carries.all(axis=0)
@@ -127,7 +211,7 @@ class MeasuredRows:
         ]
         used = self.taken(np.flatnonzero(is_taut))
         references = np.array([[start.stretch] for start in starts])
-        used = replace(used, stretch=used.stretch / references, dropped=(*self.dropped, *dropped))
+        used = replace(used._counted_from(references, reference), dropped=(*self.dropped, *dropped))
         return used.with_step(*(start.sentence(preload) for start in starts))
 
 
@@ -193,13 +277,8 @@ class _TautStart:
         else:
             words = f"in {table.counted} {table.lines[0]}, the first, where the stress is already {size[0]:g} MPa"
             start = cls(0, float(stretch[0]), words)
-        if start.stretch <= 0:
-            raise InputError(
-                f"{table.file}: where the preload {preload} is reached ({start.place_in_words}), the stretch is "
-                f"{start.stretch:g}, not positive. Check the length of the specimen and the column of displacements."
-            )
         return start
 
     def sentence(self, preload: str) -> str:
         """Return the sentence about this step."""
-        return f"stretch counted from {self.stretch:.6g}, where the preload {preload} is reached {self.place_in_words}"
+        return f"{COUNTED_FROM} {self.stretch:.6g}, where the preload {preload} is reached {self.place_in_words}"

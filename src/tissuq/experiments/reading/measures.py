@@ -17,7 +17,7 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.torsion import apparent_stress
 from tissuq.experiments.units import ANGLE, FORCE, LENGTH, TORQUE, Quantity, number_and_unit
 
-__all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of"]
+__all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of", "without_machine"]
 
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
@@ -103,6 +103,47 @@ def stretch_of(
         raise InputError(f"{table.place(choice.deformation)}: {error}") from error
     what = "amount of shear" if is_shear else "stretch"
     return converted, f"{what} = {formula.format(f'column {label}{scaled}')}"
+
+
+def without_machine(
+    table: Table,
+    choice: ColumnChoice,
+    displacement: Column,
+    load: Column,
+    displacement_unit: str | None,
+    compliance: str | None,
+    force_unit: str | None,
+) -> tuple[Column, str]:
+    """Return displacements of the specimen alone, in the unit of the file, and how the machine's were taken off.
+
+    The machine gives way in the direction of the force, that in which it moves the specimen, whatever signs both have.
+
+    Raises
+    ------
+    InputError
+        When the compliance is not a length over a force, or the file does not give displacement and force.
+    """
+    if compliance is None:
+        return displacement, ""
+    if (choice.measure, choice.load) != ("displacement", "force"):
+        raise InputError(
+            f"compliance (--compliance) takes what the machine gives way under force off displacements, but "
+            f"{table.file} is read as {choice.measure} and {choice.load}. Leave it out, or give the columns of "
+            "displacement and force: --column displacement=NAME --column force=NAME."
+        )
+    number, unit = number_and_unit(compliance)
+    length, slash, force = unit.partition("/")
+    if number is None or number < 0 or not slash:
+        raise InputError(f"compliance must be a length over a force such as '0.5 um/N', not '{compliance}'.")
+    in_newtons, _ = _factor(table, choice.stress, FORCE, "force_unit", force_unit)
+    in_mm, _ = _factor(table, choice.deformation, LENGTH, "displacement_unit", displacement_unit)
+    per_newton = number * LENGTH.factor(length.strip()) / FORCE.factor(force.strip())
+    away = displacement - displacement[0]
+    direction = np.sign(away[np.argmax(np.abs(away))] * load[np.argmax(np.abs(load))])
+    return (
+        displacement - direction * per_newton * in_newtons * load / in_mm,
+        f", less {number:g} {unit} of the machine's compliance times the force",
+    )
 
 
 def stress_of(

@@ -13,13 +13,17 @@ __all__ = ["Slack", "find_slack"]
 
 STARTS = np.concatenate([[0.0], np.linspace(0.02, 0.7, 35)])
 """Shares of the way at which the load may begin."""
-MOST_POINTS, FEWEST_POINTS = 200, 12
-"""Points into which the rows are averaged at most, and rows that are needed."""
+FINER = np.linspace(-0.03, 0.03, 25)
+"""Further shares of the way, about the best of those."""
+MOST_POINTS, FEWEST_POINTS, FEWEST_SLACK = 200, 12, 3
+"""Points into which the rows are averaged at most, rows that are needed, and rows without load among them."""
+FITTED = 6
+"""About how many numbers the curves fit."""
 RESOLUTION = 5e-4
 """Share of the largest stress to which the family of curves is right."""
-EVIDENCE, SHORTEST = 4.0, 0.05
+EVIDENCE, SHORTEST = 5.0, 0.03
 """Gain in log likelihood (n log of the ratio of mean squares) and share of the way from which slack is said."""
-LEAST_SLOPE = 0.01
+LEAST_SLOPE = 0.02
 """Slope at the start of the stiffest curves of the family, relative to their mean slope."""
 ALREADY_LOADED = 0.2
 """Share of the largest stress below which, with the other sign, the rows are of a test through its reference."""
@@ -29,10 +33,14 @@ LEAST_PRELOAD, MOST_LOAD = 0.005, 0.1
 
 @dataclass(frozen=True)
 class Slack:
-    """Where load begins: the number of rows before, the stretch there, and a stress (MPa) that none of them carries."""
+    """Where load begins: the number of rows before it, and the stretch there with its standard deviation.
+
+    ``preload`` is a stress (MPa) that none of those rows carries.
+    """
 
     rows: int
     stretch: float
+    sd: float
     preload: float
 
 
@@ -41,7 +49,8 @@ def find_slack(stretch: Column, stress: Column) -> Slack | None:
 
     The stress is fitted by sums, with no negative weight, of curves that soften or stiffen from where load begins. If
     they fit clearly better from further on than from the first row, the specimen was slack up to there. Every curve of
-    the family has a slope at its start, as every elastic material has, so that stiffening alone is no slack.
+    the family has a slope at its start, as every elastic material has, so that stiffening alone is no slack. How well
+    they fit from every other place is how probable it is that load begins there.
     """
     way = np.abs(stretch - stretch[0])
     if len(way) < FEWEST_POINTS or not way.max() > 0 or not np.abs(stress).max() > 0:
@@ -51,32 +60,52 @@ def find_slack(stretch: Column, stress: Column) -> Slack | None:
     if load.min() < -ALREADY_LOADED:
         return None
     _, (share, mean_load) = averaged(MOST_POINTS, way / way[-1], load)
-    misfits = [_misfit(share, mean_load, start) for start in STARTS]
-    best = int(np.argmin(misfits))
-    gain = len(share) * float(np.log(misfits[0] / misfits[best]))
-    is_slack = way < STARTS[best] * way[-1]
+    starts, gains = _gains(share, mean_load)
+    if gains.max() < EVIDENCE or starts[np.argmax(gains)] < SHORTEST:
+        return None
+    weights = np.exp((gains - gains.max()) / 2) * np.gradient(starts)
+    start = float(weights @ starts / weights.sum())
+    spread = np.sqrt(weights @ (starts - start) ** 2 / weights.sum() + 0.25 * len(share) ** -2.0)
+    is_slack = way < start * way[-1]
     largest = float(np.abs(load[is_slack]).max(initial=0.0))
-    if gain < EVIDENCE or STARTS[best] < SHORTEST or not is_slack.any() or largest > MOST_LOAD:
+    if is_slack.sum() < FEWEST_SLACK or largest > MOST_LOAD:
         return None
     preload = max(largest, LEAST_PRELOAD) * float(np.abs(stress).max())
-    end = stretch[0] + np.sign(stretch[order[-1]] - stretch[0]) * STARTS[best] * way[-1]
-    return Slack(int(is_slack.sum()), float(end), preload)
+    end = stretch[0] + np.sign(stretch[order[-1]] - stretch[0]) * start * way[-1]
+    return Slack(int(is_slack.sum()), float(end), float(spread * way[-1]), preload)
 
 
-def _misfit(share: Column, load: Column, start: float) -> float:
-    """Return the mean square by which curves that begin at a share of the way miss the loads."""
+def _gains(share: Column, load: Column) -> tuple[Column, Column]:
+    """Return shares of the way, and twice the log likelihood that load begins there, less that of the first row.
+
+    Residuals that neighbours have in common count once.
+    """
+    fits = {start: _fit(share, load, start) for start in STARTS.tolist()}
+    best = min(fits, key=lambda start: fits[start][0])
+    fits |= {start: _fit(share, load, start) for start in (best + FINER).tolist() if start > 0 < best}
+    starts = sorted(fits)
+    misfits = np.array([fits[start][0] for start in starts])
+    residual = fits[starts[int(np.argmin(misfits))]][1]
+    correlation = max(float(residual[1:] @ residual[:-1]) / (len(load) * float(misfits.min())), 0.0)
+    independent = (len(load) - FITTED) * (1 - correlation) / (1 + correlation)
+    return np.array(starts), independent * np.log(misfits[0] / misfits)
+
+
+def _fit(share: Column, load: Column, start: float) -> tuple[float, Column]:
+    """Return the mean square by which curves that begin at a share of the way miss the loads, and the misses (n,)."""
     from scipy.optimize import nnls
 
-    curves = _curves(np.clip((share - start) / (1 - start), 0.0, None))
-    _, distance = nnls(curves, 1 + load, maxiter=50 * curves.shape[1])  # the 1 lets the zero of the load be negative
-    return float(distance**2 / len(share) + RESOLUTION**2)
+    curves, shifted = _curves(np.clip((share - start) / (1 - start), 0.0, None)), 1 + load
+    weights, distance = nnls(curves, shifted, maxiter=50 * curves.shape[1])  # shifted: the load may begin below zero
+    return float(distance**2 / len(share) + RESOLUTION**2), shifted - curves @ weights
 
 
 def _curves(share: Column) -> Column:
     """Return what loads are sums of (n, k): a constant, and curves that soften, go straight, stiffen or lock."""
-    stiffening = [share**power for power in (2, 3, 5, 8)]
-    stiffening += [np.expm1(rate * share) / np.expm1(rate) for rate in (4, 8, 16)]
+    stiffening = [share**power for power in (1.5, 2, 2.5, 3, 4, 5, 7, 10)]
+    stiffening += [np.expm1(rate * share) / np.expm1(rate) for rate in (1, 2, 3, 4, 5, 6, 8, 11, 16)]
+    stiffening += [share * np.exp(rate * (share**2 - 1)) for rate in (1, 2, 4)]
+    stiffening += [(1 - limit) * share / (1 - limit * share) for limit in (0.5, 0.7, 0.8, 0.9, 0.95, 0.99)]
     curves = [np.ones_like(share), share, *(LEAST_SLOPE * share + (1 - LEAST_SLOPE) * curve for curve in stiffening)]
-    curves += [-np.expm1(-rate * share) for rate in (2, 6, 20)]
-    curves += [(1 - limit) * share / (1 - limit * share) for limit in (0.8, 0.95, 0.99)]
+    curves += [-np.expm1(-rate * share) for rate in (1, 2, 4, 8, 20)]
     return np.column_stack(curves)

@@ -1,0 +1,306 @@
+"""What happened in a test besides elastic loading, a kind each: where, what was seen, and the option that cures it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.modes.mode import STRETCH, Control, LoadingMode
+from tissuq.experiments.reading.cycles import Cycle, find_cycles
+from tissuq.experiments.reading.events import Event, find_holds, find_rupture, find_slips
+from tissuq.experiments.reading.load_cell import find_drift, find_saturation, staircase_of, step_of
+from tissuq.experiments.reading.measured_rows import COUNTED_FROM, MeasuredRows
+from tissuq.experiments.reading.outliers import find_outliers
+from tissuq.experiments.reading.slack import Slack, find_slack
+from tissuq.experiments.reading.table import Column
+from tissuq.experiments.units import StressUnit
+
+__all__ = ["AUTO", "Region", "TestedStress", "least_errors", "regions_of", "slack_error", "tested_stresses"]
+
+AUTO = "auto"
+"""What is given for a preload where load begins."""
+UNTIL_PEAK = "to leave out what follows the largest stress give --until-peak."
+COARSE_STEP = 0.007
+"""Share of the largest load from which its step is worth a word: its error is then that of a careful laboratory."""
+UNIFORM_SD = 12**-0.5
+"""Standard deviation of an error that is even over a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Rows of a test, of those that are used, in which something happened; what, and a sentence with what to do."""
+
+    kind: str
+    rows: NDArray[np.intp]
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class TestedStress:
+    """One stress of the rows that are used, with the cycles in which it was measured."""
+
+    used: MeasuredRows
+    number: int
+    cycles: Sequence[Cycle]
+    mode: LoadingMode
+    unit: StressUnit
+
+    @property
+    def course(self) -> Column:
+        """What shows how far the test has gone (n,)."""
+        return self.used.course
+
+    @cached_property
+    def stress(self) -> Column:
+        """The stress (n,), MPa."""
+        return np.asarray(self.used.stress[self.number])
+
+    @property
+    def control(self) -> Control:
+        """What the course is of: the mode's control, or the mean stretch where there are several."""
+        return self.mode.controls[0] if len(self.mode.controls) == 1 else STRETCH
+
+    @cached_property
+    def peak(self) -> int:
+        """The row of the largest stress."""
+        return int(np.argmax(np.abs(self.stress)))
+
+    @cached_property
+    def branches(self) -> list[NDArray[np.intp]]:
+        """The rows of loading of every cycle, without outliers."""
+        return [np.setdiff1d(cycle.rows("loading"), self.outliers) for cycle in self.cycles]
+
+    @cached_property
+    def outliers(self) -> NDArray[np.intp]:
+        """Single rows far from their neighbours, in stress or course."""
+        return np.union1d(find_outliers(self.stress), find_outliers(self.course))
+
+    @cached_property
+    def rupture(self) -> Event | None:
+        """The first rupture, in rows that are used."""
+        for rows in self.branches:
+            rupture = find_rupture(self.course[rows], self.stress[rows], self.control.reference)
+            if rupture is not None:
+                return Event(int(rows[rupture.start]), int(rows[-1]) + 1, rupture.fall)
+        return None
+
+    @cached_property
+    def holds(self) -> list[Event]:
+        """Where the test rests and the stress relaxes."""
+        return [] if self.rupture else find_holds(self.course, self.stress)
+
+    @cached_property
+    def slips(self) -> list[Event]:
+        """Where the stress falls by a few per cent while the test goes on, before any rupture or hold."""
+        end = min(event.start for event in (self.rupture, *self.holds, Event(len(self.stress), 0, 0.0)) if event)
+        found = []
+        for rows in (branch[branch < end] for branch in self.branches):
+            slips = find_slips(self.course[rows], self.stress[rows], self.load_step or 0.0)
+            found += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
+        return found
+
+    @cached_property
+    def slack(self) -> Slack | None:
+        """The slack at the beginning of the first loading, from the rows before it is disturbed."""
+        end = min(event.start for event in (self.rupture, *self.slips, Event(len(self.stress), 0, 0.0)) if event)
+        rows = self.branches[0]
+        rows = rows[rows < end]
+        if not len(rows):
+            return None
+        rows = rows[: int(np.argmax(np.abs(self.stress[rows]))) + 1]
+        return find_slack(self.used.stretch[self.number][rows], self.stress[rows])
+
+    @cached_property
+    def load_step(self) -> float | None:
+        """The step of the stress (MPa) where that is coarse."""
+        step = step_of(self.stress)
+        return step if step and step > COARSE_STEP * np.abs(self.stress).max() else None
+
+    @cached_property
+    def stretch_step(self) -> float | None:
+        """The step of the stretch where rows share it while the stress goes on."""
+        rows = self.branches[0]
+        return staircase_of(self.used.stretch[self.number][rows], self.stress[rows])
+
+    def lines(self, rows: NDArray[np.intp]) -> str:
+        """Return the lines of the file in which rows stand, as one gives them to ``--leave-out``."""
+        runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+        lines = self.used.table.lines
+        spans = [f"{lines[run[0]]}:{lines[run[-1]]}" if len(run) > 1 else f"{lines[run[0]]}" for run in runs]
+        return ",".join(spans)
+
+    def place(self, rows: NDArray[np.intp]) -> str:
+        """Return where rows stand in the file, in words."""
+        return f"{self.used.table.counted}{'s' * (len(rows) > 1)} {self.lines(rows)}"
+
+
+def tested_stresses(used: MeasuredRows, mode: LoadingMode, unit: StressUnit) -> tuple[TestedStress, ...]:
+    """Return every stress of the rows that are used; ``unit`` is that in which people want to read them."""
+    cycles = find_cycles(used.table, used.course)
+    return tuple(TestedStress(used, number, cycles, mode, unit) for number in range(len(used.labels)))
+
+
+def slack_error(slacks: Sequence[Slack | None], reference: float) -> float:
+    """Return the standard deviation of the stretch at which the specimen is free of stress: the largest of all axes."""
+    return max(slack.sd / (slack.stretch if reference else 1.0) for slack in slacks if slack)
+
+
+def regions_of(tested: TestedStress) -> list[Region]:
+    """Return what happened in a test, kind by kind."""
+    return [region for check in CHECKS for region in check(tested)]
+
+
+def least_errors(tests: Sequence[TestedStress]) -> dict[str, float]:
+    """Return the standard deviations of errors of a test that its load cell and displacement have at least, by name."""
+    load = [test.load_step / np.abs(test.stress).max() for test in tests if test.load_step]
+    stretch = [test.stretch_step for test in tests if test.stretch_step]
+    steps = {"resolution": max(load, default=0.0), "stretch": max(stretch, default=0.0)}
+    return {name: float(UNIFORM_SD * step) for name, step in steps.items() if step}
+
+
+def _rupture(tested: TestedStress) -> Iterator[Region]:
+    if rupture := tested.rupture:
+        row, rows = rupture.start - 1, np.arange(rupture.start, rupture.stop)
+        is_before_peak = tested.peak >= rupture.start
+        advice = _leave_out(tested, np.arange(rupture.start, len(tested.used))) if is_before_peak else UNTIL_PEAK
+        yield Region(
+            "rupture",
+            rows,
+            f"after {tested.used.table.counted} {tested.used.table.lines[row]} ({tested.control.name} {tested.course[row]:.4g}) the stress "
+            f"falls by {rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
+            f"{advice}",
+        )
+
+
+def _holds(tested: TestedStress) -> Iterator[Region]:
+    if holds := tested.holds:
+        rows = np.concatenate([np.arange(hold.start, hold.stop) for hold in holds])
+        is_before_peak = any(hold.stop <= tested.peak for hold in holds)
+        yield Region(
+            "hold",
+            rows,
+            f"in {tested.place(rows)} the stretch rests while the stress falls by up to "
+            f"{max(hold.fall for hold in holds):.0%} of the largest: it relaxes, as no elastic material does; "
+            f"{_leave_out(tested, rows) if is_before_peak else UNTIL_PEAK}",
+        )
+
+
+def _slips(tested: TestedStress) -> Iterator[Region]:
+    if slips := tested.slips:
+        rows = np.array([row for slip in slips for row in range(slip.start, slip.stop)])
+        yield Region(
+            "slip",
+            rows,
+            f"in {tested.place(rows)} the stress suddenly falls, by up to {max(slip.fall for slip in slips):.1%} "
+            "of the largest, and the test goes on: the specimen slipped in the grips, or tore a little, and stretches "
+            f"from there on are too large; {_leave_out(tested, np.arange(slips[0].start, len(tested.used)))}",
+        )
+
+
+def _saturation(tested: TestedStress) -> Iterator[Region]:
+    rows = find_saturation(tested.stress)
+    if len(rows):
+        largest = abs(tested.stress[rows[0]]) / tested.unit.to_mpa
+        yield Region(
+            "saturation",
+            rows,
+            f"{len(rows)} rows carry exactly the largest stress, {largest:.5g} {tested.unit.name}: the load cell reads "
+            f"no more than that; {_leave_out(tested, rows)}",
+        )
+
+
+def _outliers(tested: TestedStress) -> Iterator[Region]:
+    if len(rows := tested.outliers):
+        yield Region(
+            "outlier",
+            rows,
+            f"{'rows lie' if len(rows) > 1 else 'a row lies'} far off the ones before and after, in "
+            f"{tested.place(rows)}; {_leave_out(tested, rows)}",
+        )
+
+
+def _drift(tested: TestedStress) -> Iterator[Region]:
+    if tested.rupture or tested.holds or tested.slips:
+        return
+    course, stress = tested.course, tested.stress
+    if drift := find_drift(course, stress):
+        begin, end = (f"{value / tested.unit.to_mpa:.3g}" for value in drift)
+        yield Region(
+            "drift",
+            np.array([0, len(stress) - 1]),
+            f"the stress is {begin} {tested.unit.name} at the beginning and {end} {tested.unit.name} at the end, back "
+            f"at {tested.control.name} {course[-1]:.4g}, {abs(drift[1] - drift[0]) / np.abs(stress).max():.0%} of the "
+            "largest apart: the zero of the load cell drifts, or the specimen has changed for good; to fit one branch "
+            "give --branch loading, and for a zero that is not sure --tolerance "
+            f"zero={abs(drift[1] - drift[0]) / 2 / tested.unit.to_mpa:.2g}.",
+        )
+
+
+def _load_step(tested: TestedStress) -> Iterator[Region]:
+    if step := tested.load_step:
+        share = step / np.abs(tested.stress).max()
+        yield Region(
+            "resolution",
+            np.array([], dtype=np.intp),
+            f"the stresses are multiples of {step / tested.unit.to_mpa:.3g} {tested.unit.name}, {share:.1%} of the "
+            f"largest: the resolution of the load cell, or few digits in the file. A fit allows for an error of "
+            f"{UNIFORM_SD * share:.2g} of the largest in each; to state another one give --tolerance "
+            f"resolution={UNIFORM_SD * share:.2g}.",
+        )
+
+
+def _stretch_step(tested: TestedStress) -> Iterator[Region]:
+    if step := tested.stretch_step:
+        yield Region(
+            "resolution",
+            np.array([], dtype=np.intp),
+            f"the {tested.control.name} goes on in steps of {step:.3g} while the stress goes on evenly: the resolution "
+            f"of the displacement. A fit allows for an error of {UNIFORM_SD * step:.2g} in each; to state another one "
+            f"give --tolerance stretch={UNIFORM_SD * step:.2g}.",
+        )
+
+
+def _slack(tested: TestedStress) -> Iterator[Region]:
+    if any(COUNTED_FROM in step for step in tested.used.steps) or not (slack := tested.slack):
+        return
+    if len(tested.mode.stresses) == 1 or tested.mode.machine_axes:
+        preload = f"{_rounded_up(slack.preload / tested.unit.to_mpa):g} {tested.unit.name}"
+        advice = (
+            f"to count from where load begins give --preload auto, or from where it carries a load --preload "
+            f'"{preload}"; both drop these rows.'
+        )
+    else:
+        advice = "count stretches in the file from where it is taut."
+    yield Region(
+        "slack",
+        tested.branches[0][: slack.rows],
+        f"the first {slack.rows} rows carry no load that shows, up to {tested.mode.controls[0].name} "
+        f"{slack.stretch:.4g} (standard deviation {slack.sd:.2g}): slack, or a toe too soft to measure; {advice}",
+    )
+
+
+def _leave_out(tested: TestedStress, rows: NDArray[np.intp]) -> str:
+    return f"to leave {'them' if len(rows) > 1 else 'it'} out give --leave-out {tested.lines(rows)}."
+
+
+def _rounded_up(value: float) -> float:
+    """Return a positive number with two digits that is not smaller."""
+    digit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(np.ceil(1.02 * value / digit) * digit)
+
+
+CHECKS: tuple[Callable[[TestedStress], Iterator[Region]], ...] = (
+    _rupture,
+    _holds,
+    _slips,
+    _saturation,
+    _outliers,
+    _drift,
+    _load_step,
+    _stretch_step,
+    _slack,
+)
