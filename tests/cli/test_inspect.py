@@ -223,3 +223,37 @@ def test_specimens_beside_one_another_are_a_population(cli, here):
     assert cli("population", "all.csv", "--discrepancy", "none", "--no-figures").status == 0
     specimens = pd.read_csv(here / "runs" / "population" / "specimens.csv")
     assert set(specimens.iloc[:, 0]) == {"s1", "s2", "s3"}
+
+
+@pytest.fixture
+def slack_file(here):
+    """Fifty of 201 rows without load, then a neo-Hookean material with C10 = 50 kPa."""
+    grips = np.linspace(1, 1.4, 201)
+    taut = np.maximum(grips / grips[50], 1.0)
+    stress = 100 * (taut - taut**-2) + 0.1 * np.random.default_rng(2).standard_normal(201)
+    rows = "".join(f"{a:.6f},{b:.6f}\n" for a, b in zip(grips, stress, strict=True))
+    (here / "slack.csv").write_text("stretch,stress [kPa]\n" + rows)
+    return "slack.csv"
+
+
+def test_the_advice_about_slack_can_be_typed_and_enters_the_fit(cli, here, slack_file):
+    said = cli("inspect", slack_file)
+    assert "give --preload auto" in " ".join(said.out.split())
+    said = cli("fit", slack_file, "--preload", "auto", "--discrepancy", "none", "--noise-sd", "0.1", "--no-figures")
+    assert said.status == 0, said.err
+    recipe = tomllib.loads((here / "runs" / "slack" / "run.toml").read_text())
+    assert recipe["preload"] == "auto"
+    page = (here / "runs" / "slack" / "report.html").read_text()
+    assert "where load begins (estimated; standard deviation" in page
+    assert "is as large as the measurements show" in page
+
+
+def test_rows_are_chosen_by_lines_and_stretches(cli, here, slack_file):
+    said = cli("inspect", slack_file, "--stretch", "1.2:1.3", "--leave-out", "110:112")
+    assert said.status == 0, said.err
+    assert "without the rows in lines 110:112" in said.out
+    assert "only rows at stretches from 1.2 to 1.3" in said.out
+    assert cli("inspect", slack_file, "--stretch", "1.2").status == 2
+    said = cli("fit", slack_file, "--stretch", "1.2:1.3", "--discrepancy", "none", "--no-figures", "--preload", "1 kPa")
+    assert said.status == 0, said.err
+    assert tomllib.loads((here / "runs" / "slack" / "run.toml").read_text())["stretch_range"] == [1.2, 1.3]

@@ -81,8 +81,8 @@ def find_rupture(stretch: Column, stress: Column, reference: float = 1.0) -> Eve
 def find_slips(stretch: Column, stress: Column, step: float = 0.0) -> list[Event]:
     """Return where the stress falls suddenly, by how much it then lies below where it was going, on a loading branch.
 
-    Lines through the points before and after are drawn up to the fall from both sides. Stresses are multiples of a
-    step, where that is coarse.
+    Lines through the points before and after are drawn up to the fall from both sides. At a kink, which is none, one of
+    them lies beyond the points on the other side. Stresses are multiples of a step, where that is coarse.
     """
     if len(stretch) < FEWEST_ROWS or not np.abs(stress).max() > 0:
         return []
@@ -98,11 +98,12 @@ def find_slips(stretch: Column, stress: Column, step: float = 0.0) -> list[Event
             before = np.arange(points - 1, count - gap - points + 1)  # the last point before the fall
             after, advance = before + gap, course[before + gap] - course[before]
             middle = (course[before] + course[after]) / 2
-            left = _line_at(course, load, points, before - points + 1, middle)
-            right = _line_at(course, load, points, after, middle)
-            drop, error = left.value - right.value, scatter * np.hypot(left.error, right.error)
+            left, right = (_lines(course, load, points, starts) for starts in (before - points + 1, after))
+            drop = left.at(middle) - right.at(middle)
+            error = scatter * np.hypot(left.error(middle), right.error(middle))
             local = load[before] + np.minimum(left.slope, right.slope) * advance - load[after]
-            is_slip = (drop > least) & (local > LOCAL * drop) & (load[after] < load[before])
+            is_no_kink = (right.mean < left.at(right.centre)) & (left.mean > right.at(left.centre))
+            is_slip = (drop > least) & (local > LOCAL * drop) & (load[after] < load[before]) & is_no_kink
             is_slip &= advance > SLIP_ADVANCE * gap * advance_of_point
             is_clearer = is_slip & (drop > error * np.maximum(clarity[before], SLIP_SCATTERS))
             clearer = before[is_clearer]
@@ -114,23 +115,32 @@ def find_slips(stretch: Column, stress: Column, step: float = 0.0) -> list[Event
     return sorted(slips, key=lambda slip: slip.start)
 
 
-class _Line(NamedTuple):
-    """Slopes of lines through points, their values at places, and the standard errors of these for noise of one."""
+class _Lines(NamedTuple):
+    """Lines through points: where these lie in the mean, their slopes, and the size of the course that gives these."""
 
+    centre: Column
+    mean: Column
     slope: Column
-    value: Column
-    error: Column
+    size: Column
+    points: int
+
+    def at(self, places: Column) -> Column:
+        """Return their values."""
+        return np.asarray(self.mean + self.slope * (places - self.centre))
+
+    def error(self, places: Column) -> Column:
+        """Return the standard errors of these, for noise of one."""
+        return np.sqrt(1 / self.points + (places - self.centre) ** 2 / self.size)
 
 
-def _line_at(course: Column, load: Column, points: int, starts: NDArray[np.intp], places: Column) -> _Line:
-    """Return the lines through so many points each, from starts on, at places of the course."""
+def _lines(course: Column, load: Column, points: int, starts: NDArray[np.intp]) -> _Lines:
+    """Return the lines through so many points each, from starts on."""
     windows = np.lib.stride_tricks.sliding_window_view
     ways, loads = windows(course, points)[starts], windows(load, points)[starts]
     centre, mean = ways.mean(axis=1), loads.mean(axis=1)
     away = ways - centre[:, None]
     size = np.maximum((away**2).sum(axis=1), np.finfo(float).tiny)
-    slope = (away * (loads - mean[:, None])).sum(axis=1) / size
-    return _Line(slope, mean + slope * (places - centre), np.sqrt(1 / points + (places - centre) ** 2 / size))
+    return _Lines(centre, mean, (away * (loads - mean[:, None])).sum(axis=1) / size, size, points)
 
 
 def find_holds(stretch: Column, stress: Column) -> list[Event]:
