@@ -58,10 +58,8 @@ def main() -> None:
                     outcomes.setdefault("slack found", []).append(("slack" in auto.least_errors, 0.0))
         for name, pairs in outcomes.items():
             held, widths = np.array(pairs).T
-            print(
-                f"slack {share:.0%}, {name}: {held.mean():.0%} of {len(pairs)}, half width {np.median(widths):.1%}",
-                flush=True,
-            )
+            width = f", half width {np.median(widths):.1%}" if any(widths) else ""
+            print(f"slack {share:.0%}, {name}: {held.mean():.0%} of {len(pairs)}{width}", flush=True)
 
 
 if __name__ == "__main__":

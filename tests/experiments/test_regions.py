@@ -29,14 +29,14 @@ def inspected(tmp_path):
 
 @pytest.mark.parametrize("name", [name for name in PLANTED if name != "slack over a quarter"])
 def test_what_is_planted_is_found_in_95_of_100_tests(name):
-    """Of 1200 of each kind 97 to 100 % are found (`python tests/planted.py 600`): fewer than 52 of 60 by chance is
-    less likely than 1e-3 for 97 %."""
+    """Of 500 of each kind 95 to 100 % are found (`python tests/planted.py 250`): fewer than 52 of 60 by chance is
+    less likely than 0.01 for 95 %."""
     assert rates(name, 60, 11, ALL_LAWS)[PLANTED[name][0]] >= 52
 
 
 @pytest.mark.parametrize("name", CLEAN)
 def test_clean_tests_raise_no_more_than_5_of_100_false_alarms_of_all_kinds_together(name):
-    """Of 1200 1 to 3 % raise one: more than 10 of 120 by chance is less likely than 1e-2 for 3 %."""
+    """Of 500 1 to 2 % raise one: more than 10 of 120 by chance is less likely than 1e-3 for 2 %."""
     assert rates(name, 120, 12, ALL_LAWS)["any"] <= 10
 
 

@@ -82,7 +82,7 @@ def _hysteresis(reading: Reading, number: int) -> str:
     high = min(course[rows[-1]] for rows in ordered)
     grid = np.linspace(low, high, 50)
     loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
-    share = float(np.abs(loading - unloading).max() / np.abs(stress).max())
+    share = float(np.abs(loading - unloading).max() / max(np.abs(stress).max(), np.finfo(float).tiny))
     if share < NOTABLE_SHARE:
         return ""
     return (
