@@ -116,8 +116,8 @@ def test_fine_steps_and_even_points_are_no_resolution():
 def test_a_zero_that_drifts_is_said_with_both_ends(inspected):
     way = 1 - np.abs(2 * np.linspace(0, 1, 201) - 1)
     drifting = 10 * way - np.linspace(0, 1, 201)
-    (note,) = inspected(1 + 0.3 * way, drifting).warnings
-    assert "the stress is" in note
+    note, hysteresis = inspected(1 + 0.3 * way, drifting).warnings
+    assert hysteresis.startswith("loading and unloading differ")
     assert "10% of the largest apart: the zero of the load cell drifts" in note
     assert "--branch loading" in note
     assert inspected(1 + 0.3 * way, drifting, branch="loading").warnings == ()
@@ -162,3 +162,14 @@ def test_a_range_that_is_none_is_refused(inspected, pair):
 def test_a_range_without_rows_is_refused_with_those_there_are(inspected):
     with pytest.raises(InputError, match=r"no row has a stretch from 2 to 3; they are from 1 to 1\.3"):
         inspected(1 + 0.3 * WAY, 10 * WAY, stretch_range=(2, 3))
+
+
+def test_a_fall_on_the_way_from_compression_to_the_reference_is_no_slip(inspected):
+    """The size of the stress falls there in any case, more steeply in places."""
+    strain = np.linspace(-0.15, 0.15, 101)
+    stress = np.where(strain < 0, 3.0, 1.0) * strain - 0.03 * (strain < -0.08)
+    assert inspected(1 + strain, stress).reading.regions == [[]]
+
+
+def test_two_loads_alone_are_no_saturation():
+    assert not len(find_saturation(np.repeat([0.17, 0.40], 11)))

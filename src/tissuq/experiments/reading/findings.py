@@ -28,7 +28,7 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
-DISTURBED = {"rupture", "hold", "slip", "drift"}
+DISTURBED = {"rupture", "hold", "slip"}
 """What makes loading and unloading differ without hysteresis."""
 
 

@@ -10,8 +10,8 @@ from tissuq.experiments.reading.table import Column
 
 __all__ = ["find_drift", "find_saturation", "staircase_of", "step_of"]
 
-SATURATED_ROWS, TIMES_OTHERS = 4, 3.0
-"""Rows at the largest load, and times as many as at any other load above half of it, from which it is saturated."""
+FEWEST_LEVELS, SATURATED_ROWS, TIMES_OTHERS = 8, 4, 3.0
+"""Different loads; rows at the largest one, and times as many as at any other above half of it: it is saturated."""
 EQUAL, WHOLE = 1e-7, 0.06
 """Share of the range by which numbers differ that are not equal, and part of a step by which multiples of it miss."""
 EVEN = 0.9
@@ -32,7 +32,11 @@ def find_saturation(load: Column) -> NDArray[np.intp]:
     size = np.abs(load)
     values, counts = np.unique(size, return_counts=True)
     others = counts[:-1][values[:-1] > 0.5 * values[-1]]
-    is_saturated = counts[-1] >= SATURATED_ROWS and counts[-1] > TIMES_OTHERS * others.max(initial=1)
+    is_saturated = (
+        len(values) >= FEWEST_LEVELS
+        and counts[-1] >= SATURATED_ROWS
+        and counts[-1] > TIMES_OTHERS * others.max(initial=1)
+    )
     return np.flatnonzero(size == values[-1]) if is_saturated else np.array([], dtype=np.intp)
 
 

@@ -98,10 +98,18 @@ class TestedStress:
         """Where the stress falls by a few per cent while the test goes on, before any rupture or hold."""
         end = min(event.start for event in (self.rupture, *self.holds, Event(len(self.stress), 0, 0.0)) if event)
         found = []
-        for rows in (branch[branch < end] for branch in self.branches):
+        for rows in self._away_from_reference(end):
             slips = find_slips(self.course[rows], self.stress[rows], self.load_step or 0.0)
             found += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
         return found
+
+    def _away_from_reference(self, end: int) -> Iterator[NDArray[np.intp]]:
+        """Iterate over the rows before one in which a branch goes away from the undeformed specimen, to either side."""
+        away = self.course - self.control.reference
+        for rows in (branch[branch < end] for branch in self.branches):
+            for part in (rows[away[rows] >= 0], rows[away[rows] < 0]):
+                if len(part) and abs(away[part[-1]]) > abs(away[part[0]]):
+                    yield part
 
     @cached_property
     def slack(self) -> Slack | None:
