@@ -13,7 +13,7 @@ FIT = [
     (["a" * 300 + ".csv"], ["aaa.csv", "too long"]),
     ([], ["FILE", "--config"]),
     (["SPECIMEN", "--column", "stress=Load"], ["no column 'Load'", "'stretch', 'stress_kPa'"]),
-    (["SPECIMEN", "--column", "torque=Load"], ["'torque'", "stress or force"]),
+    (["SPECIMEN", "--column", "energy=Load"], ["'energy'", "stress or force"]),
     (["SPECIMEN", "--column", "stress"], ["--column", "ROLE=COLUMN"]),
     (["SPECIMEN", "--column", "stress="], ["--column", "ROLE=COLUMN"]),
     (["SPECIMEN", "--column", "stress=1", "--column", "stress=2"], ["--column", "twice", "'stress'"]),

@@ -3,8 +3,8 @@ import gc
 import numpy as np
 import pytest
 
-from loading import MEASURED, PAIRS, SHEAR
-from tissuq.errors import ModelError
+from loading import MEASURED, PAIRS, SHEAR, TEXTBOOK
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode, SimpleShear, ThinTube, loading_mode, loading_modes
 
 
@@ -78,6 +78,19 @@ def test_the_cauchy_ratio_is_that_of_the_tensors(measured):
     expected = [measured.gradient(point)[column, column] for point in measured.points]
     assert measured.gradient(measured.points[0])[column, row] == 0.0 or row == column
     np.testing.assert_allclose(measured.path.cauchy_ratio(measured.points), expected, rtol=1e-15)
+
+
+def test_the_engineering_stress_is_f_times_the_second_piola_kirchhoff_stress_where_that_is_determined(mode):
+    points, gradient, components = TEXTBOOK[mode.name]
+    random = np.random.default_rng(1)
+    second = [part + part.T for part in random.standard_normal((len(points), 3, 3))]
+    first = [gradient(point) @ stress for point, stress in zip(points, second, strict=True)]
+    measured, expected = (np.array([[stress[c] for stress in each] for c in components]) for each in (second, first))
+    if mode.name == "simple-shear":
+        with pytest.raises(InputError, match="does not determine it"):
+            mode.from_second_piola_kirchhoff(points, measured)
+        return
+    np.testing.assert_allclose(mode.from_second_piola_kirchhoff(points, measured), expected, rtol=1e-13)
 
 
 def test_shear_of_either_sign_is_a_mirror_image():

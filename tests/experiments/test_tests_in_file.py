@@ -207,6 +207,19 @@ def test_one_sheet_that_holds_a_test_is_the_test_of_the_file(tmp_path):
     assert test.options["sheet"] == "Data"
 
 
+def test_options_that_only_some_tests_need_are_for_these(tmp_path):
+    force = sheet(["Displacement [mm]", "Force [N]"], 10 * (1 - ramp()), -10 * neo_hookean(2 - ramp()))
+    path = book(tmp_path / "liver.xlsx", compression=[[force[0][0], force[0][1]], *force[1:]], shear=SHEAR)
+    tests = find_tests_in_file(path, dimensions=SIZES, compression_positive=True)
+    assert [(test.options["dimensions"], test.options["compression_positive"]) for test in tests] == [
+        (SIZES, True),
+        (None, False),
+    ]
+    np.testing.assert_allclose(tests[1].reading.experiment.stress, MU * (ramp() - 1), rtol=1e-12)
+    with pytest.raises(InputError, match="which needs no length"):
+        tq.read_experiment(path, sheet="shear", dimensions=SIZES)
+
+
 def test_a_mode_that_only_some_tests_say_is_asked_for(tmp_path):
     path = book(tmp_path / "liver.xlsx", tension=TENSION, Blatt3=TENSION)
     with pytest.raises(InputError, match=r"'Blatt3' does not say in which loading mode.*--mode once for all 2 tests"):
@@ -300,3 +313,9 @@ def test_a_damaged_file_of_matlab_is_refused(tmp_path):
     (tmp_path / "a.mat").write_bytes(b"MATLAB 5.0 MAT-file, Platform: " + bytes(range(200)))
     with pytest.raises(InputError, match="seems to be a file of MATLAB, but it cannot be opened"):
         tq.read_experiment(tmp_path / "a.mat")
+
+
+def test_a_table_of_very_many_columns_is_refused_at_once(tmp_path):
+    rows = [[f"x{k}" for k in range(9000)], *[[f"{row}.5"] * 9000 for row in range(8)]]
+    with pytest.raises(InputError, match="a table of 9000 columns; at most 1000 are read"):
+        read_tests(written(tmp_path / "wide.csv", rows))

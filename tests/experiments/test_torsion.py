@@ -143,3 +143,39 @@ def test_a_torque_against_the_twist_is_refused(tmp_path):
 )
 def test_units_of_torque(unit, newton_mm):
     assert TORQUE.factor(unit) == pytest.approx(newton_mm)
+
+
+def test_a_rheometer_that_moves_its_gap_does_not_twist(tmp_path):
+    gap = np.linspace(10.0, 8.0, 30)
+    rows = [f"{k * 1e-7},{k * 1e-6},{h},{10 * k / 30}" for k, h in enumerate(gap)]
+    path = tmp_path / "gap.csv"
+    path.write_text("\n".join(["Encoder (rad),Torque (Nm),Gap (mm),Normal force (N)", *rows]) + "\n")
+    data = read_experiment(path, dimensions={"diameter": "8 mm"}, compression_positive=True)
+    assert data.mode.name == "uniaxial"
+    np.testing.assert_allclose(data.stretch, gap / 10)
+    path.write_text(path.read_text().replace("Encoder", "Twist"))
+    assert read_experiment(path, dimensions={"diameter": "8 mm"}, compression_positive=True).mode.name == "uniaxial"
+
+
+def rate_file(folder, header="Step time [s],Shear rate [1/s],Stress [Pa]", time=None):
+    """A disc that is sheared faster and faster: an amount of shear of 0.01 t + 0.005 t^2 at the time t."""
+    time = np.linspace(0, 4, 50) if time is None else time
+    rows = [f"{t:.6f},{0.01 * (1 + t):.8f},{500 * t:.3f}" for t in time]
+    (folder / "rate.csv").write_text("\n".join([header, *rows]) + "\n")
+    return folder / "rate.csv"
+
+
+def test_a_rate_of_shear_is_summed_over_time(tmp_path):
+    time = np.linspace(0, 4, 50)
+    data = read_experiment(rate_file(tmp_path), mode="simple-shear")
+    np.testing.assert_allclose(data.stretch, 0.01 * time + 0.005 * time**2, atol=1e-6)
+    minutes = rate_file(tmp_path, "t [min],Scherrate [1/min],Stress [Pa]")
+    np.testing.assert_allclose(read_experiment(minutes, mode="simple-shear").stretch, data.stretch, atol=1e-12)
+    assert "integral of column 'Scherrate [1/min]'" in read_experiment(minutes, mode="simple-shear").source
+
+
+def test_a_rate_of_shear_without_a_time_that_goes_on_is_refused(tmp_path):
+    with pytest.raises(InputError, match="0 columns are times"):
+        read_experiment(rate_file(tmp_path, "Step,Shear rate [1/s],Stress [Pa]"), mode="simple-shear")
+    with pytest.raises(InputError, match=r"line 4, column 'Step time .s.': the time goes back"):
+        read_experiment(rate_file(tmp_path, time=np.array([0, 1, 0.5, 2, 3])), mode="simple-shear")

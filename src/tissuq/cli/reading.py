@@ -112,8 +112,8 @@ OPTIONS: dict[str, Any] = {
     "skip_rows": Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")],
 }
 """The options, in the order of the help, by the names of the settings that they are."""
-SELECTION = ("sheet", "table", "columns", "only")
-"""Options that say where in a file a test is."""
+SELECTION = ("sheet", "table", "columns", "only", "dimensions", "compression_positive")
+"""Options that differ between the tests in a file: where each is, and what not all need."""
 DIMENSIONS = ("length", "area", "width", "thickness", "diameter")
 
 

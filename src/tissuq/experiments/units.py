@@ -22,6 +22,8 @@ __all__ = [
     "LENGTH",
     "MASSES",
     "NUMBER",
+    "RATE",
+    "TIME",
     "TORQUE",
     "Quantity",
     "StressUnit",
@@ -83,7 +85,6 @@ SYMBOLS = (
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
-TIMES = ("s", "sec", "ms", "min", "h")
 MASSES = ("g", "kg")
 """Units of mass that are written where units of force are meant."""
 
@@ -262,6 +263,12 @@ FORCE = Quantity(
     "N",
     {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
 )
+TIME = Quantity("time", "s", {"s": 1.0, "sec": 1.0, "Sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0})
+RATE = Quantity(
+    "rate",
+    "1/s",
+    {form.format(unit): 1 / factor for unit, factor in TIME.factors.items() for form in ("1/{}", "{}-1", "/{}")},
+)
 TORQUE = Quantity(
     "torque",
     "N mm",
@@ -289,7 +296,13 @@ def measured_in(unit: str) -> str:
     for quantity in (FORCE, LENGTH, ANGLE, TORQUE):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
-    return "strain" if compact and compact.lower() in STRAIN_UNITS else "time" if compact.lower() in TIMES else ""
+    return (
+        "strain"
+        if compact and compact.lower() in STRAIN_UNITS
+        else "time"
+        if TIME.factor_or_none(compact.lower())
+        else ""
+    )
 
 
 def number_and_unit(text: str) -> tuple[float | None, str]:

@@ -208,7 +208,8 @@ class Tolerances:
     def at_least(self, sizes: Mapping[str, float]) -> Tolerances:
         """Return the same with errors at least as large, but for those that were stated as numbers.
 
-        Where there are none at all, the intervals are of the specimen as tested, and none is added.
+        Where there are none at all, only errors of a whole test are added: known noise, or a discrepancy that takes up
+        errors, has those that every measurement has by itself.
 
         Examples
         --------
@@ -218,7 +219,11 @@ class Tolerances:
         """
         larger = {name: size for name, size in sizes.items() if size > self._sizes.get(name, 0.0)}
         larger = {name: size for name, size in larger.items() if name not in self._numbers}
-        return self.with_sizes(**larger) if self and larger else self
+        if self:
+            return self.with_sizes(**larger) if larger else self
+        kinds = variants(MeasurementError)
+        of_test = {name: size for name, size in larger.items() if not kinds[name].is_independent}
+        return Tolerances(**(self._stated | of_test)) if of_test else self
 
     def account_of(self, least_errors: Mapping[str, float]) -> str:
         """Return in words which errors are as large as the measurements themselves show; empty where none is."""

@@ -192,7 +192,7 @@ def fit_many(
     solver = Solver(method, modes_named(stable_in), int(seed))
 
     def model_of(data: Experiment) -> StatisticalModel:
-        stated = (tolerances or Tolerances()).at_least(data.least_errors)
+        stated = tolerances.at_least(data.least_errors) if tolerances else tolerances or Tolerances()
         model = StatisticalModel(data, *options, stated)
         standard = default_tolerances(model) if tolerances is None else stated
         if tolerances is None or tolerances.estimand not in ("", AS_TESTED):

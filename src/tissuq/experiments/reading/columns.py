@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
-SHEARS = ("shear", "twist")
+SHEARS = ("shear", "twist", "rate")
 DEFORMATIONS = (*LENGTHENINGS, *SHEARS)
 LOADS = ("stress", "torque", "force")
 SPREAD_ROLES = ("sem", "sd", "n")
@@ -76,7 +76,7 @@ class ColumnChoice:
     deformation, stress : int
         The columns.
     measure : str
-        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear or twist.
+        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear, its rate, or twist.
     load : str
         What the other column holds: stress, torque or force.
     strain_type, stress_type : str
@@ -264,9 +264,11 @@ def _choice(
         deformation = find_column(table, measure, mapping[measure])
     else:
         measures = ["shear"] if is_shear else ["stretch", "strain"]
-        roles = SHEARS if load == "torque" else ("shear",) if is_shear else LENGTHENINGS
+        roles = ("shear", "twist") if load == "torque" else ("shear", "rate") if is_shear else LENGTHENINGS
         if load == "torque" and not contents.fitting("shear"):
             measures = ["twist"]
+        elif is_shear and not contents.fitting("shear") and contents.fitting("rate"):
+            measures = ["rate"]
         if not is_shear and not contents.fitting(*measures):
             measures = ["displacement"] if contents.fitting("displacement") else ["length"]
         is_named = bool(contents.fitting(*measures)) or (is_shear and load != "torque")
@@ -536,7 +538,7 @@ def _check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnCho
         return
     for choice in choices:
         for column, content in ((choice.deformation, choice.measure), (choice.stress, choice.load)):
-            if content in ("displacement", "length", "twist", "force", "torque"):
+            if content in ("displacement", "length", "twist", "rate", "force", "torque"):
                 raise InputError(
                     f"{table.place(column)} holds a {content}, and in loading mode '{mode.name}' columns are read as "
                     "stretch, strain or shear, and as stress. Convert it, and give its column as one of them."

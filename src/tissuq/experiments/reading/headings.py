@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES, StrainMeasure
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
@@ -45,6 +45,10 @@ ROLES = {
         "twist, twist angle, angle of twist, torsion angle, rotation, rotation angle, angle, angular displacement, "
         "angular position, deflection angle, encoder, drehwinkel, verdrehwinkel, torsionswinkel, auslenkwinkel, "
         "angle de torsion, ángulo de torsión, angolo di torsione, ângulo de torção, 扭转角, ねじり角"
+    ),
+    "rate": _names(
+        "shear rate, shear strain rate, rate of shear, scherrate, schergeschwindigkeit, taux de cisaillement, "
+        "vitesse de cisaillement, velocidad de corte, tasa de corte, velocità di taglio, γ̇"
     ),
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
@@ -146,6 +150,8 @@ UNIT_IN_HEADING = (
 """Forms of a name with a unit; brackets are often mistyped, as in ``Stress [kPa}``."""
 QUOTIENT = re.compile(rf"[^{re.escape(BRACKETS)}/]+/[^{re.escape(BRACKETS)}/]+")
 """A unit without brackets, as in ``Stress N/mm^2``."""
+REMEMBERED = 4096
+"""Names that are taken apart once."""
 COPY = re.compile(r"(?<=[^\d\s])\.\d$")
 """What pandas adds to a name that stands in a table again, as in ``Stress.1``."""
 UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[-_.:;|\s](?P<unit>\S*[^\W\d_]\S*|%)")
@@ -159,6 +165,7 @@ class Heading:
     unit: str = ""
 
 
+@lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
     name = MEASURE_IN_BRACKETS.sub(r" \1", COPY.sub("", name.strip())).strip()

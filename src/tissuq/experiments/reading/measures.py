@@ -15,7 +15,7 @@ from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.torsion import apparent_stress
-from tissuq.experiments.units import ANGLE, FORCE, LENGTH, TORQUE, Quantity, number_and_unit
+from tissuq.experiments.units import ANGLE, FORCE, LENGTH, RATE, TIME, TORQUE, Quantity, measured_in, number_and_unit
 
 __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of", "without_machine"]
 
@@ -62,6 +62,8 @@ def stretch_of(
     """
     if choice.measure == "twist":
         return _from_twist(table, choice, values, dimensions, strain_unit, zero)
+    if choice.measure == "rate":
+        return _from_rate(table, choice, values)
     if choice.measure == "displacement":
         return _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
     if zero is not None:
@@ -233,6 +235,28 @@ def _from_twist(
     source = f"column {table.label(choice.deformation)} in {unit_source}{counted}"
     sizes = f"R = {_in_words(radius)}, H = {_in_words(height)}"
     return (twist - start) * radius.value / height.value, f"amount of shear at the rim = {source} x R / H: {sizes}"
+
+
+def _from_rate(table: Table, choice: ColumnChoice, values: Column) -> tuple[Column, str]:
+    """Return the amount of shear as the integral of its rate over time, by trapezoids, and how it was obtained."""
+    from scipy.integrate import cumulative_trapezoid
+
+    times = [column for column in range(len(table.names)) if measured_in(_declared_unit(table, column)) == "time"]
+    times = [column for column in times if not table.is_constant(column)]
+    if len(times) != 1:
+        raise InputError(
+            f"{table.place(choice.deformation)} is a rate of shear, which over time makes the amount of shear, but "
+            f"{len(times)} columns are times. Add a column of shear to the file (--column shear=NAME)."
+        )
+    rate, rate_source = _factor(table, choice.deformation, RATE, "strain_unit", None)
+    second, _ = _factor(table, times[0], TIME, "strain_unit", None)
+    (time,) = table.numbers(times)
+    if (np.diff(time) < 0).any():
+        row = int(np.argmax(np.diff(time) < 0)) + 1
+        raise InputError(f"{table.place(times[0], row)}: the time goes back, so that no shear follows from its rate.")
+    shear = cumulative_trapezoid(values * rate, time * second, initial=0.0)
+    label, over = table.label(choice.deformation), table.label(times[0])
+    return shear, f"amount of shear = integral of column {label} in {rate_source} over {over}, 0 in the first row"
 
 
 def _in_words(dimension: Dimension) -> str:

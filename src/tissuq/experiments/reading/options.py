@@ -12,7 +12,7 @@ from tissuq.experiments.units import is_quantity, unit_of
 
 __all__ = ["spelled_out"]
 
-COLUMNS = ("stretch", "strain", "displacement", "shear", "stress", "force")
+COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "stress", "torque", "force")
 """Roles of columns that are options by themselves; ``length`` is that of the specimen."""
 PARTS = {name: "columns" for role in COLUMNS for name in (role, f"{role}2")} | dict.fromkeys(
     DIMENSION_NAMES, "dimensions"

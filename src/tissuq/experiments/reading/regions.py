@@ -178,8 +178,8 @@ def _rupture(tested: TestedStress) -> Iterator[Region]:
         yield Region(
             "rupture",
             rows,
-            f"after {tested.used.table.counted} {tested.used.table.lines[row]} ({tested.control.name} {tested.course[row]:.4g}) the stress "
-            f"falls by {rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
+            f"after {tested.place(np.array([row]))} ({tested.control.name} {tested.course[row]:.4g}) the stress falls "
+            f"by {rupture.fall:.0%} of the largest while the test goes on: the specimen tore, or slipped; "
             f"{advice}",
         )
 

@@ -109,12 +109,12 @@ def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], cour
 def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
     """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
-    some_rows = table.some_rows(SAMPLED_ROWS)
+    samples = table.some_rows(SAMPLED_ROWS).texts_of_all()
     for column in sorted(set(range(len(table.names))) - used):
         quantity = _quantity(table, column)
         if quantity in CYCLE_NAMES | SET_NAMES or (table.block is not None and not is_of_specimens(quantity)):
             continue
-        sample = some_rows.texts(column)
+        sample = samples[column]
         if len(set(sample)) > len(sample) / 2:
             continue
         labels = row_names(table, column)

@@ -96,7 +96,10 @@ def _mode_of_columns(table: Table) -> tuple[str, str]:
     if not stretches and len(shears) == 1:
         return "simple-shear", "a column of shear"
     is_disc = not stretches and len(twists) == 1 and len(role_names("torque") & set(quantities)) == 1
-    return ("simple-shear", "columns of twist and torque") if is_disc else ("", "")
+    gaps = [column for column, quantity in enumerate(quantities) if quantity in role_names("length")]
+    if not is_disc or any(map(table.varies, gaps)):
+        return "", ""
+    return "simple-shear", "columns of twist and torque"
 
 
 def mode_in_comment(file: Path) -> str:

@@ -45,6 +45,10 @@ FEW_ROWS = 200
 HEAD_LINES = 1000
 """Lines of a long file that show its layout."""
 ALL_TESTS = "tissuq.read_tests and tissuq fit read all of them."
+CONSTANT_SHARE = 0.02
+"""Range of numbers over the largest, up to which they are one: of the gap of a rheometer that holds it."""
+MOST_COLUMNS = 1000
+"""Columns of a table that is read in seconds."""
 CACHED_FILES = 2
 """Files whose tables are remembered: tests of one file are read one after another."""
 TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo)|(zeit|time)$")
@@ -138,10 +142,22 @@ class Table:
         cells = set(self.some_rows(FEW_ROWS).texts(column))
         return len(cells) < 2 or not any(NUMBER.fullmatch(cell) for cell in cells)
 
+    def varies(self, column: int) -> bool:
+        """Tell whether the numbers in a column (counted from 0) differ by more than a sensor's own error."""
+        try:
+            (numbers,) = self.numbers([column])
+        except InputError:
+            return False
+        return bool(np.ptp(numbers) > CONSTANT_SHARE * np.abs(numbers).max())
+
     def texts(self, column: int) -> list[str]:
         """Return the cells of a column (counted from 0) as text, empty ones where a row ends before it."""
         cells = (split(row, self.separator) for row in self.rows)
         return [row[column] if column < len(row) else "" for row in cells]
+
+    def texts_of_all(self) -> list[tuple[str, ...]]:
+        """Return the cells of every column as text, as `texts` does of one."""
+        return list(zip(*(_padded(split(row, self.separator), len(self.names)) for row in self.rows), strict=True))
 
     def numbers(self, columns: Sequence[int]) -> list[Column]:
         """Return columns (counted from 0) as finite numbers, written with decimal points or decimal commas.
@@ -401,6 +417,11 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         header_line, header = content[layout.names]
     names = column_names(header, layout.width, layout.separator, has_units=layout.units is not None)
     width = len(names) or layout.width
+    if width > MOST_COLUMNS:
+        raise InputError(
+            f"{file}: a table of {width} columns; at most {MOST_COLUMNS} are read. Put those of the tests into a file "
+            "of their own."
+        )
     units = [] if layout.units is None else split(texts[layout.units], layout.separator)
     table = Table(
         file=file,

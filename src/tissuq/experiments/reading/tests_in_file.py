@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack, cast
@@ -166,7 +167,33 @@ def _of_one_table(
             selection: ReadingOptions = {**options, "only": {**only, several.column: label}}
             yield from _of_one_table(rows, path, selection, [*names, label])
         return
+    except InputError as error:
+        if not names:
+            raise
+        reading, of_test = _without_what_others_need(table, path, of_test, error)
     yield TestInFile(name, replace(reading, mode_source=source or reading.mode_source), of_test)
+
+
+def _without_what_others_need(
+    table: Table, path: str | os.PathLike[str], options: ReadingOptions, error: InputError
+) -> tuple[Reading, ReadingOptions]:
+    """Read one of several tests without options that it refuses, and that others may need.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read without them either: the error with them.
+    """
+    without: list[ReadingOptions] = [
+        {**options, "dimensions": None},
+        {**options, "compression_positive": False},
+        {**options, "dimensions": None, "compression_positive": False},
+    ]
+    for of_test in without:
+        if of_test != options:
+            with suppress(InputError):
+                return read_rows(table, path, **of_test), of_test
+    raise error
 
 
 def _check_modes(path: str | os.PathLike[str], tests: Sequence[TestInFile]) -> None:
