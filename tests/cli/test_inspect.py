@@ -186,7 +186,9 @@ def test_a_study_of_all_tests_in_a_file_is_written_and_fitted(cli, here):
     study.write_text(study.read_text().replace('# specimen = "S1" ', 'specimen = "S1" '))
     options = ["--discrepancy", "none", "--no-figures"]
     assert cli("fit", "study.toml", *options, "--out", "from-study").status == 0
-    assert cli("fit", "liver.txt", *options, "--out", "from-file").status == 0
+    said = cli("fit", "liver.txt", *options, "--out", "from-file")
+    assert said.status == 0
+    assert said.out.startswith("test 1    tension: uniaxial ('tension'), 12 rows")
     recipe = tomllib.loads((here / "from-study" / "run.toml").read_text())
     assert [test["specimen"] for test in recipe["tests"]] == ["S1", ""]
     assert [test["mode"] for test in recipe["tests"]] == ["uniaxial", "simple-shear"]

@@ -216,6 +216,7 @@ def measured(
         When there is not one mode, specimen or noise for each file or test, or a test does not say its mode.
     """
     from tissuq.experiments.modes import loading_modes
+    from tissuq.experiments.reading.inspection import Inspection, lines_of_tests
 
     noise = _numbers(noise_sd)
     if not files:
@@ -230,6 +231,8 @@ def measured(
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
         return reading | tests[0] | {"noise_sd": noise[0] if noise else None}
+    if len(tests) > len(files):
+        print(*lines_of_tests([Inspection.of(of_test) for of_file in of_files for _, of_test in of_file]), "", sep="\n")
     stated_noise = noise if noise and len(noise) > 1 else None
     for name, option, values in (
         ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)

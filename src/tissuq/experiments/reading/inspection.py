@@ -17,7 +17,7 @@ from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import stress_unit
 
-__all__ = ["Inspection", "inspect", "noise_between_neighbours", "overview"]
+__all__ = ["Inspection", "inspect", "lines_of_tests", "noise_between_neighbours", "overview"]
 
 MIN_TRIPLES = 30
 """Number of triples of neighbouring measurements from which their scatter shows the noise."""
@@ -173,14 +173,18 @@ def inspect(path: Any, **options: Unpack[PythonOptions]) -> Inspection:
     return Inspection.of(read_file(path, **options))
 
 
+def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:
+    """Return what was understood of each of several tests, in a numbered line, wrapped."""
+    return [_wrapped(f"test {number}", inspection.line) for number, inspection in enumerate(inspections, start=1)]
+
+
 def overview(inspections: Sequence[Inspection]) -> str:
     """Return what was understood of several tests: a line and the warnings of each."""
-    lines = [f"{len(inspections)} tests were understood", ""]
     noted: dict[str, list[str]] = {}
     for number, inspection in enumerate(inspections, start=1):
-        lines.append(_wrapped(f"test {number}", inspection.line))
         for text in inspection.warnings:
             noted.setdefault(text, []).append(str(number))
+    lines = [f"{len(inspections)} tests were understood", "", *lines_of_tests(inspections)]
     for text, numbers in noted.items():
         of_tests = "all tests" if len(numbers) == len(inspections) else f"test {', '.join(numbers)}"
         lines += ["", _wrapped("Note", f"{of_tests}: {text}")]

@@ -53,7 +53,7 @@ def find_slack(stretch: Column, stress: Column) -> Slack | None:
     they fit from every other place is how probable it is that load begins there.
 
     With noise of 0.3 % of the largest stress slack over a tenth of the way is found in all curves but J-shaped ones (86
-    of 100), with 1 % in 92 (41): there the rows after it carry as little as those before (docs/reading.md).
+    of 100), with 1 % in 92 (41): there the rows after it carry as little as those before (docs/what-is-looked-for.md).
     """
     way = np.abs(stretch - stretch[0])
     if len(way) < FEWEST_POINTS or not way.max() > 0 or not np.abs(stress).max() > 0:
