@@ -70,7 +70,7 @@ def test_tests_beside_one_another_are_read_each_by_its_columns(tmp_path, rows, n
     ("header", "message"),
     [
         (["Strain", "Stress [kPa]", "Stress [kPa]", "Stress [kPa]"], "several columns may be the stress"),
-        (["Strain", "Stress 11 [kPa]", "Stress 22 [kPa]", "Stress 33 [kPa]"], "no column is recognised as"),
+        (["Strain", "Stress 11 [kPa]", "Stress 22 [kPa]", "Stress 33 [kPa]"], "is of a biaxial test"),
         (["Strain", "Engineering stress [kPa]", "Nominal stress [kPa]", "Stress rate [kPa]"], "several columns may be"),
     ],
 )
@@ -92,6 +92,17 @@ def test_axes_x_and_y_are_of_one_test_and_1_and_2_are_asked_about(tmp_path):
         read_tests(path)
     (test,) = find_tests_in_file(path, mode="biaxial")
     assert test.reading.experiment.stress.shape == (60, 2)
+
+
+def test_stresses_along_axes_whose_measure_is_open_are_asked_about_and_the_advice_reads_them(tmp_path):
+    stress = 1e3 * MU * (ramp() - ramp() ** -5)
+    rows = [["lambda_x", "lambda_y", "sigma_xx[kPa]", "sigma_yy[kPa]"], *rows_of(ramp(), ramp(), stress, 2 * stress)]
+    path = written(tmp_path / "sheet.csv", rows)
+    with pytest.raises(InputError, match=r"--stress-type\): engineering, cauchy"):
+        read_tests(path)
+    (test,) = read_tests(path, stress_type="cauchy")
+    assert test.mode.name == "biaxial"
+    np.testing.assert_allclose(test.stress, np.outer(1e-3 * stress / ramp(), [1, 2]).reshape(60, 2), atol=2e-6)
 
 
 def test_a_shorter_test_ends_where_its_cells_do(tmp_path):

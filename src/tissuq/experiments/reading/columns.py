@@ -14,6 +14,7 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.headings import (
     CYCLE_NAMES,
     DIMENSION_NAMES,
+    STRESS_NOUNS,
     heading,
     measure_in,
     of_spread,
@@ -109,6 +110,8 @@ class _Contents:
         That is the one asked for, or else the engineering one, or what does not say another.
         """
         names = frozenset().union(*(role_names(role) for role in roles))
+        if "stress" in roles and self.stress_type is not None:
+            names |= STRESS_NOUNS
         columns = [column for column, quantity in enumerate(self.quantities) if quantity in names]
         wanted = self.stress_type if "stress" in roles else self.strain_type
         for measures in (("", "engineering"),) if wanted is None else ((wanted,), ("",)):

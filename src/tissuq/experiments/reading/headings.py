@@ -16,6 +16,7 @@ __all__ = [
     "ROLES",
     "SET_NAMES",
     "SPREADS",
+    "STRESS_NOUNS",
     "Heading",
     "heading",
     "is_of_count",
@@ -135,6 +136,10 @@ DIMENSION_NAMES = {
 }
 
 
+ROLES_AND_SIZES = frozenset(["size"]).union(*ROLES.values())
+"""Names of what is along an axis of a biaxial machine."""
+STRESS_NOUNS = frozenset(noun for noun in NOUNS["stress"] if len(noun) > 1) | {"σ"}
+"""Names of a stress whose measure they leave open; one letter may be anything else."""
 AXES = {"x": "x", "y": "y", "1": "x", "2": "y"}
 """Axes of a biaxial machine, by how columns name them."""
 
@@ -258,16 +263,18 @@ def is_of_specimens(quantity: str) -> bool:
 def on_axis(quantity: str) -> tuple[str, str]:
     """Return the axis (x, y, or nothing) that a column of a biaxial machine belongs to, and its name without it.
 
-    Axes that are numbered 1 and 2 are x and y.
+    Axes that are numbered 1 and 2 are x and y; components such as xx and 22 are along them.
 
     Examples
     --------
-    >>> on_axis("xforce"), on_axis("stress y"), on_axis("stretch 1"), on_axis("load")
-    (('x', 'force'), ('y', 'stress'), ('x', 'stretch'), ('', 'load'))
+    >>> on_axis("xforce"), on_axis("stress y"), on_axis("stretch 1"), on_axis("sigma yy"), on_axis("load")
+    (('x', 'force'), ('y', 'stress'), ('x', 'stretch'), ('y', 'sigma'), ('', 'load'))
     """
-    names = frozenset().union(*ROLES.values(), ["size"])
-    for axis, name in ((quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())):
-        if axis in AXES and name in names:
+    parts = [(quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())]
+    if quantity[-1:] == quantity[-2:-1]:
+        parts.append((quantity[-1:], quantity[:-2].strip()))
+    for axis, name in parts:
+        if axis in AXES and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
             return AXES[axis], name
     return "", quantity
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_modes
-from tissuq.experiments.reading.headings import heading, measure_in, on_lettered_axis, role_names
+from tissuq.experiments.reading.headings import STRESS_NOUNS, heading, measure_in, on_lettered_axis, role_names
 from tissuq.experiments.reading.table import Table
 
 __all__ = ["DEFAULT_MODE", "DEFAULT_SOURCE", "GIVEN", "about_mode", "find_mode", "mode_in_comment", "mode_of"]
@@ -87,7 +87,7 @@ def _mode_of_columns(table: Table) -> tuple[str, str]:
     quantities = [measure_in(heading(name).quantity)[0] for name in table.names]
     deformations = role_names("stretch") | role_names("strain") | role_names("displacement")
     on_axes = [on_lettered_axis(quantity) for quantity in quantities]
-    loads = role_names("stress") | role_names("force")
+    loads = role_names("stress") | STRESS_NOUNS | role_names("force")
     if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
         return "biaxial", "columns of both axes"
     stretches, shears, twists = (
