@@ -162,8 +162,9 @@ def test_specimens_may_be_tested_in_several_modes(cli, here):
     assert {row["mode"] for row in table(here / "run" / "data.csv")} == {"uniaxial", "planar"}
     assert {row["mode"] for row in table(here / "run" / "new_patient.csv")} == {"uniaxial", "planar"}
     assert "4 specimens, uniaxial, planar, " in (here / "run" / "report.html").read_text()
-    own = [float(row["median"]) for row in table(here / "run" / "specimens.csv")]
-    assert own == pytest.approx(np.array([*MODULI_KPA[:3], 50]) * 1e-3, rel=0.05)
+    specimens = table(here / "run" / "specimens.csv")
+    assert {row["unit"] for row in specimens} == {"kPa"}
+    assert [float(row["median"]) for row in specimens] == pytest.approx([*MODULI_KPA[:3], 50], rel=0.05)
     assert cli("population", "--config", "run/run.toml", "--no-figures", "--out", "again").status == 0
     assert (here / "again" / "population.csv").read_bytes() == (here / "run" / "population.csv").read_bytes()
 
