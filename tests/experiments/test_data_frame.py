@@ -145,13 +145,27 @@ def test_a_long_data_frame_is_taken_as_numbers_and_a_gap_in_it_is_refused():
         (FRAME, {"unit": "kPa", "stress_unit": "kPa"}, r"unit and stress_unit are the same"),
         (FRAME, {"stress": "P [kPa]", "columns": {"stress": "x"}}, r"stress is given by itself and in columns"),
         (FRAME, {"sheet": 1}, r"^DataFrame is no file: leave sheet, table and skip_rows out"),
-        (TWO, {"stress": "P [kPa]"}, r"names several tests: 'A', 'B'"),
         (tq.Experiment("uniaxial", STRETCH, STRESS), {"unit": "kPa"}, r"^unit: .*which has been read"),
     ],
 )
 def test_what_cannot_be_fitted_is_said_in_one_message(data, options, message):
     with pytest.raises(tq.InputError, match=message):
         tq.fit(data, **options)
+
+
+def test_several_tests_in_a_table_are_fitted_together():
+    with pytest.raises(tq.InputError, match="names several tests: 'A', 'B'"):
+        tq.read(TWO, stress="P [kPa]")
+    posterior = tq.fit(TWO, stress="P [kPa]", discrepancy="none", noise_sd="0.05 kPa")
+    assert [test.name for test in posterior.model.experiment.tests] == ["A", "B"]
+    apart = tq.fit(tq.read_tests(TWO, stress="P [kPa]"), discrepancy="none", noise_sd="0.05 kPa")
+    assert posterior.marginals["C10"].mean == apart.marginals["C10"].mean
+
+
+def test_all_tests_of_a_table_say_what_was_assumed():
+    table = {"stretch": [1.0, 1.1, 1.2], "stress": [0.0, 20.0, 40.0]}
+    with pytest.warns(UserWarning, match="MPa was assumed"):
+        tq.read_tests(table)
 
 
 def test_an_inspection_of_a_data_frame_speaks_of_its_rows():

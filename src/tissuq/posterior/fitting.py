@@ -10,7 +10,8 @@ from tissuq.assessment.stable_posterior import modes_named
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
-from tissuq.experiments.reading.experiment_file import PythonOptions, measurements
+from tissuq.experiments.reading.experiment_file import PythonOptions
+from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named
 from tissuq.model.noise import Noise, noise_named

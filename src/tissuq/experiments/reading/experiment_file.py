@@ -47,7 +47,6 @@ __all__ = [
     "Reading",
     "ReadingOptions",
     "checked_mode",
-    "measurements",
     "read",
     "read_experiment",
     "read_file",
@@ -291,45 +290,6 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
 
 read_experiment = read
 """The earlier name of `read`."""
-
-
-def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
-    """Return what people have as an experiment: one as it is, a file or a table as `read` does, or several together.
-
-    Parameters
-    ----------
-    data : Experiment, str, path or table, or sequence of these
-    others : sequence of str
-        Names of further options, which messages may propose.
-    options
-        As of `read`; of several files those of each.
-
-    Raises
-    ------
-    InputError
-        When it is none of these, or options of reading come with what has been read.
-
-    Examples
-    --------
-    >>> measurements({"stretch": [1.0, 1.1], "stress": [0.0, 0.2]}, unit="MPa").stress.tolist()
-    [0.0, 0.2]
-    """
-    spelled_out(options, READING_OPTIONS, others)
-    if isinstance(data, str | os.PathLike) or is_data_frame(data):
-        return read(data, **options)
-    if isinstance(data, Experiment):
-        if options:
-            raise InputError(
-                f"{', '.join(options)}: said of how a file is read, but the measurements are an Experiment, "
-                "which has been read. Give it to tissuq.read, or to Experiment."
-            )
-        return data
-    if isinstance(data, Sequence):
-        return Experiment.of([measurements(test, others, **options) for test in data])
-    raise InputError(
-        "measurements are needed: a file ('test.csv'), a table (a DataFrame, a Dataset of xarray), or an Experiment, "
-        f"which tissuq.Experiment(mode, stretch, stress) makes of arrays; or a list of these. Not {data!r:.80}."
-    )
 
 
 def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:

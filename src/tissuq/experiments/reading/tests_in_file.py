@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -14,6 +15,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import (
@@ -30,7 +32,7 @@ from tissuq.experiments.reading.side_by_side import columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, GIVEN, about_mode, mode_of
 from tissuq.experiments.reading.table import Table, read_tables
 
-__all__ = ["TestInFile", "find_tests_in_file", "read_tests"]
+__all__ = ["TestInFile", "find_tests_in_file", "measurements", "read_tests"]
 
 MIN_SHARE_OF_TEST = 0.5
 """Rows of a table that may be a test, over those of the longest test in its file; shorter ones are of results."""
@@ -67,6 +69,11 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     list of Experiment
         In the order of the file, named as there.
 
+    Warns
+    -----
+    UserWarning
+        Of units or a zero of displacements that were assumed.
+
     Raises
     ------
     InputError
@@ -79,7 +86,49 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     ['rubber-treloar-uniaxial']
     """
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
-    return [test.reading.experiment for test in find_tests_in_file(path, **plain)]
+    readings = [test.reading for test in find_tests_in_file(path, **plain)]
+    for text in dict.fromkeys(text for reading in readings for text in assumptions(reading.used, reading.choices)):
+        warnings.warn(text, stacklevel=2)
+    return [reading.experiment for reading in readings]
+
+
+def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
+    """Return what people have as an experiment: one as it is, all tests in a file or a table, or several together.
+
+    Parameters
+    ----------
+    data : Experiment, str, path or table, or sequence of these
+    others : sequence of str
+        Names of further options, which messages may propose.
+    options
+        As of `read_tests`; of several files those of each.
+
+    Raises
+    ------
+    InputError
+        When it is none of these, or options of reading come with what has been read.
+
+    Examples
+    --------
+    >>> measurements({"stretch": [1.0, 1.1], "stress": [0.0, 0.2]}, unit="MPa").stress.tolist()
+    [0.0, 0.2]
+    """
+    spelled_out(options, READING_OPTIONS, others)
+    if isinstance(data, str | os.PathLike) or is_data_frame(data):
+        return Experiment.of(read_tests(data, **options))
+    if isinstance(data, Experiment):
+        if options:
+            raise InputError(
+                f"{', '.join(options)}: said of how a file is read, but the measurements are an Experiment, "
+                "which has been read. Give it to tissuq.read, or to Experiment."
+            )
+        return data
+    if isinstance(data, Sequence):
+        return Experiment.of([measurements(test, others, **options) for test in data])
+    raise InputError(
+        "measurements are needed: a file ('test.csv'), a table (a DataFrame, a Dataset of xarray), or an Experiment, "
+        f"which tissuq.Experiment(mode, stretch, stress) makes of arrays; or a list of these. Not {data!r:.80}."
+    )
 
 
 def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[TestInFile]:
