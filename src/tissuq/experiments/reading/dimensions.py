@@ -54,13 +54,11 @@ class Dimensions:
         InputError
             When it is not known.
         """
-        self._refuse_ambiguous("length")
-        if "length" not in self.sizes:
-            raise InputError(
-                f"{self.file}: to turn displacements into stretches give the undeformed length: length '20 mm' "
-                '(--length "20 mm"; in Python dimensions={"length": "20 mm"}). The lines above the table state none.'
-            )
-        return self.sizes["length"]
+        return self._size(
+            "length",
+            "to turn displacements into stretches give the undeformed length: length '20 mm' "
+            '(--length "20 mm"; in Python dimensions={"length": "20 mm"}). The lines above the table state none.',
+        )
 
     @property
     def radius(self) -> Dimension:
@@ -71,14 +69,11 @@ class Dimensions:
         InputError
             When it is not known.
         """
-        self._refuse_ambiguous("diameter")
-        if "diameter" not in self.sizes:
-            raise InputError(
-                f"{self.file}: to turn a torque and a twist into stress and shear at the rim of a disc give its "
-                'diameter (--diameter "20 mm"; in Python dimensions={"diameter": "20 mm"}), and its height as --length '
-                '"2 mm".'
-            )
-        diameter = self.sizes["diameter"]
+        diameter = self._size(
+            "diameter",
+            "to turn a torque and a twist into stress and shear at the rim of a disc give its diameter "
+            '(--diameter "20 mm"; in Python dimensions={"diameter": "20 mm"}), and its height as --length "2 mm".',
+        )
         return Dimension(diameter.value / 2, f"half the diameter {diameter.source}")
 
     @property
@@ -109,6 +104,13 @@ class Dimensions:
                 'Say which: --area "10 mm2", and leave out the others.'
             )
         return area
+
+    def _size(self, name: str, advice: str) -> Dimension:
+        """Return a size that must be known, and be stated once."""
+        self._refuse_ambiguous(name)
+        if name not in self.sizes:
+            raise InputError(f"{self.file}: {advice}")
+        return self.sizes[name]
 
     def _refuse_ambiguous(self, *names: str) -> None:
         for name in names:
