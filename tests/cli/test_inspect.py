@@ -259,3 +259,13 @@ def test_rows_are_chosen_by_lines_and_stretches(cli, here, slack_file):
     said = cli("fit", slack_file, "--stretch", "1.2:1.3", "--discrepancy", "none", "--no-figures", "--preload", "1 kPa")
     assert said.status == 0, said.err
     assert tomllib.loads((here / "runs" / "slack" / "run.toml").read_text())["stretch_range"] == [1.2, 1.3]
+
+
+def test_one_axis_of_a_biaxial_machine_needs_no_mode(cli, here):
+    here.joinpath("sheet.csv").write_text(
+        "stretch x,stretch y,stress x [kPa],stress y [kPa]\n1,1,0,0\n1.1,1.05,2,1.5\n1.2,1.1,4,3\n"
+    )
+    said = cli("inspect", "sheet.csv", "--axis", "y")
+    assert (said.status, said.err) == (0, "")
+    assert "'stretch y' is stretch" in said.out
+    assert "'stress y" in said.out

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import tissuq as tq
+from tissuq.experiments.reading.options import PARTS, PythonOptions
 from tissuq.experiments.reading.table import read_table
 
 Q = pint.UnitRegistry().Quantity
@@ -187,3 +188,7 @@ def test_a_fit_of_files_and_tables_is_that_of_their_experiments(is_file, tmp_pat
     assert laws.fits["neo-hookean"].marginals["C10"].mean == expected.marginals["C10"].mean
     (of_many,) = tq.fit_many([[data]], discrepancy="none", noise_sd=1e-3, **options)
     assert of_many.marginals["C10"].mean == expected.marginals["C10"].mean
+
+
+def test_every_part_of_an_option_is_an_option_of_its_own():
+    assert PARTS.keys() <= PythonOptions.__annotations__.keys()

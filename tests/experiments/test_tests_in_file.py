@@ -330,3 +330,31 @@ def test_a_table_of_very_many_columns_is_refused_at_once(tmp_path):
     rows = [[f"x{k}" for k in range(9000)], *[[f"{row}.5"] * 9000 for row in range(8)]]
     with pytest.raises(InputError, match="a table of 9000 columns; at most 1000 are read"):
         read_tests(written(tmp_path / "wide.csv", rows))
+
+
+BIAXIAL = """stretch x,stretch y,stress x [kPa],stress y [kPa]
+1.0,1.0,0,0
+1.1,1.05,2,1.5
+1.2,1.1,4,3
+"""
+
+
+def test_one_axis_of_a_biaxial_machine_is_read_without_a_mode(tmp_path):
+    path = tmp_path / "sheet.csv"
+    path.write_text(BIAXIAL)
+    for options in ({"axis": "y"}, {"columns": {"stretch": "stretch y", "stress": "stress y [kPa]"}}):
+        (test,) = read_tests(path, **options)
+        assert test.mode.name == "uniaxial"
+        assert test.stretch.tolist() == [1.0, 1.05, 1.1]
+        assert test.stress == pytest.approx([0, 1.5e-3, 3e-3])
+    assert read_tests(path)[0].mode.name == "biaxial"
+
+
+def test_shear_tests_beside_one_another_tell_their_mode(tmp_path):
+    path = tmp_path / "fungi.csv"
+    path.write_text("Shear,Stress S1 [kPa],Stress S2 [kPa]\n0,0,0\n0.1,1,1.2\n0.2,2,2.4\n")
+    tests = find_tests_in_file(path)
+    assert [(test.name, test.options["mode"], test.reading.mode_source) for test in tests] == [
+        ("s1", "simple-shear", "a column of shear"), ("s2", "simple-shear", "a column of shear")
+    ]  # fmt: skip
+    assert tests[1].reading.experiment.stress == pytest.approx([0, 1.2e-3, 2.4e-3])

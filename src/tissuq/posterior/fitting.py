@@ -10,7 +10,7 @@ from tissuq.assessment.stable_posterior import modes_named
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import States
-from tissuq.experiments.reading.experiment_file import PythonOptions
+from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy, discrepancy_named

@@ -17,7 +17,7 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.experiment_file import PythonOptions
+from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements
 from tissuq.experiments.units import in_unit
 from tissuq.inference.marginal import Marginal, blended

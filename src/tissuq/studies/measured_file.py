@@ -10,7 +10,8 @@ from typing import Any, Literal, Self, cast
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_file
+from tissuq.experiments.reading.experiment_file import Reading, read_file
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.units import StressUnit
 from tissuq.model.noise import Noise, noise_named
 from tissuq.parameters.seeds import MAX_SEED

@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, cast
+from typing import Any, Unpack, cast
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns, mapping_of_each_stress
@@ -23,7 +23,7 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.measures import Load, stress_of, stretch_of, without_machine
-from tissuq.experiments.reading.options import spelled_out
+from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
 from tissuq.experiments.reading.regions import (
     AUTO,
@@ -36,82 +36,18 @@ from tissuq.experiments.reading.regions import (
 )
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
 from tissuq.experiments.reading.spread import Spread, spread_of
-from tissuq.experiments.reading.stated_mode import DEFAULT_MODE, GIVEN, about_mode, mode_of
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stated_mode import about_mode, mode_of
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.table import Column, Table, read_table
 
 __all__ = [
-    "READING_OPTIONS",
-    "PythonOptions",
     "Reading",
-    "ReadingOptions",
-    "checked_mode",
     "read",
     "read_experiment",
     "read_file",
     "read_rows",
     "table_of",
 ]
-
-AXES = ("x", "y")
-
-
-class ReadingOptions(TypedDict, total=False):
-    """How to read a file where it does not tell by itself: the options of :func:`tissuq.read`."""
-
-    mode: str | LoadingMode | None
-    columns: Mapping[str, str | int] | None
-    stress_unit: str | None
-    stress_type: str | None
-    strain_type: str | None
-    strain_unit: str | None
-    force_unit: str | None
-    displacement_unit: str | None
-    zero: str | None
-    mean_of: int | None
-    dimensions: Mapping[str, str] | None
-    only: Mapping[str, str | int] | None
-    compression_positive: bool
-    cycle: str | int | None
-    branch: str | None
-    compliance: str | None
-    leave_out: str | None
-    preload: str | None
-    stretch_range: Sequence[float] | None
-    until_peak: bool
-    every: int
-    axis: str | None
-    sheet: str | int | None
-    table: int | None
-    name: str | None
-    skip_rows: int
-
-
-READING_OPTIONS = tuple(ReadingOptions.__annotations__)
-
-
-class PythonOptions(ReadingOptions, total=False):
-    """The options of :func:`tissuq.read`, with entries of `columns` and `dimensions`, and the unit, by themselves."""
-
-    stretch: str | int | None
-    strain: str | int | None
-    displacement: str | int | None
-    shear: str | int | None
-    stress: str | int | None
-    force: str | int | None
-    stretch2: str | int | None
-    strain2: str | int | None
-    displacement2: str | int | None
-    shear2: str | int | None
-    stress2: str | int | None
-    force2: str | int | None
-    length: Any
-    area: Any
-    width: Any
-    thickness: Any
-    diameter: Any
-    unit: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +111,7 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         The file, or a table in memory: a DataFrame of pandas or polars, a Dataset of xarray, a mapping from names to
         arrays or quantities of pint. Units are those in the names of columns, of quantities, and of the attributes
         ``units`` of xarray.
-    stretch, strain, displacement, shear, stress, force, and with 2 at the end : str or int, optional
+    stretch, strain, displacement, shear, twist, rate, stress, torque, force, or ending in 2 : str or int, optional
         Entries of ``columns``: the name of a column, or its number from 1.
     length, area, width, thickness, diameter : str, optional
         Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
@@ -295,8 +231,8 @@ read_experiment = read
 def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     """Read a file as :func:`read` does, and keep what was done on the way."""
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
-    if plain.get("mode") is not None:
-        checked_mode(plain)
+    if (mode := plain.get("mode")) is not None:
+        checked_mode(mode, plain)
     table = table_of(path, plain)
     return read_rows(only_rows(table, plain.get("only")), table.file if is_data_frame(path) else path, **plain)
 
@@ -308,11 +244,8 @@ def table_of(path: Any, options: ReadingOptions) -> Table:
 
 def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[ReadingOptions]) -> Reading:
     """Return what `read_file` does for the rows of a file that have been found already, all of them or some."""
-    mode_source = GIVEN
-    if options.get("mode") is None:
-        has_columns = bool(options.get("axis") or options.get("columns"))
-        options["mode"], mode_source = mode_of(path, table, has_columns=has_columns)
-    mode = checked_mode(options)
+    stated, mode_source = mode_of(path, table, options)
+    mode = checked_mode(stated, options)
     name, is_positive = options.get("name"), options.get("compression_positive", False)
     types = options.get("strain_type"), options.get("stress_type")
     with about_mode(mode.name, mode_source):
@@ -373,47 +306,6 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     problems = (spread.problem for spread in spreads if spread.problem)
     notes = *table.notes, *dimensions.warnings, *problems
     return Reading(experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads)
-
-
-def checked_mode(options: ReadingOptions) -> LoadingMode:
-    """Return the loading mode, once the options have been looked at that need no file."""
-    mode = loading_mode(options.get("mode") or DEFAULT_MODE)
-    axis, every = options.get("axis"), options.get("every", 1)
-    if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
-        raise InputError(
-            f"a file is read in loading modes with one stress or two, and '{mode.name}' has "
-            f"{', '.join(mode.stresses)}: give its values to Experiment."
-        )
-    if len(mode.stresses) > 1 and options.get("compression_positive"):
-        raise InputError(
-            f"compression_positive=True (--compression-positive) is for loading modes with one stress, not for "
-            f"'{mode.name}'. Change the signs in the file, tension positive."
-        )
-    if not (len(mode.stresses) == 1 or mode.machine_axes) and options.get("preload") is not None:
-        raise InputError(
-            f"preload (--preload) does not go with loading mode '{mode.name}', where it does not say which stress "
-            "carries it. Leave it out, and count stretches in the file from where the specimen is taut."
-        )
-    for option, measures in (("strain_type", STRAIN_MEASURES), ("stress_type", STRESS_MEASURES)):
-        name = options.get(option)
-        if name is not None and name not in measures:
-            raise InputError(f"{option} must be one of {', '.join(measures)}, not '{name}'.")
-    if (stretch_range := options.get("stretch_range")) is not None and not _is_range(stretch_range):
-        raise InputError(
-            f"stretch_range (--stretch) must be a lowest and a highest stretch such as 1:1.2, not {stretch_range!r}."
-        )
-    if axis is not None and axis not in AXES:
-        raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
-    mean_of = options.get("mean_of")
-    if mean_of is not None and (not isinstance(mean_of, int) or mean_of < 2):
-        raise InputError(f"mean_of (--mean-of) must be a number of specimens, 2 or more, not {mean_of!r}.")
-    if not isinstance(every, int) or every < 1:
-        raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
-    return mode
-
-
-def _is_range(pair: Sequence[float]) -> bool:
-    return len(pair) == 2 and bool(np.isfinite(pair).all()) and pair[0] < pair[1]
 
 
 def _measured(

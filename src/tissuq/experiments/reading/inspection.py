@@ -10,10 +10,11 @@ from typing import Any, Unpack
 import numpy as np
 
 from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
-from tissuq.experiments.reading.experiment_file import PythonOptions, Reading, read_file
+from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.headings import SPREADS
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import stress_unit
 

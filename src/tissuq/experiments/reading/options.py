@@ -2,15 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, TypedDict
+
+import numpy as np
 
 from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.reading.headings import DIMENSION_NAMES
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.units import is_quantity, unit_of
 
-__all__ = ["spelled_out"]
+__all__ = ["READING_OPTIONS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
+
+AXES = ("x", "y")
+"""Of a biaxial machine."""
+
+
+class ReadingOptions(TypedDict, total=False):
+    """How to read a file where it does not tell by itself: the options of :func:`tissuq.read`."""
+
+    mode: str | LoadingMode | None
+    columns: Mapping[str, str | int] | None
+    stress_unit: str | None
+    stress_type: str | None
+    strain_type: str | None
+    strain_unit: str | None
+    force_unit: str | None
+    displacement_unit: str | None
+    zero: str | None
+    mean_of: int | None
+    dimensions: Mapping[str, str] | None
+    only: Mapping[str, str | int] | None
+    compression_positive: bool
+    cycle: str | int | None
+    branch: str | None
+    compliance: str | None
+    leave_out: str | None
+    preload: str | None
+    stretch_range: Sequence[float] | None
+    until_peak: bool
+    every: int
+    axis: str | None
+    sheet: str | int | None
+    table: int | None
+    name: str | None
+    skip_rows: int
+
+
+READING_OPTIONS = tuple(ReadingOptions.__annotations__)
+
+
+class PythonOptions(ReadingOptions, total=False):
+    """The options of :func:`tissuq.read`, with entries of `columns` and `dimensions`, and the unit, by themselves."""
+
+    stretch: str | int | None
+    strain: str | int | None
+    displacement: str | int | None
+    shear: str | int | None
+    twist: str | int | None
+    rate: str | int | None
+    stress: str | int | None
+    torque: str | int | None
+    force: str | int | None
+    stretch2: str | int | None
+    strain2: str | int | None
+    displacement2: str | int | None
+    shear2: str | int | None
+    twist2: str | int | None
+    rate2: str | int | None
+    stress2: str | int | None
+    torque2: str | int | None
+    force2: str | int | None
+    length: Any
+    area: Any
+    width: Any
+    thickness: Any
+    diameter: Any
+    unit: str | None
+
 
 COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "stress", "torque", "force")
 """Roles of columns that are options by themselves; ``length`` is that of the specimen."""
@@ -78,3 +150,44 @@ def _as_texts(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: _as_texts(entry) for name, entry in value.items()}
     return f"{float(value.magnitude)!r} {unit_of(value)}" if is_quantity(value) else value
+
+
+def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMode:
+    """Return a loading mode, once the options have been looked at that need no file."""
+    mode = loading_mode(name)
+    axis, every = options.get("axis"), options.get("every", 1)
+    if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
+        raise InputError(
+            f"a file is read in loading modes with one stress or two, and '{mode.name}' has "
+            f"{', '.join(mode.stresses)}: give its values to Experiment."
+        )
+    if len(mode.stresses) > 1 and options.get("compression_positive"):
+        raise InputError(
+            f"compression_positive=True (--compression-positive) is for loading modes with one stress, not for "
+            f"'{mode.name}'. Change the signs in the file, tension positive."
+        )
+    if not (len(mode.stresses) == 1 or mode.machine_axes) and options.get("preload") is not None:
+        raise InputError(
+            f"preload (--preload) does not go with loading mode '{mode.name}', where it does not say which stress "
+            "carries it. Leave it out, and count stretches in the file from where the specimen is taut."
+        )
+    for option, measures in (("strain_type", STRAIN_MEASURES), ("stress_type", STRESS_MEASURES)):
+        measure = options.get(option)
+        if measure is not None and measure not in measures:
+            raise InputError(f"{option} must be one of {', '.join(measures)}, not '{measure}'.")
+    if (stretch_range := options.get("stretch_range")) is not None and not _is_range(stretch_range):
+        raise InputError(
+            f"stretch_range (--stretch) must be a lowest and a highest stretch such as 1:1.2, not {stretch_range!r}."
+        )
+    if axis is not None and axis not in AXES:
+        raise InputError(f"axis must be one of {', '.join(AXES)}, not '{axis}'.")
+    mean_of = options.get("mean_of")
+    if mean_of is not None and (not isinstance(mean_of, int) or mean_of < 2):
+        raise InputError(f"mean_of (--mean-of) must be a number of specimens, 2 or more, not {mean_of!r}.")
+    if not isinstance(every, int) or every < 1:
+        raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
+    return mode
+
+
+def _is_range(pair: Sequence[float]) -> bool:
+    return len(pair) == 2 and bool(np.isfinite(pair).all()) and pair[0] < pair[1]

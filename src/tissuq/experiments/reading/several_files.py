@@ -11,7 +11,8 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import find_column
-from tissuq.experiments.reading.experiment_file import Reading, ReadingOptions, read_rows, table_of
+from tissuq.experiments.reading.experiment_file import Reading, read_rows, table_of
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.several_specimens import only_rows, row_names
 
 __all__ = ["SUFFIXES", "find_tests", "read_column"]

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tissuq.errors import InputError
-from tissuq.experiments.modes import loading_modes
+from tissuq.experiments.modes import LoadingMode, loading_modes
 from tissuq.experiments.reading.headings import STRESS_NOUNS, heading, measure_in, on_lettered_axis, role_names
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.table import Table
 
 __all__ = ["DEFAULT_MODE", "DEFAULT_SOURCE", "GIVEN", "about_mode", "find_mode", "mode_in_comment", "mode_of"]
@@ -47,9 +48,9 @@ def find_mode(file: str | os.PathLike[str], words: Sequence[str] = ()) -> tuple[
 
 
 def mode_of(
-    file: str | os.PathLike[str], table: Table, words: Sequence[str] = (), *, has_columns: bool = False
-) -> tuple[str, str]:
-    """Return the mode that a file states, or the columns of its table leave no choice about, or else the default one.
+    file: str | os.PathLike[str], table: Table, options: ReadingOptions, words: Sequence[str] = ()
+) -> tuple[str | LoadingMode, str]:
+    """Return the mode of the options; else that the file states, or its columns leave no choice about; else uniaxial.
 
     Parameters
     ----------
@@ -57,16 +58,18 @@ def mode_of(
     table : Table
     words : sequence of str
         Further names of the test.
-    has_columns : bool
-        Whether columns or an axis have been chosen, so that others tell nothing.
+    options : ReadingOptions
+        Where they choose columns or an axis, other columns tell nothing.
 
     Returns
     -------
-    (str, str)
+    (str or LoadingMode, str)
         The mode, and where it comes from.
     """
+    if (chosen := options.get("mode")) is not None:
+        return chosen, GIVEN
     mode, source = find_mode(file, [table.sheet, table.title, *words])
-    if not mode and not has_columns:
+    if not (mode or options.get("columns") or options.get("axis")):
         mode, source = _mode_of_columns(table)
     return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
 

@@ -18,18 +18,11 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
-from tissuq.experiments.reading.experiment_file import (
-    READING_OPTIONS,
-    PythonOptions,
-    Reading,
-    ReadingOptions,
-    checked_mode,
-    read_rows,
-)
-from tissuq.experiments.reading.options import spelled_out
+from tissuq.experiments.reading.experiment_file import Reading, read_rows
+from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
-from tissuq.experiments.reading.side_by_side import columns_side_by_side
-from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, GIVEN, about_mode, mode_of
+from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
+from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, mode_of
 from tissuq.experiments.reading.table import Table, read_tables
 
 __all__ = ["TestInFile", "find_tests_in_file", "measurements", "read_tests"]
@@ -154,12 +147,13 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
             selection["table"] = table.number
             names.append(table.title or str(table.number))
         try:
-            of_table = list(_side_by_side(only_rows(table, options.get("only")), path, selection, names))
+            rows = only_rows(table, options.get("only"))
+            of_table = _side_by_side(rows, path, selection, names)
         except InputError as error:
             refused.append((table, error))
             continue
-        for part in of_table:
-            tests += _of_one_table(*part)
+        for columns in of_table:
+            tests += _of_one_table(rows, path, selection, names, columns)
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
     for table, refusal in refused:
         if len(table.rows) >= MIN_SHARE_OF_TEST * longest:
@@ -178,35 +172,34 @@ def _may_be_test(refusal: InputError, tests: Sequence[TestInFile]) -> InputError
     return InputError(f"{refusal} To leave that table out and read '{tests[0].name}': {place}.")
 
 
-_Part = tuple[Table, str | os.PathLike[str], ReadingOptions, list[str]]
-"""Rows, the path of their file, the options that read them, and what the file calls them."""
-
-
 def _side_by_side(
     table: Table, path: str | os.PathLike[str], options: ReadingOptions, names: list[str]
-) -> Iterator[_Part]:
-    """Yield the tests whose columns stand beside one another; the table itself where it has those of one."""
-    stated, source = mode_of(path, table, names)
-    mode = checked_mode({**options, "mode": options.get("mode") or stated})
+) -> list[ColumnsOfTest | None]:
+    """Return the columns of each test beside the others; None for the only test of a table."""
+    stated, source = mode_of(path, table, options, names)
+    mode = checked_mode(stated, options)
     stress_type, columns = options.get("stress_type"), options.get("columns")
     tests = [] if columns else columns_side_by_side(table, stress_type, is_shear=mode.controls == (SHEAR,))
     if not tests or len(mode.stresses) > 1:
-        with about_mode(mode.name, GIVEN if options.get("mode") else source):
+        with about_mode(mode.name, source):
             choose_columns(table, mode, columns, options.get("strain_type"), stress_type, options.get("axis"))
-        yield table, path, options, names
-        return
-    for test in tests:
-        yield table, path, {**options, "columns": test.columns}, [*names, test.name]
+        return [None]
+    return list(tests)
 
 
 def _of_one_table(
-    table: Table, path: str | os.PathLike[str], options: ReadingOptions, names: list[str]
+    table: Table,
+    path: str | os.PathLike[str],
+    options: ReadingOptions,
+    names: list[str],
+    columns: ColumnsOfTest | None,
 ) -> Iterator[TestInFile]:
-    """Yield the test in rows, or those of each specimen that a column names."""
-    name, source = " ".join(names) or Path(path).stem, ""
-    of_test: ReadingOptions = {"name": name, **options}
-    if options.get("mode") is None:
-        of_test["mode"], source = mode_of(path, table, names, has_columns=bool(options.get("columns")))
+    """Yield the test in some rows and columns, or those of each specimen that a column names."""
+    words = [*names, columns.name] if columns else names
+    name, (mode, source) = " ".join(words) or Path(path).stem, mode_of(path, table, options, words)
+    of_test: ReadingOptions = {"name": name, **options, "mode": mode}
+    if columns:
+        of_test["columns"] = columns.columns
     try:
         reading = read_rows(table, path, **of_test)
     except SeveralSpecimens as several:
@@ -214,13 +207,13 @@ def _of_one_table(
         for label in dict.fromkeys(several.labels):
             rows = table.taken(np.flatnonzero(labels == label))
             selection: ReadingOptions = {**options, "only": {**only, several.column: label}}
-            yield from _of_one_table(rows, path, selection, [*names, label])
+            yield from _of_one_table(rows, path, selection, [*names, label], columns)
         return
     except InputError as error:
-        if not names:
+        if not words:
             raise
         reading, of_test = _without_what_others_need(table, path, of_test, error)
-    yield TestInFile(name, replace(reading, mode_source=source or reading.mode_source), of_test)
+    yield TestInFile(name, replace(reading, mode_source=source), of_test)
 
 
 def _without_what_others_need(
