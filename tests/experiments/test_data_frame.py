@@ -10,7 +10,7 @@ import xarray as xr
 
 import tissuq as tq
 from tissuq.experiments.reading.options import PARTS, PythonOptions
-from tissuq.experiments.reading.table import read_table
+from tissuq.experiments.reading.tables import read_table
 
 Q = pint.UnitRegistry().Quantity
 STRETCH = np.r_[np.linspace(1, 1.3, 14), np.linspace(1.28, 1, 14)]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.experiments.reading import table
+from tissuq.experiments.reading import tables
 
-ROWS = table.LONG_FILE + 500
+ROWS = tables.LONG_FILE + 500
 
 
 def lines(separator=",", seed=0):
@@ -29,11 +29,11 @@ def written(folder, content):
 @pytest.mark.parametrize("separator", [",", ";", "\t", "  "])
 def test_the_fast_parser_reads_the_same_numbers(tmp_path, monkeypatch, separator):
     path = written(tmp_path, ["made by a machine, today", *lines(separator), "", ""])
-    fast = table.read_table(path)
+    fast = tables.read_table(path)
     assert fast.block is not None
-    table._tables_in.cache_clear()
-    monkeypatch.setattr(table, "LONG_FILE", 10**9)
-    slow = table.read_table(path)
+    tables._tables_in.cache_clear()
+    monkeypatch.setattr(tables, "LONG_FILE", 10**9)
+    slow = tables.read_table(path)
     assert slow.block is None
     assert list(fast.lines) == list(slow.lines)
     assert fast.rows == slow.rows

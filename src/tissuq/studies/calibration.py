@@ -19,7 +19,8 @@ from tissuq.emulation.kriging import Kernel, Trend
 from tissuq.emulation.problem import Method
 from tissuq.emulation.runs import PointSet
 from tissuq.errors import InputError
-from tissuq.experiments.reading.table import Table, read_table
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tables import read_table
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.studies.calibrate import calibrate

@@ -38,7 +38,8 @@ from tissuq.experiments.reading.several_specimens import check_one_specimen, onl
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_mode import about_mode, mode_of
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
-from tissuq.experiments.reading.table import Column, Table, read_table
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.tables import read_table
 
 __all__ = [
     "Reading",

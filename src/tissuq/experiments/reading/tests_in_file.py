@@ -23,7 +23,8 @@ from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, R
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, mode_of
-from tissuq.experiments.reading.table import Table, read_tables
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tables import read_tables
 
 __all__ = ["TestInFile", "find_tests_in_file", "measurements", "read_tests"]
 
