@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from machine_files import neo_hookean
+from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 
 STIFFNESS = {"A": 1.0, "B": 1.1, "C": 1.2}
@@ -87,12 +87,30 @@ def test_cycles_and_one_specimen_are_read_as_before(tmp_path, name, labels):
     assert len(tq.read_experiment(written(tmp_path, name, labels))) == 60
 
 
-def test_numbers_that_may_be_of_cycles_or_of_specimens_are_said(tmp_path):
-    path = written(tmp_path, "No", "123")
+def test_numbers_that_may_be_of_steps_or_of_specimens_are_said(tmp_path):
+    path = written(tmp_path, "Step", "123")
     (note,) = tq.inspect(path).warnings
     assert "all 3 cycles are used" in note
-    assert "if column 'No' numbers specimens, give --only 'No=1'" in note
-    assert len(tq.read_experiment(path, only={"No": 1})) == 20
+    assert "if column 'Step' numbers specimens, give --only 'Step=1'" in note
+    assert len(tq.read_experiment(path, only={"Step": 1})) == 20
+
+
+@pytest.mark.parametrize("name", ["No", "Mouse", "Test ID"])
+def test_numbered_tests_that_are_not_unloaded_are_no_cycles(tmp_path, name):
+    path = written(tmp_path, name, "123")
+    with pytest.raises(InputError, match=f"--only '{name}=1'"):
+        tq.read_experiment(path)
+    assert [test.name for test in tq.read_tests(path)] == ["1", "2", "3"]
+
+
+def test_numbers_of_animals_and_replicates_part_tests_together(tmp_path):
+    path, up = tmp_path / "mice.csv", ramp()
+    rows = [f"{m},{r},{s:.6f},{m * r * neo_hookean(s):.6f}" for m in (1, 2) for r in (1, 2) for s in up]
+    path.write_text("\n".join(["Mouse,Replicate,Stretch,Stress (MPa)", *rows]) + "\n")
+    tests = tq.read_tests(path)
+    assert [test.name for test in tests] == ["1 1", "1 2", "2 1", "2 2"]
+    for test, size in zip(tests, (1, 2, 2, 4), strict=True):
+        np.testing.assert_allclose(test.stress, size * neo_hookean(up), atol=2e-6)
 
 
 def test_two_specimens_are_no_population(tmp_path):

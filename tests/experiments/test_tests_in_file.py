@@ -224,7 +224,7 @@ def test_options_that_only_some_tests_need_are_for_these(tmp_path):
     tests = find_tests_in_file(path, dimensions=SIZES, compression_positive=True)
     assert [(test.options["dimensions"], test.options["compression_positive"]) for test in tests] == [
         (SIZES, True),
-        (None, False),
+        (None, None),
     ]
     np.testing.assert_allclose(tests[1].reading.experiment.stress, MU * (ramp() - 1), rtol=1e-12)
     with pytest.raises(InputError, match="which needs no length"):

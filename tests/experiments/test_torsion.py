@@ -122,7 +122,7 @@ def test_a_twist_that_does_not_begin_at_zero_is_asked_about(tmp_path):
         ),
         ("Twist,Torque (mN m)", {"mode": "simple-shear", "dimensions": SIZES}, "states no unit of angle"),
         ("Twist (rad),Torque", {"mode": "simple-shear", "dimensions": SIZES}, "states no unit of torque"),
-        ("Twist (rad),Torque (mN m)", {"columns": {"twist": 1, "torque": 2}}, "a column is given as"),
+        ("Twist (rad),Torque (mN m)", {"columns": {"twist": 1, "torque": 2}}, "give its diameter"),
         ("Strain,Shear stress (kPa)", {"stress_type": "torsion", "columns": {"stress": 2}}, "is for a twisted disc"),
         ("Shear,Normal force (N)", {"mode": "simple-shear"}, "is normal to the sheared planes"),
     ],

@@ -84,7 +84,8 @@ OPTIONS: dict[str, Any] = {
         typer.Option(help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat."),
     ],
     "compression_positive": Annotated[
-        bool | None, typer.Option("--compression-positive", help="The file counts compression as positive.")
+        bool | None,
+        typer.Option("--compression-positive/--tension-positive", help="Which the file counts as positive [its sign]."),
     ],
     "cycle": Annotated[str | None, typer.Option(help="Use only this cycle: first, last or its number [all].")],
     "branch": Annotated[str | None, typer.Option(help="Use only loading or unloading [both].")],

@@ -62,7 +62,7 @@ COMMON_STRESS_UNITS = {
 }
 PASCALS = {unit.lower(): unit for unit in COMMON_STRESS_UNITS if unit.endswith("Pa")}
 
-STRAIN_UNITS = dict.fromkeys(["", "1", "-", "mm/mm", "m/m", "in/in", "um/um"], 1.0)
+STRAIN_UNITS = dict.fromkeys(["", "1", "-", "mm/mm"], 1.0)
 STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
 STRAIN_UNITS |= {"‰": 1e-3} | dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
 
@@ -191,13 +191,17 @@ def strain_factor(text: str) -> float:
 
     Examples
     --------
-    >>> strain_factor("%")
-    0.01
+    >>> strain_factor("%"), strain_factor("mm/m")
+    (0.01, 0.001)
     """
     compact = re.sub(r"\s+", "", str(text)).lower()
-    if compact not in STRAIN_UNITS:
+    if compact in STRAIN_UNITS:
+        return STRAIN_UNITS[compact]
+    length, _, over = compact.partition("/")
+    factors = LENGTH.factor_or_none(length), LENGTH.factor_or_none(over)
+    if factors[0] is None or factors[1] is None:
         raise InputError(f"'{text}' is not a unit of strain; write '%', or '1' (also 'mm/mm') for a plain ratio.")
-    return STRAIN_UNITS[compact]
+    return factors[0] / factors[1]
 
 
 @dataclass(frozen=True)

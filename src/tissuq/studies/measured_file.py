@@ -37,7 +37,7 @@ class ReadingSettings(BaseModel):
     mean_of: int | None = Field(None, ge=2)
     dimensions: dict[str, str] = Field(default_factory=dict)
     only: dict[str, str | int] = Field(default_factory=dict)
-    compression_positive: bool = False
+    compression_positive: bool | None = None
     cycle: str | int | None = None
     branch: str | None = None
     compliance: str | None = None

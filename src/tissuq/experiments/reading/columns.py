@@ -23,6 +23,7 @@ from tissuq.experiments.reading.headings import (
     role_names,
     without_mean,
 )
+from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
@@ -39,7 +40,7 @@ __all__ = [
 ]
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
-SHEARS = ("shear", "twist", "rate")
+SHEARS = ("shear", "twist", "rate", "sliding")
 DEFORMATIONS = (*LENGTHENINGS, *SHEARS)
 LOADS = ("stress", "torque", "force")
 SPREAD_ROLES = ("sem", "sd", "n")
@@ -53,9 +54,11 @@ OTHER_MEASURE = (
 """Within names of a strain or stress that is, or may be, another one than the engineering one."""
 NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
+NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak|end of")
+"""In a line above the table that speaks of strain or stress without saying what the columns hold."""
 NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
-SHEAR_STRESS = re.compile(r"shear|schub|scher|cisaillement|cortante|taglio|cisalhamento|τ|tau")
+SHEAR_STRESS = re.compile(r"shear|lateral|horizontal|schub|scher|quer|cisaillement|cort[ae]|taglio|cisalhamento|τ|tau")
 NORMAL = re.compile(r"normal|axial|^f ?[nz]$")
 OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
@@ -267,11 +270,12 @@ def _choice(
         deformation = find_column(table, measure, mapping[measure])
     else:
         measures = ["shear"] if is_shear else ["stretch", "strain"]
-        roles = ("shear", "twist") if load == "torque" else ("shear", "rate") if is_shear else LENGTHENINGS
+        roles = ("shear", "twist") if load == "torque" else ("shear", "rate", "sliding") if is_shear else LENGTHENINGS
         if load == "torque" and not contents.fitting("shear"):
             measures = ["twist"]
-        elif is_shear and not contents.fitting("shear") and contents.fitting("rate"):
-            measures = ["rate"]
+        elif is_shear:
+            sheared = (role for role in ("shear", "rate", "sliding", "strain") if contents.fitting(role))
+            measures = [next(sheared, "shear")]
         if not is_shear and not contents.fitting(*measures):
             measures = ["displacement"] if contents.fitting("displacement") else ["length"]
         is_named = bool(contents.fitting(*measures)) or (is_shear and load != "torque")
@@ -282,6 +286,7 @@ def _choice(
         else:
             deformation = _recognise(table, contents, measures, roles)
             measure = next(name for name in measures if contents.quantities[deformation] in role_names(name))
+            measure = "shear" if is_shear and measure == "strain" else measure
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
@@ -294,6 +299,8 @@ def _choice(
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
     names, axes = [on_axis(name) for name, _ in _names(table)], _axes_of(table)
+    if not mapping:
+        names = _without_empty(table, names)
     if axis is not None and axis not in axes:
         raise InputError(
             f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
@@ -306,6 +313,19 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
         )
     wanted = axis or (axes[0] if len(axes) == 1 else "")
     return [name if axis_of_name in ("", wanted) else "" for axis_of_name, name in names]
+
+
+def _without_empty(table: Table, names: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return names of columns, but none of those that hold the same number throughout where others are like them."""
+    kinds = (frozenset().union(*map(role_names, roles)) for roles in (DEFORMATIONS, LOADS))
+    filled = list(names)
+    for kind in kinds:
+        columns = [column for column, (_, name) in enumerate(names) if name in kind]
+        empty = [column for column in columns if table.is_constant(column)]
+        if len(empty) < len(columns):
+            for column in empty:
+                filled[column] = "", ""
+    return filled
 
 
 def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:
@@ -324,7 +344,7 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
     unfit = (set(LENGTHENINGS) if is_shear else {*SHEARS, "torque"}) & set(mapping)
     if unfit:
         deformation = (
-            "an amount of shear, or the twist and torque of a disc"
+            "an amount of shear, its rate, a displacement along the planes (sliding), or the twist and torque of a disc"
             if is_shear
             else "a stretch, strain, displacement or length"
         )
@@ -448,7 +468,8 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
     strain_type = _type_of(table, choice.deformation, contents, "strain", contents.strain_type)
     stress_type = _type_of(table, choice.stress, contents, "stress", contents.stress_type)
     name, is_strain = contents.quantities[choice.deformation], choice.measure == "strain"
-    if is_strain and set(name.split()) & {"stretch", "lambda", "λ"}:
+    is_percent = "%" in table.stated_units(choice.deformation)
+    if is_strain and not is_percent and set(name.split()) & {"stretch", "lambda", "λ"}:
         raise InputError(
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."
@@ -470,6 +491,10 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
         raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {_say_which('strain')}")
     if choice.load == "stress" and not stress_type and re.search(OTHER_MEASURE, contents.quantities[choice.stress]):
         raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {_say_which('stress')}")
+    if is_strain and not strain_type:
+        _check_lines_above(table, choice.deformation, "strain")
+    if choice.load == "stress" and not stress_type:
+        _check_lines_above(table, choice.stress, "stress")
     is_told = contents.strain_type or contents.stress_type
     if is_strain and choice.load == "stress" and not is_told and (strain_type == "") != (stress_type == ""):
         stated, unstated = ("strain", "stress") if strain_type else ("stress", "strain")
@@ -495,6 +520,19 @@ def _type_of(table: Table, column: int, contents: _Contents, kind: str, wanted: 
     return wanted or by_name
 
 
+def _check_lines_above(table: Table, column: int, kind: str) -> None:
+    """Refuse a column of open measure where a line above the table names one that is not the engineering one."""
+    for line, text in table.head:
+        if set(table.names) & {*split(text, table.separator)} - {""}:
+            continue
+        words = text.lower()
+        if kind in words and not NO_MEASURE.search(words) and re.search(OTHER_MEASURE, words):
+            raise InputError(
+                f"{table.place(column)} does not say which type of {kind} it is, and line {line} says "
+                f"'{text.strip()}'. {_say_which(kind)}"
+            )
+
+
 def _check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_shear: bool) -> None:
     """Refuse a shear stress where nothing is sheared, and amplitudes of oscillations, which are no curve."""
     quantities = [heading(name).quantity for name in table.names]
@@ -506,7 +544,7 @@ def _check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_
     if not is_shear and "stress" not in mapping and SHEAR_STRESS.search(quantities[stress]):
         raise InputError(
             f"{table.place(stress)} is a shear stress. If the specimen was sheared, give --mode simple-shear and the "
-            "column of the amount of shear (--column shear=NAME)."
+            "column of the amount of shear (--column shear=NAME), or of the displacement (sliding=NAME)."
         )
     moduli = [k for k, name in enumerate(quantities) if OSCILLATION.search(name) and not table.is_constant(k)]
     if moduli and not (mapping.keys() & LOADS and mapping.keys() & DEFORMATIONS):
@@ -541,7 +579,7 @@ def _check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnCho
         return
     for choice in choices:
         for column, content in ((choice.deformation, choice.measure), (choice.stress, choice.load)):
-            if content in ("displacement", "length", "twist", "rate", "force", "torque"):
+            if content in ("displacement", "length", "twist", "rate", "sliding", "force", "torque"):
                 raise InputError(
                     f"{table.place(column)} holds a {content}, and in loading mode '{mode.name}' columns are read as "
                     "stretch, strain or shear, and as stress. Convert it, and give its column as one of them."

@@ -36,7 +36,14 @@ from tissuq.experiments.reading.regions import (
 )
 from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
 from tissuq.experiments.reading.spread import Spread, spread_of
-from tissuq.experiments.reading.stated_mode import about_mode, mode_of
+from tissuq.experiments.reading.stated_mode import (
+    DEFAULT_SOURCE,
+    about_mode,
+    check_not_sheared,
+    comment_on_mode,
+    direction_of,
+    mode_of,
+)
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tables import read_table
@@ -112,8 +119,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         The file, or a table in memory: a DataFrame of pandas or polars, a Dataset of xarray, a mapping from names to
         arrays or quantities of pint. Units are those in the names of columns, of quantities, and of the attributes
         ``units`` of xarray.
-    stretch, strain, displacement, shear, twist, rate, stress, torque, force, or ending in 2 : str or int, optional
-        Entries of ``columns``: the name of a column, or its number from 1.
+    stretch, strain, displacement, shear, twist, rate, sliding, stress, torque, force : str or int, optional
+        Entries of ``columns``: the name of a column, or its number from 1; those of a second axis end in 2.
     length, area, width, thickness, diameter : str, optional
         Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
     unit : str, optional
@@ -123,10 +130,11 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         say: both axes of a biaxial machine, or an amount of shear; else uniaxial.
     columns : mapping, optional
         From ``stretch``, ``strain``, ``displacement``, ``length`` (the current one, or the height), ``shear`` (the
-        amount of shear) or ``twist`` (of a disc), and ``stress``, ``force`` or ``torque``,
-        to the name of a column or its number from 1. Columns with usual names (with a unit or not) need none. The
-        second axis or stress of a loading mode that has two is ``stretch2`` ... ``force2``; columns with x and y in
-        their names need none in the mode ``biaxial``.
+        amount of shear), ``sliding`` (the displacement of one sheared plane, over the height ``length``) or ``twist``
+        (of a disc), and ``stress``, ``force`` or ``torque``, to the name of a column or its
+        number from 1. Columns with usual names (with a unit or not) need none. The second axis or stress of a loading
+        mode that has two is ``stretch2`` ... ``force2``; columns with x and y in their names need none in the mode
+        ``biaxial``.
     stress_unit : str, optional
         Unit of the stresses; without it the file's own, and MPa when the file states none. For a file of forces,
         the unit in which people want to read the stresses, kPa unless given.
@@ -158,9 +166,10 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     only : mapping, optional
         From the name of a column to what must stand in it, such as ``{"Specimen": "S1"}``: the only rows to read. A
         table of several specimens is refused without it.
-    compression_positive : bool
+    compression_positive : bool, optional
         Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
-        displacements that are positive, too.
+        displacements that are positive, too. Without it compression is negative, and asked about where a name says
+        compression and the numbers are positive.
     cycle : str or int, optional
         ``first``, ``last`` or the number (from 1) of the only cycle to use; all unless given.
     branch : str, optional
@@ -243,15 +252,22 @@ def table_of(path: Any, options: ReadingOptions) -> Table:
     return read_table(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
 
 
-def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[ReadingOptions]) -> Reading:
-    """Return what `read_file` does for the rows of a file that have been found already, all of them or some."""
-    stated, mode_source = mode_of(path, table, options)
+def read_rows(
+    table: Table, path: str | os.PathLike[str], words: Sequence[str] = (), /, **options: Unpack[ReadingOptions]
+) -> Reading:
+    """Return what `read_file` does for the rows of a file that have been found already, all of them or some.
+
+    ``words`` are further names of the test, which may say its loading mode.
+    """
+    stated, mode_source = mode_of(path, table, options, words)
     mode = checked_mode(stated, options)
-    name, is_positive = options.get("name"), options.get("compression_positive", False)
+    name, is_positive = options.get("name"), options.get("compression_positive")
     types = options.get("strain_type"), options.get("stress_type")
     with about_mode(mode.name, mode_source):
         labelled_choices = choose_columns(table, mode, options.get("columns"), *types, options.get("axis"))
     choices = tuple(labelled_choices.values())
+    if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
+        check_not_sheared(table)
     dimensions = dimensions_of(table, options.get("dimensions"))
     try:
         measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
@@ -262,7 +278,8 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
         table = complete
         measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
     check_one_specimen(table, choices, measured.course)
-    recorded = with_compression_negative(measured, choices, is_positive)
+    names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
+    recorded = with_compression_negative(measured, choices, is_positive, direction_of(*names))
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
@@ -292,7 +309,7 @@ def read_rows(table: Table, path: str | os.PathLike[str], /, **options: Unpack[R
     if (every := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), every)
         used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
-    check_signs(used, choices, is_positive)
+    check_signs(used, choices, bool(is_positive))
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(

@@ -51,6 +51,10 @@ ROLES = {
         "shear rate, shear strain rate, rate of shear, scherrate, schergeschwindigkeit, taux de cisaillement, "
         "vitesse de cisaillement, velocidad de corte, tasa de corte, velocità di taglio, γ̇"
     ),
+    "sliding": _names(
+        "shear displacement, lateral displacement, horizontal displacement, sliding, sliding displacement, schubweg, "
+        "scherweg, déplacement de cisaillement, desplazamiento de corte, spostamento di taglio"
+    ),
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
@@ -62,7 +66,8 @@ ROLES = {
     ),
     "force": _names(
         "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
-        "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft"
+        "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft, shear force, lateral force, "
+        "horizontal force, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, forza di taglio"
     ),
     "torque": _names(
         "torque, axial torque, drehmoment, moment, torsionsmoment, couple, couple de torsion, par, par de torsión, "
@@ -142,6 +147,11 @@ STRESS_NOUNS = frozenset(noun for noun in NOUNS["stress"] if len(noun) > 1) | {"
 """Names of a stress whose measure they leave open; one letter may be anything else."""
 AXES = {"x": "x", "y": "y", "1": "x", "2": "y"}
 """Axes of a biaxial machine, by how columns name them."""
+DIRECTIONS = {
+    "x": r"circumferential|circumf\.?|circ\.?|hoop|umfangs|circonf[ée]rentielle?|circunferencial|circonferenziale|fd",
+    "y": r"axial|longitudinal|long\.?|axiale?|längs|longitudinale|xd",
+}
+"""Directions in a wall, or along and across fibres, by the axis that they stand for."""
 
 MEASURE_IN_BRACKETS = re.compile(
     rf"\s*[\[(]({'|'.join(measure.words for kind in MEASURES.values() for measure in kind)})[\])]", re.IGNORECASE
@@ -159,6 +169,8 @@ REMEMBERED = 4096
 """Names that are taken apart once."""
 COPY = re.compile(r"(?<=[^\d\s])\.\d$")
 """What pandas adds to a name that stands in a table again, as in ``Stress.1``."""
+NEXT_WORD = re.compile(r"(?<=[a-zß-ÿ]{3})(?=[A-Z])|(?<=[A-Z][a-z]{2})(?=[A-Z])")
+"""Where a word begins without a blank, as in ``TrueStrain`` and ``EngStress``; not in ``mmHg`` and ``kPa``."""
 UNIT_AS_SUFFIX = re.compile(r"(?P<quantity>.+)[-_.:;|\s](?P<unit>\S*[^\W\d_]\S*|%)")
 
 
@@ -173,7 +185,7 @@ class Heading:
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = MEASURE_IN_BRACKETS.sub(r" \1", COPY.sub("", name.strip())).strip()
+    name = MEASURE_IN_BRACKETS.sub(r" \1", COPY.sub("", NEXT_WORD.sub(" ", name.strip()))).strip()
     matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
     suffix = UNIT_AS_SUFFIX.fullmatch(name)
     is_unit = suffix is not None and looks_like_unit(suffix["unit"])
@@ -263,7 +275,8 @@ def is_of_specimens(quantity: str) -> bool:
 def on_axis(quantity: str) -> tuple[str, str]:
     """Return the axis (x, y, or nothing) that a column of a biaxial machine belongs to, and its name without it.
 
-    Axes that are numbered 1 and 2 are x and y; components such as xx and 22 are along them.
+    Axes that are numbered 1 and 2 are x and y, as are the circumferential and the axial direction; components such as
+    xx and 22 are along them.
 
     Examples
     --------
@@ -276,6 +289,10 @@ def on_axis(quantity: str) -> tuple[str, str]:
     for axis, name in parts:
         if axis in AXES and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
             return AXES[axis], name
+    for axis, words in DIRECTIONS.items():
+        name = plain(_words(words).sub(" ", quantity, count=1))
+        if name != quantity and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
+            return axis, name
     return "", quantity
 
 
@@ -288,4 +305,5 @@ def on_lettered_axis(quantity: str) -> tuple[str, str]:
     (('y', 'stress'), ('', 'stretch 1'))
     """
     axis, name = on_axis(quantity)
-    return (axis, name) if axis and axis in (quantity[0], quantity[-1]) else ("", quantity)
+    is_numbered = AXES.keys() - AXES.values() & {quantity[:1], quantity[-1:]}
+    return ("", quantity) if is_numbered else (axis, name)

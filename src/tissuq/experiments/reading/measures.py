@@ -22,6 +22,8 @@ __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of", "without_machine"]
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"
+MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf", "lbs": "lbf"}
+"""Units of mass that stand for the weight of it."""
 NOTABLE_TWIST = 0.05
 """Share of its range by which a twist may begin away from 0."""
 LARGEST_ASSUMED_STRESS = 100.0
@@ -64,6 +66,9 @@ def stretch_of(
         return _from_twist(table, choice, values, dimensions, strain_unit, zero)
     if choice.measure == "rate":
         return _from_rate(table, choice, values)
+    if choice.measure == "sliding":
+        stretch, step = _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
+        return stretch - 1, step.replace("stretch = 1 +", "amount of shear =")
     if choice.measure == "displacement":
         return _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
     if zero is not None:
@@ -308,7 +313,8 @@ def _declared_unit(table: Table, column: int) -> str:
 def _factor(table: Table, column: int, quantity: Quantity, option: str, unit: str | None) -> tuple[float, str]:
     """Return the factor from a column's unit of force or length, and the words for where it comes from."""
     declared = _declared_unit(table, column)
-    hint = f"give {option} (--{option.replace('_', '-')} {quantity.unit})"
+    proposed = MASSES.get(declared, quantity.unit) if quantity is FORCE else quantity.unit
+    hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
     if unit is None:
         if not declared:
             raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")

@@ -36,7 +36,7 @@ class ReadingOptions(TypedDict, total=False):
     mean_of: int | None
     dimensions: Mapping[str, str] | None
     only: Mapping[str, str | int] | None
-    compression_positive: bool
+    compression_positive: bool | None
     cycle: str | int | None
     branch: str | None
     compliance: str | None
@@ -64,6 +64,7 @@ class PythonOptions(ReadingOptions, total=False):
     shear: str | int | None
     twist: str | int | None
     rate: str | int | None
+    sliding: str | int | None
     stress: str | int | None
     torque: str | int | None
     force: str | int | None
@@ -73,6 +74,7 @@ class PythonOptions(ReadingOptions, total=False):
     shear2: str | int | None
     twist2: str | int | None
     rate2: str | int | None
+    sliding2: str | int | None
     stress2: str | int | None
     torque2: str | int | None
     force2: str | int | None
@@ -84,7 +86,7 @@ class PythonOptions(ReadingOptions, total=False):
     unit: str | None
 
 
-COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "stress", "torque", "force")
+COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "sliding", "stress", "torque", "force")
 """Roles of columns that are options by themselves; ``length`` is that of the specimen."""
 PARTS = {name: "columns" for role in COLUMNS for name in (role, f"{role}2")} | dict.fromkeys(
     DIMENSION_NAMES, "dimensions"

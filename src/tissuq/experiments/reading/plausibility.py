@@ -40,9 +40,11 @@ NEGLIGIBLE_STRAIN = 0.1
 
 
 def with_compression_negative(
-    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool | None, direction: str
 ) -> MeasuredRows:
     """Return the rows with strain and stress of compression negative.
+
+    The direction is that of the load as names say it: compression, tension or an empty text.
 
     Where the file counts compression as positive, stresses at stretches below 1 change their sign. Where its strains
     or displacements are positive, too, they do as well.
@@ -50,17 +52,23 @@ def with_compression_negative(
     Raises
     ------
     InputError
-        When it does but the stretches are all above 1, or a column's name says compression and nobody says its sign.
+        When it does but the stretches are all above 1, or a name says compression and nobody says its sign.
     """
     choice = choices[0]
     if choice.measure in SHEARS:
         if compression_positive:
             raise InputError("compression_positive=True (--compression-positive) has no meaning for a shear stress.")
         return measured
-    if not compression_positive:
-        _check_names(measured, choices)
-        return measured
+    if compression_positive is None:
+        _check_names(measured, choices, direction)
     strain = measured.stretch - 1
+    if compression_positive is False and choice.measure in ("strain", "displacement"):
+        is_turned = float((measured.stress * strain).sum()) < 0 and strain.max() < -NEGLIGIBLE_STRAIN * strain.min()
+        if is_turned and measured.stress.sum() > 0:
+            turned = replace(measured, stretch=_of_other_sign(measured.stretch, choice))
+            return turned.with_step(f"sign of {choice.measure} changed: tension is positive")
+    if not compression_positive:
+        return measured
     says_direction = choice.measure in ("stretch", "length")
     if says_direction and (strain >= 0).all():
         raise InputError(
@@ -162,17 +170,29 @@ def _check_signs(
                 f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
                 "(--compression-positive)."
             )
+        other = "; if the column of stretches holds strain, give it as strain"
+        if choice.measure in ("strain", "displacement"):
+            other = (
+                f"; if this is tension, in which the {choice.measure} falls, give compression_positive=False "
+                "(--tension-positive)"
+            )
         raise InputError(
             f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
-            "counts compression as positive, give compression_positive=True (--compression-positive); if the "
-            "column of stretches holds strain, give it as strain."
+            "counts compression as positive, give compression_positive=True (--compression-positive)"
+            f"{other}."
         )
     row = _wrong_sign(stretch, stress, stretch > 1)
     if row is not None:
+        advice = "Change the sign of the stresses in the file, or check which columns are read."
+        if choice.measure in ("strain", "displacement"):
+            advice = (
+                f"If this is compression, whose {choice.measure} the machine counts as positive, give "
+                "compression_positive=True (--compression-positive); if it is tension, change the sign of the "
+                f"{choice.load} in the file."
+            )
         raise InputError(
             f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
-            f"is negative ({stress[row]:g} MPa); tension must be positive. Change the sign of the stresses "
-            "in the file, or of the strains if this is compression, or check which columns are read."
+            f"is negative ({stress[row]:g} MPa); tension must be positive. {advice}"
         )
 
 
@@ -201,8 +221,8 @@ def _quoted(name: str) -> str:
     return f"'{name}'" if " " in name else name
 
 
-def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
-    """Refuse positive numbers in columns whose names say compression."""
+def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direction: str) -> None:
+    """Refuse positive numbers in columns whose names say compression, and of a test whose name does."""
     for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         furthest = int(np.argmax(np.abs(stretch - 1)))
         for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
@@ -212,3 +232,12 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> Non
                     "If the machine counts compression as positive, give compression_positive=True "
                     "(--compression-positive)."
                 )
+    (choice, *_), strain, stress = choices, measured.stretch[0] - 1, measured.stress[0]
+    is_of_sign = choice.measure in ("strain", "displacement")
+    is_all_positive = strain.min() > -NEGLIGIBLE_STRAIN * strain.max() and float((strain * stress).sum()) > 0
+    if direction == "compression" and is_of_sign and is_all_positive:
+        raise InputError(
+            f"{measured.table.file}: a name says that this is compression, and strains and loads are positive. If the "
+            "machine counts compression as positive, give compression_positive=True (--compression-positive); if it "
+            "is tension, compression_positive=False (--tension-positive)."
+        )

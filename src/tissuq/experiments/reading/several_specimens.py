@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, pairwise
 
@@ -21,6 +22,8 @@ RESTART, RETURN = 0.1, 0.5
 """Share of the range of stretches within which all tests begin, and of the longest way that all go."""
 SAMPLED_ROWS = 500
 """Rows in which a column of measured values shows as such."""
+NOT_OF_TESTS = re.compile(r"step|schritt|segment|phase|block|stage|loop|temp|rate|speed|geschwind|humid|feucht")
+"""Names of columns of numbers that part a test of one specimen."""
 SPECIMENS_OF_POPULATION = 3
 """Fewest specimens that show a population."""
 SHOWN = 6
@@ -78,7 +81,8 @@ def filled_on(cells: Sequence[str]) -> list[str]:
 def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Column) -> None:
     """Refuse a table of several specimens, which would be fitted as one.
 
-    They are in a column that is named so, or in one whose words part the rows into tests that each begin anew.
+    They are in a column that is named so, or in one whose words part the rows into tests that each begin anew, or its
+    numbers where no test was unloaded.
 
     Raises
     ------
@@ -86,7 +90,9 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
         When there are several, with what reads one of them, or all.
     """
     for column, labels in _parting_columns(table, choices, course):
-        if not is_of_specimens(_quantity(table, column)) and not _are_words(labels):
+        quantity = _quantity(table, column)
+        is_numbered = not NOT_OF_TESTS.search(quantity) and _jump(labels, course)
+        if not (is_of_specimens(quantity) or _are_words(labels) or is_numbered):
             continue
         name, distinct = table.key(column), list(dict.fromkeys(labels))
         fit_all = f"; to fit each and the population that they are from: tissuq population FILE --specimen '{name}'"
@@ -137,6 +143,12 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
     ways = furthest - begins
     is_same_way = bool((ways > 0).all() or (ways < 0).all()) and np.abs(ways).min() >= RETURN * np.abs(ways).max()
     return is_same_way and bool(np.ptp(begins) <= RESTART * np.ptp(course))
+
+
+def _jump(labels: Sequence[str], course: Column) -> bool:
+    """Tell whether the way back between labels was not measured, as it is between cycles of one specimen."""
+    last = np.flatnonzero([label != after for label, after in pairwise(labels)])
+    return bool((np.abs(course[last] - course[last + 1]) >= RETURN * np.ptp(course)).all())
 
 
 def _cell_or_last(last: str, cell: str) -> str:

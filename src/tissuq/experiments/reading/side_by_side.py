@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -21,6 +22,8 @@ from tissuq.experiments.reading.table import Table
 
 __all__ = ["ColumnsOfTest", "columns_side_by_side"]
 
+PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
+"""Words and capacities that tell one load cell from another, and not tests."""
 TENSOR = frozenset(["11", "22", "33", "12", "13", "23", "21", "31", "32"])
 """Components, which are not numbers of tests."""
 
@@ -105,7 +108,11 @@ def _parts(quantity: str) -> Iterator[tuple[str, str]]:
 def _is_test(text: str) -> bool:
     """Tell whether a part of a name is the number, the letter or the name of a specimen."""
     words = text.split()
-    return bool(words) and (len(words[-1]) == 1 or any(map(str.isdigit, text)) or is_of_specimens(words[0]))
+    return (
+        bool(words)
+        and not PART_OF_MACHINE.search(text)
+        and (len(words[-1]) == 1 or any(map(str.isdigit, text)) or is_of_specimens(words[0]))
+    )
 
 
 def _names_above(table: Table, columns: Sequence[int]) -> list[str]:

@@ -10,11 +10,30 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_modes
-from tissuq.experiments.reading.headings import STRESS_NOUNS, heading, measure_in, on_lettered_axis, role_names
+from tissuq.experiments.reading.columns import SHEARS
+from tissuq.experiments.reading.headings import (
+    NEXT_WORD,
+    STRESS_NOUNS,
+    heading,
+    measure_in,
+    on_lettered_axis,
+    role_names,
+)
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.table import Table
 
-__all__ = ["DEFAULT_MODE", "DEFAULT_SOURCE", "GIVEN", "about_mode", "find_mode", "mode_in_comment", "mode_of"]
+__all__ = [
+    "DEFAULT_MODE",
+    "DEFAULT_SOURCE",
+    "GIVEN",
+    "about_mode",
+    "check_not_sheared",
+    "comment_on_mode",
+    "direction_of",
+    "find_mode",
+    "mode_in_comment",
+    "mode_of",
+]
 
 DEFAULT_MODE = "uniaxial"
 """Where nothing states one."""
@@ -22,6 +41,17 @@ GIVEN, DEFAULT_SOURCE = "as given", "nothing says otherwise"
 """Where a mode comes from that the file does not state."""
 MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "axial": "uniaxial", "shear": "simple-shear"}
 """Words for loading modes beside their names."""
+NAMES_OF_MODES = {"pure-shear": "planar"}
+"""Further names of loading modes."""
+CONFINED = re.compile(r"(^|-)confined($|-)")
+"""Words for compression between walls, which no loading mode is."""
+RHEOMETER = re.compile(r"parallel[ -]plate|plate[ -/]plate|platte[ -/]platte|cone|kegel|geometry name|rheomet")
+"""Words above a table of a rheometer."""
+DIRECTIONS = {
+    "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축"),
+    "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장"),
+}
+"""Words for the direction of a load."""
 HEAD_LINES = 20
 """Lines of a file in which a comment may state its mode."""
 
@@ -69,9 +99,37 @@ def mode_of(
     if (chosen := options.get("mode")) is not None:
         return chosen, GIVEN
     mode, source = find_mode(file, [table.sheet, table.title, *words])
-    if not (mode or options.get("columns") or options.get("axis")):
+    columns = options.get("columns") or {}
+    if not mode and columns.keys() & {*SHEARS, "torque"}:
+        mode, source = "simple-shear", "a column of shear"
+    if not (mode or columns or options.get("axis")):
         mode, source = _mode_of_columns(table)
     return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
+
+
+def direction_of(*texts: str) -> str:
+    """Return the direction of load, compression or tension, that the last of some texts to say one says.
+
+    Examples
+    --------
+    >>> direction_of("Compression", "sample 3"), direction_of("liver", "tension and compression")
+    ('compression', '')
+    """
+    said = [{name for name, words in DIRECTIONS.items() if words.search(text.lower())} for text in texts]
+    last = next((names for names in reversed(said) if names), set())
+    return last.pop() if len(last) == 1 else ""
+
+
+def check_not_sheared(table: Table) -> None:
+    """Refuse strains and stresses of which nothing says the mode, and that a rheometer seems to have measured."""
+    torque = [name for name in table.names if measure_in(heading(name).quantity)[0] in role_names("torque")]
+    lines = [f"line {line} says '{text.strip()}'" for line, text in table.head if RHEOMETER.search(text.lower())]
+    signs = lines or [f"column '{name}' is a torque" for name in torque]
+    if signs:
+        raise InputError(
+            f"{table.file}: {signs[0]}: if a rheometer sheared the specimen, give --mode simple-shear, if it pulled or "
+            "pressed it, --mode uniaxial."
+        )
 
 
 @contextmanager
@@ -94,7 +152,8 @@ def _mode_of_columns(table: Table) -> tuple[str, str]:
     if all({axis for axis, name in on_axes if name in names} >= {"x", "y"} for names in (deformations, loads)):
         return "biaxial", "columns of both axes"
     stretches, shears, twists = (
-        names & set(quantities) for names in (deformations, role_names("shear"), role_names("twist"))
+        names & set(quantities)
+        for names in (deformations, role_names("shear") | role_names("sliding"), role_names("twist"))
     )
     if not stretches and len(shears) == 1:
         return "simple-shear", "a column of shear"
@@ -106,21 +165,32 @@ def _mode_of_columns(table: Table) -> tuple[str, str]:
 
 
 def mode_in_comment(file: Path) -> str:
-    """Return the mode that a comment line such as ``# mode: planar`` at the head of a file states, or an empty text."""
+    """Return the mode that a comment at the head of a file states, or an empty text."""
+    return _mode_of_words(comment_on_mode(file))
+
+
+def comment_on_mode(file: Path) -> str:
+    """Return what a comment line such as ``# mode: planar`` at the head of a file says, or an empty text."""
     try:
         with file.open("rb") as content:
             head = [content.readline(1000).decode("latin-1") for _ in range(HEAD_LINES)]
     except (OSError, ValueError):
         return ""
     stated = (line.split(":", 1)[1] for line in head if re.match(r"#\s*mode\s*:", line, re.IGNORECASE))
-    return _mode_of_words(next(stated, ""))
+    return next(stated, "").strip()
 
 
 def _mode_of_words(text: str) -> str:
     """Return the loading mode that words name; an empty text for none, or several."""
-    words = "-".join(re.findall(r"[a-z]+", text.lower()))
-    for name in sorted(loading_modes(), key=len, reverse=True):
+    words = "-".join(re.findall(r"[a-z]+", NEXT_WORD.sub(" ", text).lower()))
+    names = dict.fromkeys(loading_modes()) | NAMES_OF_MODES
+    for name in sorted(names, key=len, reverse=True):
         if re.search(rf"(^|-){name}($|-)", words):
-            return name
+            return names[name] or name
+    if CONFINED.search(words):
+        raise InputError(
+            f"'{text}' says that the specimen was confined, and no loading mode is with walls. If it could widen "
+            "freely, say so: --mode uniaxial."
+        )
     modes = {mode for word, mode in MODE_WORDS.items() if word in words.split("-")}
     return modes.pop() if len(modes) == 1 else ""

@@ -22,7 +22,7 @@ from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
-from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, mode_of
+from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_tables
 
@@ -197,12 +197,14 @@ def _of_one_table(
 ) -> Iterator[TestInFile]:
     """Yield the test in some rows and columns, or those of each specimen that a column names."""
     words = [*names, columns.name] if columns else names
-    name, (mode, source) = " ".join(words) or Path(path).stem, mode_of(path, table, options, words)
-    of_test: ReadingOptions = {"name": name, **options, "mode": mode}
+    name = " ".join(words) or Path(path).stem
+    of_test: ReadingOptions = {"name": name, **options}
     if columns:
         of_test["columns"] = columns.columns
+    if options.get("compression_positive") and direction_of(*words) == "tension":
+        of_test["compression_positive"] = None
     try:
-        reading = read_rows(table, path, **of_test)
+        reading = read_rows(table, path, words, **of_test)
     except SeveralSpecimens as several:
         only, labels = options.get("only") or {}, np.array(several.labels)
         for label in dict.fromkeys(several.labels):
@@ -213,12 +215,13 @@ def _of_one_table(
     except InputError as error:
         if not words:
             raise
-        reading, of_test = _without_what_others_need(table, path, of_test, error)
-    yield TestInFile(name, replace(reading, mode_source=source), of_test)
+        reading, of_test = _without_what_others_need(table, path, words, of_test, error)
+    mode = options.get("mode") or reading.experiment.mode.name
+    yield TestInFile(name, reading, {**of_test, "mode": mode})
 
 
 def _without_what_others_need(
-    table: Table, path: str | os.PathLike[str], options: ReadingOptions, error: InputError
+    table: Table, path: str | os.PathLike[str], words: Sequence[str], options: ReadingOptions, error: InputError
 ) -> tuple[Reading, ReadingOptions]:
     """Read one of several tests without options that it refuses, and that others may need.
 
@@ -229,13 +232,13 @@ def _without_what_others_need(
     """
     without: list[ReadingOptions] = [
         {**options, "dimensions": None},
-        {**options, "compression_positive": False},
-        {**options, "dimensions": None, "compression_positive": False},
+        {**options, "compression_positive": None},
+        {**options, "dimensions": None, "compression_positive": None},
     ]
     for of_test in without:
         if of_test != options:
             with suppress(InputError):
-                return read_rows(table, path, **of_test), of_test
+                return read_rows(table, path, words, **of_test), of_test
     raise error
 
 

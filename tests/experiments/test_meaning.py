@@ -1,0 +1,134 @@
+"""What names of columns, tests and files mean: each advice, followed, reads the true stretches and stresses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import neo_hookean, ramp
+from tissuq.errors import InputError
+
+L = ramp()
+P = 1e3 * neo_hookean(L)  # kPa
+SIZES = {"length": "10 mm", "area": "4 mm2"}
+D = 10 * (L - 1)  # mm
+N = P * 4e-3  # N
+
+
+def written(folder, name, head, *columns):
+    rows = [",".join(f"{value:.8g}" for value in row) for row in zip(*columns, strict=True)]
+    (folder / name).write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    return folder / name
+
+
+def check(path, expected="uniaxial", stretch=L, stress=P, **options):
+    (test,) = tq.read_tests(path, **options)
+    assert test.mode.name == expected
+    np.testing.assert_allclose(test.stretch, stretch, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(test.stress, 1e-3 * stress, rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "columns"),
+    [
+        ("Time_s,TrueStrain,TrueStress_kPa", (L, np.log(L), P * L)),
+        ("EngStrain,EngStress_kPa,TrueStrain,TrueStress_kPa", (L - 1, P, np.log(L), P * L)),
+        ("Circumferential stretch,Circumferential Cauchy stress (kPa)", (L, P * L)),
+        ("Strain (mm/m),Stress (kPa)", (1000 * (L - 1), P)),
+        ("GreenStrain (%),PK2 (kPa)", (50 * (L**2 - 1), P / L)),
+    ],
+)
+def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, head, columns):
+    check(written(tmp_path, "test.csv", head, *columns))
+
+
+def test_words_without_blanks_have_units(tmp_path):
+    check(written(tmp_path, "test.csv", "AxialDisplacement(mm),ForceN", D, N), dimensions=SIZES)
+
+
+def test_empty_columns_of_stress_and_strain_are_not_read_beside_forces(tmp_path):
+    path = written(tmp_path, "test.csv", "Force (N),Displacement (mm),Stress (kPa),Strain", N, D, 0 * L, 0 * L)
+    check(path, dimensions=SIZES)
+
+
+def test_directions_in_a_wall_are_axes(tmp_path):
+    names = "Circumferential stretch,Axial stretch,Circumferential Cauchy stress (kPa),Axial Cauchy stress (kPa)"
+    across = 1 + (L - 1) / 2
+    path = written(tmp_path, "artery.csv", names, L, across, L * P, across * P / 2)
+    check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1))
+
+
+def test_a_plane_that_slides_over_another_is_sheared(tmp_path):
+    path = written(tmp_path, "shear.csv", "Shear displacement (mm),Shear force (N)", D, N)
+    check(path, "simple-shear", L - 1, dimensions=SIZES)
+    path = written(tmp_path, "any.csv", "d (mm),F (N)", D, N)
+    check(path, "simple-shear", L - 1, dimensions=SIZES, columns={"sliding": 1, "force": 2})
+
+
+@pytest.mark.parametrize("name", ["T19_PureShear.csv", "pure_shear_3.csv", "liver planar.csv"])
+def test_pure_shear_is_planar(tmp_path, name):
+    check(written(tmp_path, name, "Stretch,Stress (kPa)", L, P), "planar")
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "columns", "words", "options"),
+    [
+        ("a.csv", "# Cauchy stress\nStretch,Stress (kPa)", (L, P * L), "Cauchy stress'", {"stress_type": "cauchy"}),
+        (
+            "b.csv",
+            "Strain measure:,logarithmic\nStrain,Engineering stress (kPa)",
+            (np.log(L), P),
+            "line 1 says",
+            {"strain_type": "true", "stress_type": "engineering"},
+        ),
+        ("compression_1.csv", "Strain,Stress (kPa)", (L - 1, P), "--tension-positive", {"compression_positive": False}),
+        ("confined_1.csv", "Stretch,Stress (kPa)", (L, P), "--mode uniaxial", {"mode": "uniaxial"}),
+        (
+            "cells.csv",
+            "Disp (mm),Load 10N (N),Load 1kN (N)",
+            (D, N, 1.01 * N),
+            "force=",
+            {"dimensions": SIZES, "columns": {"force": "Load 10N (N)"}},
+        ),
+        (
+            "position.csv",
+            "Position (mm),Force (N)",
+            (35.2 - D, N),
+            "--tension-positive",
+            {"dimensions": SIZES, "compression_positive": False},
+        ),
+        ("percent.csv", "Stretch (%),Stress (kPa)", (100 * (L - 1), P), "strain=", {"columns": {"strain": 1}}),
+        ("weight.csv", "Displacement (mm),Load (g)", (D, N / 9.80665e-3), "force_unit gf", {"force_unit": "gf"}),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:column")
+def test_what_is_open_is_asked_about_and_the_advice_reads_it(tmp_path, name, head, columns, words, options):
+    path = written(tmp_path, name, head, *columns)
+    sizes = {"dimensions": SIZES} if "mm)" in head else {}
+    with pytest.raises(InputError) as refusal:
+        tq.read_tests(path, **sizes)
+    assert words.replace("force_unit", "--force-unit") in str(refusal.value)
+    check(path, **(sizes | options))
+
+
+def test_compression_that_is_named_is_not_read_as_tension(tmp_path):
+    path = written(tmp_path, "compression_1.csv", "Displacement (mm),Force (N)", 10 * (1 - 1 / L), N)
+    with pytest.raises(InputError, match="--compression-positive"):
+        tq.read_tests(path, dimensions=SIZES)
+    check(path, stretch=1 / L, stress=-P, dimensions=SIZES, compression_positive=True)
+
+
+def test_displacements_of_compression_may_be_positive_and_forces_negative(tmp_path):
+    path = written(tmp_path, "test.csv", "Displacement (mm),Force (N)", 10 * (1 - 1 / L), -N)
+    with pytest.raises(InputError, match="--compression-positive"):
+        tq.read_tests(path, dimensions=SIZES)
+    check(path, stretch=1 / L, stress=-P, dimensions=SIZES, compression_positive=True)
+
+
+def test_what_a_rheometer_sheared_is_not_read_as_tension(tmp_path):
+    head = "Geometry name,20mm parallel plate\nStep time,Strain,Stress,Torque\ns,%,Pa,uN.m"
+    path = written(tmp_path, "stress growth.csv", head, L, 100 * (L - 1), 1000 * P, P)
+    with pytest.raises(InputError, match=r"line 1 says .*parallel plate.* --mode simple-shear"):
+        tq.read_tests(path)
+    check(path, "simple-shear", L - 1, mode="simple-shear")
