@@ -326,6 +326,30 @@ def test_a_damaged_file_of_matlab_is_refused(tmp_path):
         tq.read_experiment(tmp_path / "a.mat")
 
 
+def test_a_table_of_parquet_is_read_to_the_last_digit(tmp_path):
+    polars = pytest.importorskip("polars", reason="polars is not installed")
+    columns = {"stretch": ramp(), "stress [MPa]": neo_hookean(ramp()), "Specimen": ["S1"] * len(ramp())}
+    polars.DataFrame(columns).write_parquet(tmp_path / "test.parquet")
+    test = tq.read(tmp_path / "test.parquet")
+    np.testing.assert_array_equal(test.stretch, ramp())
+    np.testing.assert_array_equal(test.stress, neo_hookean(ramp()))
+    two = polars.concat([polars.DataFrame(columns | {"Specimen": [name] * len(ramp())}) for name in ("S1", "S2")])
+    two.write_parquet(tmp_path / "two.parquet")
+    assert [test.name for test in read_tests(tmp_path / "two.parquet")] == ["S1", "S2"]
+
+
+def test_a_parquet_file_that_is_damaged_or_far_too_long_is_refused(tmp_path):
+    polars = pytest.importorskip("polars", reason="polars is not installed")
+    (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(range(200)) + b"PAR1")
+    with pytest.raises(InputError, match="seems to be a Parquet file, but it cannot be opened"):
+        tq.read(tmp_path / "a.parquet")
+    long = polars.select(stretch=polars.repeat(1.0, 10_000_001))
+    long.write_parquet(tmp_path / "b.parquet")
+    assert (tmp_path / "b.parquet").stat().st_size < 100_000
+    with pytest.raises(InputError, match="10000001 rows; at most 10000000 are read"):
+        tq.read(tmp_path / "b.parquet")
+
+
 def test_a_table_of_very_many_columns_is_refused_at_once(tmp_path):
     rows = [[f"x{k}" for k in range(9000)], *[[f"{row}.5"] * 9000 for row in range(8)]]
     with pytest.raises(InputError, match="a table of 9000 columns; at most 1000 are read"):

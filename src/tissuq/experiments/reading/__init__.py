@@ -2,6 +2,7 @@
 
 from tissuq.experiments.reading.file_format import FileFormat
 from tissuq.experiments.reading.matlab import MatlabFile
+from tissuq.experiments.reading.parquet import ParquetFile
 from tissuq.experiments.reading.workbooks import BinaryWorkbook, OldWorkbook, OpenDocument, Workbook
 
-__all__ = ["BinaryWorkbook", "FileFormat", "MatlabFile", "OldWorkbook", "OpenDocument", "Workbook"]
+__all__ = ["BinaryWorkbook", "FileFormat", "MatlabFile", "OldWorkbook", "OpenDocument", "ParquetFile", "Workbook"]

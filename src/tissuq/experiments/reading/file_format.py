@@ -95,13 +95,14 @@ def _sheet_named(path: str | os.PathLike[str], names: list[str], sheet: str | in
 
 
 @contextmanager
-def explained(path: str | os.PathLike[str], kind: str, library: str, cure: str) -> Iterator[None]:
+def explained(path: str | os.PathLike[str], kind: str, library: str, cure: str, extra: str = "excel") -> Iterator[None]:
     """Turn whatever a library raises, or that it is missing, into what to do instead."""
     try:
         yield
     except ImportError as error:
         raise InputError(
-            f"{path} is {kind}; reading it needs {library}: pip install 'tissuq[excel]'. Or {cure} and give that file."
+            f"{path} is {kind}; reading it needs {library}: pip install 'tissuq[{extra}]'. Or {cure} and give that "
+            "file."
         ) from error
     except Exception as error:  # libraries raise whatever their parsers do
         raise InputError(

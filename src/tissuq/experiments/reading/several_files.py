@@ -17,7 +17,7 @@ from tissuq.experiments.reading.several_specimens import only_rows, row_names
 
 __all__ = ["SUFFIXES", "find_tests", "read_column"]
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat")
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".parquet")
 """Of files in a folder that may hold measurements."""
 
 
