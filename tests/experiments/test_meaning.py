@@ -132,3 +132,20 @@ def test_what_a_rheometer_sheared_is_not_read_as_tension(tmp_path):
     with pytest.raises(InputError, match=r"line 1 says .*parallel plate.* --mode simple-shear"):
         tq.read_tests(path)
     check(path, "simple-shear", L - 1, mode="simple-shear")
+
+
+def test_components_of_tensors_are_of_axes_once_their_measures_are_said(tmp_path):
+    across = 1 + (L - 1) / 2
+    path = written(
+        tmp_path, "sheet.csv", "E11,E22,S11 (kPa),S22 (kPa)", (L**2 - 1) / 2, (across**2 - 1) / 2, P / L, P / across
+    )
+    options = {}
+    for words, option in (
+        ("mode='biaxial'", {"mode": "biaxial"}),
+        ("stress_type", {"stress_type": "second-piola-kirchhoff"}),
+        ("strain_type", {"strain_type": "green"}),
+    ):
+        with pytest.raises(InputError, match=words):
+            tq.read(path, **options)
+        options |= option
+    check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P], axis=1), **options)

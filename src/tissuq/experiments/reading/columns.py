@@ -12,6 +12,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.headings import (
+    COMPONENTS,
     CYCLE_NAMES,
     DIMENSION_NAMES,
     STRESS_NOUNS,
@@ -114,7 +115,9 @@ class _Contents:
         """
         names = frozenset().union(*(role_names(role) for role in roles))
         if "stress" in roles and self.stress_type is not None:
-            names |= STRESS_NOUNS
+            names |= STRESS_NOUNS | COMPONENTS["stress"]
+        if "strain" in roles and self.strain_type is not None:
+            names |= COMPONENTS["strain"]
         columns = [column for column, quantity in enumerate(self.quantities) if quantity in names]
         wanted = self.stress_type if "stress" in roles else self.strain_type
         for measures in (("", "engineering"),) if wanted is None else ((wanted,), ("",)):
@@ -285,7 +288,8 @@ def _choice(
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
         else:
             deformation = _recognise(table, contents, measures, roles)
-            measure = next(name for name in measures if contents.quantities[deformation] in role_names(name))
+            name = contents.quantities[deformation]
+            measure = next((measure for measure in measures if name in role_names(measure)), "strain")
             measure = "shear" if is_shear and measure == "strain" else measure
     if deformation == stress:
         raise InputError(
@@ -395,13 +399,29 @@ def _recognise(
     if len(columns) > 1:
         raise _ambiguous(table, candidates, columns)
     if not columns:
-        hint = _stress_hint(table, contents) if "stress" in roles else _shear_hint(table, contents, roles)
+        hint = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
+        by_unit = _likely_by_unit(table, roles)
+        likely = [table.label(column) for columns in by_unit.values() for column in columns]
+        several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""
+        in_order = [*by_unit, *(role for role in roles if role not in by_unit)]
         raise InputError(
-            f"{table.file}: no column is recognised as {what}.{hint} "
-            f"{_columns_there_are(table)} {_how_to_say(table, roles)}"
+            f"{table.file}: no column is recognised as {what}.{hint}{several} "
+            f"{_columns_there_are(table)} {_how_to_say(table, in_order)}"
         )
     return columns[0]
+
+
+def _likely_by_unit(table: Table, roles: Sequence[str]) -> dict[str, list[int]]:
+    """Return the columns that vary and have a unit of one of some roles, by this."""
+    columns_of: dict[str, list[int]] = {}
+    for column, name in enumerate(table.names):
+        in_heading, beneath = table.stated_units(column)
+        kind = measured_in(beneath or in_heading)
+        role = DEFORMATIONS_OF_UNITS.get(kind, kind)
+        if role in roles and not _is_of_something_else(heading(name).quantity) and not table.is_constant(column):
+            columns_of.setdefault(role, []).append(column)
+    return columns_of
 
 
 def _stress_hint(table: Table, contents: _Contents) -> str:
@@ -414,7 +434,8 @@ def _stress_hint(table: Table, contents: _Contents) -> str:
                 f" Column {table.label(column)} is a pressure. For a tube, convert it to stresses with "
                 "ThinTube.engineering_stresses in Python, and give these with --mode thin-tube."
             )
-        if measured_in(beneath or in_heading) == "stress" and NOT_ENGINEERING.search(quantity):
+        is_symbol = quantity in COMPONENTS["stress"]
+        if measured_in(beneath or in_heading) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
             return f" Column {table.label(column)} may be a stress of several types. {_say_which('stress')}"
     return ""
 
@@ -426,7 +447,10 @@ def _say_which(kind: str) -> str:
     return f"Say which it is with {kind}_type (--{kind}-type): {', '.join(names[:-1])} or {names[-1]}."
 
 
-def _shear_hint(table: Table, contents: _Contents, roles: Sequence[str]) -> str:
+def _deformation_hint(table: Table, contents: _Contents, roles: Sequence[str]) -> str:
+    symbols = [column for column, name in enumerate(contents.quantities) if name in COMPONENTS["strain"]]
+    if symbols and "strain" in roles:
+        return f" Column {table.label(symbols[0])} may be a strain of several types. {_say_which('strain')}"
     columns = [] if "shear" in roles else contents.fitting("shear")
     if not columns:
         return ""

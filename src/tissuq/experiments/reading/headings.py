@@ -11,6 +11,7 @@ from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMe
 from tissuq.experiments.units import BRACKETS, looks_like_unit
 
 __all__ = [
+    "COMPONENTS",
     "CYCLE_NAMES",
     "DIMENSION_NAMES",
     "ROLES",
@@ -147,6 +148,8 @@ STRESS_NOUNS = frozenset(noun for noun in NOUNS["stress"] if len(noun) > 1) | {"
 """Names of a stress whose measure they leave open; one letter may be anything else."""
 AXES = {"x": "x", "y": "y", "1": "x", "2": "y"}
 """Axes of a biaxial machine, by how columns name them."""
+COMPONENTS = {"stress": _names("s, p, t"), "strain": _names("e")}
+"""Symbols of which a component such as S11 or Eyy is along an axis, of a measure that they leave open."""
 DIRECTIONS = {
     "x": r"circumferential|circumf\.?|circ\.?|hoop|umfangs|circonf[ée]rentielle?|circunferencial|circonferenziale|fd",
     "y": r"axial|longitudinal|long\.?|axiale?|längs|longitudinale|xd",
@@ -285,7 +288,10 @@ def on_axis(quantity: str) -> tuple[str, str]:
     """
     parts = [(quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())]
     if quantity[-1:] == quantity[-2:-1]:
-        parts.append((quantity[-1:], quantity[:-2].strip()))
+        component = quantity[-1:], quantity[:-2].strip()
+        if component[0] in AXES and component[1] in frozenset().union(*COMPONENTS.values()):
+            return AXES[component[0]], component[1]
+        parts.append(component)
     for axis, name in parts:
         if axis in AXES and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
             return AXES[axis], name
