@@ -252,6 +252,7 @@ def test_tests_of_specimens_and_modes_in_rows_are_parted_by_both(tmp_path):
         for size in (1.0, 1.1)
         for mode, top in (("uniaxial", uni), ("equibiaxial", equi))
     ]
+    assert [test.specimen for test in tests] == ["A", "A", "B", "B"]
 
 
 def test_a_mode_comes_from_the_name_of_a_file_and_a_misfit_says_so(tmp_path):

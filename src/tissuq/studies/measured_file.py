@@ -81,7 +81,9 @@ class MeasuredTest(MeasuredFile):
     def reading(self, folder: Path = Path()) -> Reading:
         """Read the file, and say which specimen it was."""
         reading = super().reading(folder)
-        named = reading.experiment.labelled(name=self.name or reading.experiment.name, specimen=self.specimen)
+        named = reading.experiment.labelled(
+            name=self.name or reading.experiment.name, specimen=self.specimen or reading.experiment.specimen
+        )
         return replace(reading, experiment=named)
 
 

@@ -60,7 +60,8 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         for name, files in sources.items():
             tests = [test for file in files for test in find_tests_in_file(file, **self.reading_options)]
             for test in tests:
-                specimen = name if len(files) > 1 or len(tests) == 1 else test.name
+                is_one = len(files) > 1 or len(tests) == 1
+                specimen = name if is_one else test.reading.experiment.specimen or test.name
                 experiment = test.reading.experiment.labelled(name=specimen, specimen=specimen)
                 specimens.setdefault(specimen, []).append(replace(test.reading, experiment=experiment))
         return specimens

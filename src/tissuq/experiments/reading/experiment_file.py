@@ -34,7 +34,7 @@ from tissuq.experiments.reading.regions import (
     slack_error,
     tested_stresses,
 )
-from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows
+from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows, specimen_of
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,
@@ -320,7 +320,7 @@ def read_rows(
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
         least_errors=errors | least_errors(tested),
-    ).labelled(stress_unit=shown.name)
+    ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
     problems = (spread.problem for spread in spreads if spread.problem)
     notes = *table.notes, *dimensions.warnings, *problems
     return Reading(experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads)

@@ -14,7 +14,15 @@ from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading,
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import NUMBER
 
-__all__ = ["SeveralSpecimens", "advice_on_numbered_tests", "check_one_specimen", "filled_on", "only_rows", "row_names"]
+__all__ = [
+    "SeveralSpecimens",
+    "advice_on_numbered_tests",
+    "check_one_specimen",
+    "filled_on",
+    "only_rows",
+    "row_names",
+    "specimen_of",
+]
 
 ROWS_OF_TEST = 5
 """Rows that the tests of a table have on average at least."""
@@ -103,6 +111,13 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
             name,
             labels,
         )
+
+
+def specimen_of(table: Table) -> str:
+    """Return the specimen that columns name, of which all rows are; an empty text where they name none, or several."""
+    columns = [column for column in range(len(table.names)) if is_of_specimens(_quantity(table, column))]
+    labels = [set(row_names(table, column)) for column in columns]
+    return " ".join(names.pop() for names in labels) if all(len(names) == 1 for names in labels) else ""
 
 
 def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], course: Column) -> str:
