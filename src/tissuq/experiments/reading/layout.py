@@ -11,7 +11,9 @@ from functools import partial
 from tissuq.experiments.units import NUMBER, looks_like_unit
 
 __all__ = [
+    "LENGTH_RATIO",
     "MISSING",
+    "SHORT_TABLE",
     "SPREADSHEET_ERRORS",
     "WHITESPACE",
     "Layout",
@@ -19,6 +21,7 @@ __all__ = [
     "find_layout",
     "is_comment",
     "is_units_row",
+    "joined",
     "later_tables",
     "split",
 ]
@@ -39,6 +42,8 @@ SHORT_TABLE, LENGTH_RATIO = 3, 10
 """Rows that a table passed over has at most, and how many times more the one beneath it has at least."""
 FEWEST_ROWS = 5
 """Rows that a further table has at least."""
+KNOWN_UNITS = 2
+"""Units that show that what stands beside them is one as well."""
 WORD = re.compile(r"[^\W\d_]{2}|%")
 """What a line of names or units holds, and a row of numbers does not."""
 
@@ -83,7 +88,7 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
         return None
     first_row = _with_faulty_rows_above(lines, cells, confirmed)
     units_row = first_row - 1
-    has_units = units_row > 0 and is_units_row(cells(lines[units_row]))
+    has_units = units_row > 0 and is_units_row(cells(lines[units_row]), cells(lines[units_row - 1]))
     has_units = has_units and _are_names(_without_number(cells(lines[units_row - 1])))
     names_row = units_row - has_units
     width = len(cells(lines[confirmed]))
@@ -108,7 +113,7 @@ def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
         if position <= last_row or is_row:
             last_row = max(last_row, position)
             continue
-        has_units = position + 1 < len(texts) and is_units_row(cells(texts[position + 1]))
+        has_units = position + 1 < len(texts) and is_units_row(cells(texts[position + 1]), row)
         is_apart = lines[position][0] > lines[position - 1][0] + 1 or last_row < position - 1
         if text.strip() == header or ((is_apart or has_units) and _are_names(row)):
             first_row = position + 1 + has_units
@@ -131,6 +136,11 @@ def split(line: str, separator: str) -> list[str]:
     if separator == WHITESPACE:
         return [cell.strip('"') for cell in re.findall(r'"[^"]*"|\S+', line)]
     return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+
+
+def joined(cells: Sequence[str], separator: str) -> str:
+    """Return the line that has these cells, so that `split` gives them back."""
+    return separator.join(f'"{cell}"' if separator in cell else cell for cell in cells)
 
 
 def column_names(line: str, width: int, separator: str, *, has_units: bool = False) -> list[str]:
@@ -216,7 +226,7 @@ def _with_faulty_rows_above(lines: Sequence[str], cells: Split, row: int) -> int
         previous = cells(lines[row - 1])
         is_row = _are_values(previous) or (_is_data(previous) and len(previous) == width)
         is_beneath_names = row > 1 and _are_names(cells(lines[row - 2]))
-        if not is_row or (is_beneath_names and is_units_row(previous)):
+        if not is_row or (is_beneath_names and is_units_row(previous, cells(lines[row - 2]))):
             break
         row -= 1
     return row
@@ -239,6 +249,13 @@ def _are_names(cells: Sequence[str]) -> bool:
     return len(cells) >= 2 and len(words) >= 1 and _count_numbers(cells) == 0
 
 
-def is_units_row(cells: Sequence[str]) -> bool:
-    """Tell whether cells are units, at least one of them not empty."""
-    return all(map(looks_like_unit, cells)) and any(re.search(r"[^\W\d_]|%", cell) for cell in cells)
+def is_units_row(cells: Sequence[str], names: Sequence[str] = ()) -> bool:
+    """Tell whether cells are units, at least one of them not empty; of which beneath names some may be unknown.
+
+    Then two or more of them are known, none is a number, and a name stands over each.
+    """
+    count = sum(looks_like_unit(cell) and re.search(r"[^\W\d_]|%", cell) is not None for cell in cells)
+    if all(map(looks_like_unit, cells)):
+        return count > 0
+    has_names = len(names) >= len(cells) and all(name for name, cell in zip(names, cells, strict=False) if cell)
+    return count >= KNOWN_UNITS and has_names and not _count_numbers(cells)

@@ -19,6 +19,7 @@ from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
+from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
@@ -128,7 +129,8 @@ def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[Python
 def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[TestInFile]:
     """Return all tests in one file, as `read_tests` reads them, each with the options that read it alone.
 
-    Shorter tables without columns of deformation and load, such as one of results, are no tests.
+    Shorter tables without columns of deformation and load, such as one of results, are no tests, nor are a few rows
+    beside one of many.
 
     Raises
     ------
@@ -159,11 +161,20 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
     for table, refusal in refused:
         if len(table.rows) >= MIN_SHARE_OF_TEST * longest:
             raise _may_be_test(refusal, tests) if tests else refusal
+    longest = max((len(test.reading.recorded) for test in tests), default=0)
+    of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
+    tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
     _check_modes(path, tests)
-    notes = [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in refused]
+    notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
+    notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in refused]
     first = tests[0]
     reading = replace(first.reading, warnings=(*first.reading.warnings, *notes))
     return [first._replace(reading=reading), *tests[1:]]
+
+
+def _are_few(rows: int, longest: int) -> bool:
+    """Tell whether so many rows are no test beside the longest of their file."""
+    return rows <= SHORT_TABLE and LENGTH_RATIO * rows <= longest
 
 
 def _may_be_test(refusal: InputError, tests: Sequence[TestInFile]) -> InputError:

@@ -1,0 +1,94 @@
+"""Layouts of tables as machines and laboratories write them: what is no column, no test and no name of one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from machine_files import neo_hookean, ramp
+from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
+
+SIZES = {"length": "20 mm", "area": "10 mm2"}
+STRETCH = ramp()
+MOVED, FORCE = 20 * (STRETCH - 1), 10 * neo_hookean(STRETCH)
+"""Of a specimen of 20 mm with 10 mm²."""
+
+
+def lines_of(*columns, separator=","):
+    return [separator.join(f"{value:.6f}" for value in row) for row in zip(*columns, strict=True)]
+
+
+def written(path, *lines):
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def check(tests, names, factors=(1.0, 1.1, 1.2), stretch=STRETCH):
+    """Compare tests with neo-Hookean specimens, each so many times as stiff."""
+    assert [test.name for test in tests] == list(names)
+    for test, factor in zip(tests, factors, strict=False):
+        np.testing.assert_allclose(test.stretch, stretch, atol=2e-6)
+        np.testing.assert_allclose(test.stress, factor * neo_hookean(test.stretch), atol=2e-6)
+
+
+STATEMENTS = [["L0 (mm)", "20"], ["Width (mm)", "5"], ["Thickness (mm)", "2"], ["Fmax (N)", "0.3"]]
+
+
+def test_statements_to_the_right_of_a_table_are_of_the_specimen(tmp_path):
+    rows = lines_of(MOVED, FORCE)
+    rows[:4] = [",".join([row, "", *statement]) for row, statement in zip(rows, STATEMENTS, strict=False)]
+    path = written(tmp_path / "right.csv", "Displacement (mm),Force (N),,Specimen,Tendon 4", *rows)
+    check(read_tests(path), ["right"])
+
+
+def test_words_beside_every_row_are_columns(tmp_path):
+    rows = [f"{row},,{name},7" for name in "AB" for row in lines_of(MOVED, FORCE)]
+    path = written(tmp_path / "both.csv", "Displacement (mm),Force (N),,Specimen,Age", *rows)
+    check(read_tests(path, dimensions=SIZES), "AB", (1.0, 1.0))
+
+
+def test_a_few_rows_beside_many_are_no_test(tmp_path):
+    strain = STRETCH - 1
+    rows = lines_of(strain, 1e3 * neo_hookean(STRETCH), strain, 1e3 * neo_hookean(STRETCH))
+    rows[2:] = [",".join([*row.split(",")[:2], "", ""]) for row in rows[2:]]
+    path = written(tmp_path / "wide.csv", ",".join(["Strain [-],Stress [kPa]"] * 2), *rows)
+    (test,) = find_tests_in_file(path)
+    check([test.reading.experiment], ["1"])
+    assert "'2' is left out: of 3 rows or fewer, and no test." in test.reading.warnings
+
+
+def test_blocks_of_a_machine_are_named_by_their_numbers(tmp_path):
+    lines = ["Results Table 1", ",Maximum Load", ",(N)", "1,0.5", "2,0.6", "3,0.7", ""]
+    for number, factor in enumerate((1.0, 1.1, 1.2), start=1):
+        rows = lines_of(np.arange(60) / 10, MOVED, factor * FORCE)
+        lines += [f"{number},Time,Extension,Load", ",(s),(mm),(N)", *(f",{row}" for row in rows), ""]
+    check(read_tests(written(tmp_path / "raw.csv", *lines), dimensions=SIZES), "123")
+
+
+@pytest.mark.parametrize("name", ["Specimen {}", "Specimen: {}"])
+def test_what_is_stated_above_a_table_is_of_it_and_does_not_name_it(tmp_path, name):
+    lines = []
+    for number, factor in ((1, 1.0), (2, 1.5)):
+        lines += [name.format(f"T{number}"), f"Gauge length: {20 * factor} mm", "Width: 5 mm", "Thickness: 2 mm"]
+        lines += ["Displacement (mm)\tForce (N)", *lines_of(factor * MOVED, FORCE, separator="\t")]
+    names = ["Specimen T1", "Specimen T2"] if ":" not in name else ["T1", "T2"]
+    check(read_tests(written(tmp_path / "all.txt", *lines)), names, (1.0, 1.0))
+
+
+@pytest.mark.parametrize("separator", ["\t", ","])
+def test_one_unknown_unit_among_known_ones_is_a_unit(tmp_path, separator):
+    header = (
+        separator.join(["Axial Displacement", "Axial Force", "Axial Count"]),
+        separator.join(["mm", "N", "segments"]),
+    )
+    rows = lines_of(MOVED, FORCE, np.zeros(60), separator=separator)
+    path = written(tmp_path / "mts.txt", *header, *rows)
+    check(read_tests(path, dimensions=SIZES), ["mts"])
+    table = find_tests_in_file(path, dimensions=SIZES)[0].reading.table
+    assert table.units == ("mm", "N", "segments")
+
+
+def test_names_of_one_letter_are_not_units_of_a_statement_above(tmp_path):
+    path = written(tmp_path / "a.csv", "Operator,JR", "N,s,strain", *lines_of(FORCE, MOVED, STRETCH - 1))
+    reading = find_tests_in_file(path, columns={"force": "N"}, dimensions={"area": "10 mm2"}, force_unit="N")[0].reading
+    assert reading.table.names == ("N", "s", "strain")
