@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import tissuq as tq
 from machine_files import neo_hookean, ramp
+from tissuq.errors import InputError
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file, read_tests
 
 SIZES = {"length": "20 mm", "area": "10 mm2"}
@@ -92,3 +94,32 @@ def test_names_of_one_letter_are_not_units_of_a_statement_above(tmp_path):
     path = written(tmp_path / "a.csv", "Operator,JR", "N,s,strain", *lines_of(FORCE, MOVED, STRETCH - 1))
     reading = find_tests_in_file(path, columns={"force": "N"}, dimensions={"area": "10 mm2"}, force_unit="N")[0].reading
     assert reading.table.names == ("N", "s", "strain")
+
+
+def test_a_table_that_begins_anew_after_a_blank_line_is_of_two_tests(tmp_path):
+    rows = lines_of(MOVED, FORCE), lines_of(MOVED, 1.1 * FORCE)
+    path = written(tmp_path / "blocks.csv", "Displacement (mm),Force (N)", *rows[0], "", *rows[1])
+    tests = find_tests_in_file(path, dimensions=SIZES)
+    check([test.reading.experiment for test in tests], "12")
+    assert any("begins anew after a blank line" in text for text in tests[0].reading.warnings)
+    with pytest.raises(InputError, match=r"several tables: 1 in lines 2 to 61, 2 in lines 63 to 122.*--table 1"):
+        tq.read(path, dimensions=SIZES)
+
+
+@pytest.mark.parametrize("column", ["words", "numbers"])
+def test_blocks_that_a_column_names_are_parted_by_it(tmp_path, column):
+    names = {"words": ("A", "B"), "numbers": ("1", "2")}[column]
+    rows = [[f"{name},{row}" for row in lines_of(MOVED, FORCE)] for name in names]
+    path = written(tmp_path / "long.csv", "Specimen,Displacement (mm),Force (N)", *rows[0], "", *rows[1])
+    check(read_tests(path, dimensions=SIZES), names, (1.0, 1.0))
+
+
+def test_a_blank_line_between_cycles_or_in_a_curve_parts_nothing(tmp_path):
+    moved, force = np.concatenate([MOVED, MOVED[::-1]]), np.concatenate([FORCE, FORCE[::-1]])
+    rows, header = lines_of(moved, force), "Displacement (mm),Force (N)"
+    for name, cut in (("cycles", len(rows)), ("curve", 30)):
+        path = written(tmp_path / f"{name}.csv", header, *rows[:cut], "", *rows[cut:], *rows)
+        assert len(tq.read(path, dimensions=SIZES)) == 240
+    rows = [f"{time / 10},{row}" for time, row in enumerate([*lines_of(MOVED, FORCE)] * 2)]
+    path = written(tmp_path / "time.csv", f"Time (s),{header}", *rows[:60], "", *rows[60:])
+    assert len(tq.read(path, dimensions=SIZES)) == 120

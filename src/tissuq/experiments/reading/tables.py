@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.beside import without_statements_beside
+from tissuq.experiments.reading.blocks import blocks_of
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.headings import heading, is_of_specimens
@@ -210,6 +211,8 @@ def _read_every_line(
     bounds = pairwise([0, *starts, len(lines) + 1])
     parts = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
     tables = _joined([_table_of(file, part, layout.separator, sheet) for part in parts])
+    lines_with_text = frozenset(line for line, _ in filled)
+    tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
         return tables
     return [
@@ -324,7 +327,7 @@ def _without_summary(table: Table) -> Table:
         )
     what = f" with its {', '.join(summary.statistics)}" if summary.statistics else ""
     note = f"{where} at the end of the table, a summary{what}, left out: no measurements."
-    return replace(table.taken(np.arange(summary.start)), notes=(note,))
+    return replace(table.taken(np.arange(summary.start)), notes=(*table.notes, note))
 
 
 def _no_table(file: str, content: Lines) -> InputError:

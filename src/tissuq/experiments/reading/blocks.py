@@ -1,0 +1,71 @@
+"""Blocks of one table, parted by blank lines, of which each begins anew: tests beneath one another without names."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.reading.layout import FEWEST_ROWS, split
+from tissuq.experiments.reading.table import Table, padded
+from tissuq.experiments.units import NUMBER
+
+__all__ = ["blocks_of"]
+
+SAME, FAR = 0.1, 0.5
+"""Share of the range of a column within which all blocks begin, and by which one of them goes back at a blank line."""
+
+
+def blocks_of(table: Table, filled: Collection[int]) -> list[Table]:
+    """Return the tests in a table: one, unless it begins anew after a blank line in all columns that change.
+
+    Parameters
+    ----------
+    table : Table
+    filled : collection of int
+        The lines of the file that are not blank.
+    """
+    gaps = [row for row, (line, later) in enumerate(pairwise(table.lines), start=1) if later > line + 1]
+    gaps = [
+        row for row in gaps if any(line not in filled for line in range(table.lines[row - 1] + 1, table.lines[row]))
+    ]
+    if not gaps:
+        return [table]
+    cells = [padded(split(row, table.separator), len(table.names)) for row in table.rows]
+    numbers = _numbers(cells)
+    starts = [row for row in gaps if _begins_anew(numbers, row) and not _is_named(cells, row)]
+    bounds = list(pairwise([0, *starts, len(table.rows)]))
+    if not starts or any(stop - start < FEWEST_ROWS for start, stop in bounds):
+        return [table]
+    note = "tests are parted where the table begins anew after a blank line; --table chooses one."
+    parts = [table.taken(np.arange(start, stop)) for start, stop in bounds]
+    return [replace(part, notes=(*part.notes, note)) for part in parts]
+
+
+def _is_named(cells: Sequence[Sequence[str]], row: int) -> bool:
+    """Tell whether words in a column name what begins at a row, and name something else above it."""
+    above, before, first = cells[row - 2], cells[row - 1], cells[row]
+    return any(a == b != c and c and not NUMBER.fullmatch(c) for a, b, c in zip(above, before, first, strict=True))
+
+
+def _numbers(texts: Sequence[Sequence[str]]) -> NDArray[np.float64]:
+    """Return the numbers (rows, columns) in columns that change; nan for cells without one."""
+    cells = np.array([[_number(cell) for cell in row] for row in texts])
+    has_numbers = np.isfinite(cells[0])
+    cells = cells[:, has_numbers]
+    return np.asarray(cells[:, np.nanmax(cells, axis=0) > np.nanmin(cells, axis=0)])
+
+
+def _begins_anew(numbers: NDArray[np.float64], row: int) -> bool:
+    """Tell whether a row begins like the first, and in a column far from the row before it."""
+    span = np.nanmax(numbers, axis=0) - np.nanmin(numbers, axis=0)
+    is_same = np.abs(numbers[row] - numbers[0]) <= SAME * span
+    return bool(len(span) and is_same.all() and (np.abs(numbers[row] - numbers[row - 1]) >= FAR * span).any())
+
+
+def _number(cell: str) -> float:
+    number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
+    return number if np.isfinite(number) else np.nan
