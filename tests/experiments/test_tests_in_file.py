@@ -120,15 +120,35 @@ def test_a_shorter_test_ends_where_its_cells_do(tmp_path):
         np.testing.assert_allclose(tests[1].reading.experiment.stretch, ramp()[:53], atol=2e-6)
 
 
-def test_missing_rows_are_left_out_and_a_single_missing_cell_is_not(tmp_path):
+def test_missing_rows_are_left_out_and_many_with_a_missing_cell_are_not(tmp_path):
     rows = [["stretch", "stress [kPa]"], *rows_of(ramp(), 1e3 * neo_hookean(ramp()))]
     rows[10] = ["NaN", "NaN"]
     test = find_tests_in_file(written(tmp_path / "a.csv", rows))[0].reading
     assert len(test.experiment) == 59
     assert test.warnings == ("1 row without values of 'stretch' and 'stress [kPa]' left out, in line 11.",)
     rows[20] = ["1.1", "NaN"]
-    with pytest.raises(InputError, match="line 21, column 'stress \\[kPa\\]': 'NaN' is not a finite number"):
-        read_tests(written(tmp_path / "b.csv", rows))
+    test = find_tests_in_file(written(tmp_path / "b.csv", rows))[0].reading
+    assert len(test.experiment) == 58
+    assert test.warnings[1] == "1 row without a value of 'stretch' or 'stress [kPa]' left out, in line 21."
+    for row in (31, 32, 33, 40):
+        rows[row] = ["1.1", ""]
+    lines = "21,32:34,41"
+    words = rf"line 21, column 'stress \[kPa\]': 'NaN' is not.* Fill in the value\. .*: --leave-out {lines} \(leave_out"
+    with pytest.raises(InputError, match=words):
+        read_tests(written(tmp_path / "c.csv", rows))
+    assert [len(test) for test in read_tests(tmp_path / "c.csv", leave_out=lines)] == [54]
+
+
+def test_lines_that_cannot_be_read_are_left_out_as_the_message_says(tmp_path):
+    rows = [["stretch", "stress [kPa]"], *rows_of(ramp(), 1e3 * neo_hookean(ramp()))]
+    rows[20:20] = [["stop"], ["// camera trigger"]]
+    rows[30] = ["1.2", "overload"]
+    path = written(tmp_path / "a.csv", rows)
+    with pytest.raises(InputError, match="line 21, column 'stretch': 'stop' is not a number.*--leave-out 21,31 "):
+        read_tests(path)
+    (test,) = read_tests(path, leave_out="21,31,40")
+    np.testing.assert_allclose(test.stretch, np.delete(ramp(), [27, 36]), atol=2e-6)
+    assert "without the rows in lines 21,31,40" in test.source
 
 
 def steps(titles=("Tension - 1", "Tension - 2"), sizes=(1.0, 1.1)):

@@ -269,13 +269,15 @@ def read_rows(
     if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
         check_not_sheared(table)
     dimensions = dimensions_of(table, options.get("dimensions"))
+    absent = set[int]()
     try:
         measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
     except InputError:
-        columns = dict.fromkeys(column for choice in choices for column in (choice.deformation, choice.stress))
-        if (complete := table.without_missing(list(columns))) is table:
+        columns = list(dict.fromkeys(column for choice in choices for column in (choice.deformation, choice.stress)))
+        readable = table.without_faulty(columns, options.get("leave_out")).without_missing(columns)
+        if readable is table:
             raise
-        table = complete
+        absent, table = set(table.lines) - set(readable.lines), readable
         measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
     check_one_specimen(table, choices, measured.course)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
@@ -283,7 +285,7 @@ def read_rows(
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
-        used = used.without_lines(lines)
+        used = used.without_lines(lines, absent)
     reference, shown, errors = mode.controls[0].reference, loads[0].unit, dict[str, float]()
     if (preload := options.get("preload")) == AUTO:
         slacks = [tested.slack for tested in tested_stresses(used, mode, shown)]

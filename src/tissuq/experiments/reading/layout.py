@@ -124,8 +124,10 @@ def later_tables(lines: Sequence[tuple[int, str]], layout: Layout) -> list[int]:
 
 
 def is_comment(line: str) -> bool:
-    """Tell whether a line is a comment: it begins with a hash that is not that of a spreadsheet's error."""
+    """Tell whether a line is a comment: it begins with two slashes, or a hash that is not of a spreadsheet's error."""
     text = line.lstrip(' \t"')
+    if text.startswith("//"):
+        return True
     return line.lstrip().startswith("#") and re.split(r'[\s;,"]', text)[0].lower() not in SPREADSHEET_ERRORS
 
 

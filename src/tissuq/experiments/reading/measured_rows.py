@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.slack import Slack
-from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.table import Column, Table, rows_in
 from tissuq.experiments.units import FORCE, MASSES, number_and_unit, stress_unit
 
 __all__ = ["COUNTED_FROM", "Dropped", "MeasuredRows", "labelled", "preload_stress"]
@@ -102,26 +102,15 @@ class MeasuredRows:
         kept = self.kept(np.arange(peak + 1), "after the largest stress")
         return kept.with_step(f"only rows up to the largest stress, in {self.table.counted} {self.table.lines[peak]}")
 
-    def without_lines(self, lines: str) -> MeasuredRows:
-        """Return the rows but those of some lines of the file, such as ``31,45:50``.
+    def without_lines(self, lines: str, absent: Collection[int] = ()) -> MeasuredRows:
+        """Return the rows but those of some lines of the file, such as ``31,45:50``; some may be absent already.
 
         Raises
         ------
         InputError
             When this is not a list of lines, or some of them hold no row that is used.
         """
-        numbers, is_left_out = np.array(self.table.lines), np.zeros(len(self), dtype=bool)
-        for part in str(lines).split(","):
-            ends = part.split(":")
-            if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
-                raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
-            found = (numbers >= int(ends[0])) & (numbers <= int(ends[-1]))
-            if not found.any():
-                raise InputError(
-                    f"{self.table.file}: there is no row to leave out in line {part.strip()}; rows are in lines "
-                    f"{numbers.min()} to {numbers.max()}."
-                )
-            is_left_out |= found
+        is_left_out = rows_in(lines, [*self.table.lines, *absent], self.table.file)[: len(self)]
         if is_left_out.all():
             raise InputError(f"{self.table.file}: no row is left without lines {lines}.")
         kept = self.kept(np.flatnonzero(~is_left_out), "in lines to leave out")

@@ -136,10 +136,7 @@ class TestedStress:
 
     def lines(self, rows: NDArray[np.intp]) -> str:
         """Return the lines of the file in which rows stand, as one gives them to ``--leave-out``."""
-        runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-        lines = self.used.table.lines
-        spans = [f"{lines[run[0]]}:{lines[run[-1]]}" if len(run) > 1 else f"{lines[run[0]]}" for run in runs]
-        return ",".join(spans)
+        return self.used.table.lines_of(rows)
 
     def place(self, rows: NDArray[np.intp]) -> str:
         """Return where rows stand in the file, in words."""

@@ -18,7 +18,7 @@ from tissuq.experiments.reading.layout import (
 )
 from tissuq.experiments.units import BRACKETS, NUMBER
 
-__all__ = ["Column", "Lines", "Table", "padded"]
+__all__ = ["Column", "Lines", "Table", "padded", "rows_in"]
 
 Column = NDArray[np.float64]
 Lines = list[tuple[int, str]]
@@ -27,6 +27,14 @@ FEW_ROWS = 200
 """Rows that show whether a column is constant."""
 CONSTANT_SHARE = 0.02
 """Range of numbers over the largest, up to which they are one: of the gap of a rheometer that holds it."""
+ABSENT = MISSING - SPREADSHEET_ERRORS
+"""What stands in a cell that was not measured."""
+OVERFLOW = frozenset(["inf", "+inf", "-inf"])
+"""What may stand there because too much was measured."""
+FEW_MISSING = 0.05
+"""Share of the rows up to which those are left out in which only some of the cells are missing."""
+LEFT_OUT_AT_MOST = 0.5
+"""Share of the rows up to which a message advises to leave them out."""
 
 
 @dataclass(frozen=True)
@@ -160,27 +168,65 @@ class Table:
                 return list(block.T)
         raise self._bad_cell(columns)
 
+    def lines_of(self, rows: NDArray[np.intp]) -> str:
+        """Return the lines of the file in which rows stand, such as ``31,45:50``."""
+        runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+        spans = (f"{self.lines[run[0]]}:{self.lines[run[-1]]}" if len(run) > 1 else self.lines[run[0]] for run in runs)
+        return ",".join(map(str, spans))
+
+    def without_faulty(self, columns: Sequence[int], lines: str | None) -> Table:
+        """Return the table without rows in some lines, of which columns (counted from 0) hold what is no number."""
+        if lines is None:
+            return self
+        is_faulty = rows_in(lines, self.lines, self.file) & self._is_faulty(columns)
+        return self._without(is_faulty, "that cannot be read, to be left out as asked,")
+
     def without_missing(self, columns: Sequence[int]) -> Table:
         """Return the table without rows in which columns (counted from 0) are all empty, or marked as missing.
 
-        Of the last rows, one of the columns is enough: the test ended there.
+        One of the columns is enough in the last rows, for the test ended there, and where this leaves out few rows.
         """
         cells = list(zip(*(self.texts(column) for column in columns), strict=True))
-        absent = MISSING - SPREADSHEET_ERRORS
-        filled = [[cell for cell in row if cell.lower() not in absent] for row in cells]
+        filled = [[cell for cell in row if cell.lower() not in ABSENT] for row in cells]
         is_missing = np.array([not row for row in filled])
         for row in reversed(range(len(filled))):
             if len(filled[row]) == len(columns) or not all(map(NUMBER.fullmatch, filled[row])):
                 break
             is_missing[row] = True
-        if not is_missing.any() or is_missing.all():
+        is_partly = ~is_missing & np.array(
+            [
+                len(row) < len(columns)
+                and all(map(NUMBER.fullmatch, row))
+                and OVERFLOW.isdisjoint(map(str.lower, every))
+                for row, every in zip(filled, cells, strict=True)
+            ]
+        )
+        table = self._without(is_missing, f"without values of {' and '.join(map(self.label, columns))} left out,")
+        if np.count_nonzero(is_partly) > FEW_MISSING * len(is_partly):
+            return table
+        text = f"without a value of {' or '.join(map(self.label, columns))} left out,"
+        return table._without(is_partly[~is_missing] if table is not self else is_partly, text)
+
+    def _without(self, is_left_out: NDArray[np.bool_], text: str) -> Table:
+        """Return the table without some rows, unless these are none or all, with a note of why."""
+        if not is_left_out.any() or is_left_out.all():
             return self
-        count, first = np.count_nonzero(is_missing), self.lines[int(np.argmax(is_missing))]
-        what = "1 row" if count == 1 else f"{count} rows"
-        names = " and ".join(map(self.label, columns))
-        where = f"{'' if count == 1 else 'the first '}in {self.counted} {first}"
-        note = f"{what} without values of {names} left out, {where}."
-        return replace(self.taken(np.flatnonzero(~is_missing)), notes=(*self.notes, note))
+        count, first = np.count_nonzero(is_left_out), self.lines[int(np.argmax(is_left_out))]
+        what, where = ("1 row", "") if count == 1 else (f"{count} rows", "the first ")
+        note = f"{what} {text} {where}in {self.counted} {first}."
+        return replace(self.taken(np.flatnonzero(~is_left_out)), notes=(*self.notes, note))
+
+    def _how_to_leave_out(self, columns: Sequence[int]) -> str:
+        """Return how to leave out the rows with a faulty cell in columns; nothing where these are most rows."""
+        faulty = np.flatnonzero(self._is_faulty(columns))
+        lines = self.lines_of(faulty)
+        is_advised = len(faulty) <= LEFT_OUT_AT_MOST * len(self.rows)
+        advice = f" To leave out all rows that cannot be read: --leave-out {lines} (leave_out='{lines}')."
+        return advice if is_advised else ""
+
+    def _is_faulty(self, columns: Sequence[int]) -> NDArray[np.bool_]:
+        """Tell which rows have a cell in columns that is no finite number."""
+        return np.array([any(map(_problem, row)) for row in zip(*map(self.texts, columns), strict=True)])
 
     def _readings(self) -> Iterator[tuple[list[str], Callable[[str], float] | None]]:
         """Yield the rows and what converts their cells, the fastest first: points, commas, both by column."""
@@ -197,7 +243,7 @@ class Table:
                 cell = cells[column] if column < len(cells) else ""
                 problem = _problem(cell)
                 if problem:
-                    return InputError(f"{self.place(column, row)}: {problem}")
+                    return InputError(f"{self.place(column, row)}: {problem}{self._how_to_leave_out(columns)}")
                 for mark in set(cell) & {".", ","}:
                     marks.setdefault(mark, f"'{cell}' in {self.counted} {self.lines[row]}")
                 if len(marks) == 2:
@@ -218,19 +264,43 @@ def _from_decimal_comma(text: str) -> float:
 def _problem(cell: str) -> str:
     """Say what is wrong with a cell; nothing when it is a finite number."""
     if not cell:
-        return "the cell is empty. Fill in the value or delete the whole row."
+        return "the cell is empty. Fill in the value."
     if NUMBER.fullmatch(cell):
         finite = np.isfinite(float(cell.replace(",", ".")))
-        return "" if finite else f"'{cell}' is too large for a number. Correct the value or delete the row."
+        return "" if finite else f"'{cell}' is too large for a number. Correct it."
     if "." in cell and "," in cell and NUMBER.fullmatch(cell.replace(",", "").replace(".", "")):
         return f"'{cell}' seems to have a thousands separator. Write numbers without one."
     if NUMBER.fullmatch(cell.rstrip(" %")):
         return f"'{cell}' is a percentage. Write plain numbers, and the unit % in the heading."
     if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-        return f"'{cell}' is not a finite number. Fill in the value or delete the row."
-    return f"'{cell}' is not a number. Correct the value or delete the row."
+        return f"'{cell}' is not a finite number. Fill in the value."
+    return f"'{cell}' is not a number. Correct it."
 
 
 def padded(cells: list[str], width: int) -> tuple[str, ...]:
     """Return the cells of a row, so many, empty ones added."""
     return tuple([*cells, *[""] * width][:width])
+
+
+def rows_in(lines: str, numbers: Sequence[int], file: str) -> NDArray[np.bool_]:
+    """Tell which rows, of which the lines are numbers, stand in lines such as ``31,45:50``.
+
+    Raises
+    ------
+    InputError
+        When this is not a list of lines, or some of them hold no row.
+    """
+    of_rows = np.array(numbers)
+    is_in = np.zeros(len(of_rows), dtype=bool)
+    for part in str(lines).split(","):
+        ends = part.split(":")
+        if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
+            raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
+        found = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
+        if not found.any():
+            raise InputError(
+                f"{file}: there is no row to leave out in line {part.strip()}; rows are in lines {of_rows.min()} to "
+                f"{of_rows.max()}."
+            )
+        is_in |= found
+    return is_in

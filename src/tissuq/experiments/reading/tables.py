@@ -203,7 +203,7 @@ def _read_every_line(
     """Return the tables of any text or sheet, looking at every line."""
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
-    content = [(line, text) for line, text in filled if "#" not in text or not is_comment(text)]
+    content = [(line, text) for line, text in filled if ("#" not in text and "//" not in text) or not is_comment(text)]
     layout = find_layout([text for _, text in content], separator)
     if layout is None:
         raise _no_table(file, content)
@@ -222,7 +222,7 @@ def _read_every_line(
 
 def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
     """Return the table in numbered lines that are not blank."""
-    content = [(line, text) for line, text in filled if "#" not in text or not is_comment(text)]
+    content = [(line, text) for line, text in filled if ("#" not in text and "//" not in text) or not is_comment(text)]
     texts = [text for _, text in content]
     layout = find_layout(texts, separator)
     if layout is None:
@@ -343,7 +343,7 @@ def _no_table(file: str, content: Lines) -> InputError:
 def _comment_above(filled: Lines, first_line: int) -> tuple[int, str]:
     """Return the comment just above the data as a candidate for the names: numpy.savetxt writes them so."""
     line, text = next(((line, text) for line, text in reversed(filled) if line < first_line), (0, ""))
-    return (line, text.lstrip("# \t")) if is_comment(text) else (0, "")
+    return (line, text.lstrip("#/ \t")) if is_comment(text) else (0, "")
 
 
 def _check_shape(table: Table, header: str) -> None:
