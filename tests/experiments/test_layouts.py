@@ -123,3 +123,24 @@ def test_a_blank_line_between_cycles_or_in_a_curve_parts_nothing(tmp_path):
     rows = [f"{time / 10},{row}" for time, row in enumerate([*lines_of(MOVED, FORCE)] * 2)]
     path = written(tmp_path / "time.csv", f"Time (s),{header}", *rows[:60], "", *rows[60:])
     assert len(tq.read(path, dimensions=SIZES)) == 120
+
+
+@pytest.mark.parametrize(("separator", "marks"), [(",", ",."), (";", ".,")])
+def test_thousands_separators_are_told_by_numbers_with_both_marks(tmp_path, separator, marks):
+    header = separator.join(["Displacement (um)", "Force (mN)"])
+    rows = [
+        separator.join(f'"{value:,.3f}"'.translate(str.maketrans(",.", marks)) for value in row)
+        for row in zip(1e3 * MOVED, 1e3 * FORCE, strict=True)
+    ]
+    path = written(tmp_path / "thousands.csv", header, *rows)
+    check(read_tests(path, dimensions=SIZES), ["thousands"])
+    (test,) = find_tests_in_file(path, dimensions=SIZES)
+    assert test.reading.warnings[0].startswith(f"'{marks[0]}' was taken for a thousands separator, as in")
+
+
+def test_a_group_of_three_digits_is_thousands_only_where_another_number_says_so(tmp_path):
+    rows = ["1,000;0,000", "1,050;0,150", "1,100;0,290"]
+    assert tq.read(written(tmp_path / "a.csv", "stretch;stress (kPa)", *rows)).stretch.max() == pytest.approx(1.1)
+    rows = ["0;0", "500;150", "1,000;290", "1,500.5;420"]
+    path = written(tmp_path / "b.csv", "displacement (um);stress (kPa)", *rows)
+    assert tq.read(path, length="10 mm").stretch.tolist() == pytest.approx([1, 1.05, 1.1, 1.15005])

@@ -19,6 +19,7 @@ __all__ = [
     "AREA",
     "BRACKETS",
     "FORCE",
+    "GROUPED",
     "LENGTH",
     "MASSES",
     "NUMBER",
@@ -41,6 +42,11 @@ __all__ = [
 ]
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
+GROUPED = {
+    ",": re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d*)?"),
+    ".": re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+(?:,\d+)?"),
+}
+"""Numbers with a mark between thousands, by that mark; with one mark in all they may be decimal numbers as well."""
 
 COMMON_STRESS_UNITS = {
     "Pa": 1e-6,

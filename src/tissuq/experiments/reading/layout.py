@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tissuq.experiments.units import NUMBER, looks_like_unit
+from tissuq.experiments.units import GROUPED, NUMBER, looks_like_unit
 
 __all__ = [
     "LENGTH_RATIO",
@@ -234,12 +234,16 @@ def _with_faulty_rows_above(lines: Sequence[str], cells: Split, row: int) -> int
     return row
 
 
+def _is_number(cell: str) -> bool:
+    return any(number.fullmatch(cell) for number in (NUMBER, *GROUPED.values()))
+
+
 def _count_numbers(cells: Sequence[str]) -> int:
-    return sum(NUMBER.fullmatch(cell) is not None for cell in cells)
+    return sum(map(_is_number, cells))
 
 
 def _are_values(cells: Sequence[str]) -> bool:
-    return all(cell.lower() in MISSING or NUMBER.fullmatch(cell) for cell in cells)
+    return all(cell.lower() in MISSING or _is_number(cell) for cell in cells)
 
 
 def _is_data(cells: Sequence[str]) -> bool:

@@ -32,6 +32,7 @@ from tissuq.experiments.reading.layout import (
 from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
+from tissuq.experiments.reading.thousands import without_thousands
 from tissuq.experiments.units import NUMBER, number_and_unit
 
 __all__ = ["read_table", "read_tables"]
@@ -211,7 +212,7 @@ def _read_every_line(
     bounds = pairwise([0, *starts, len(lines) + 1])
     parts = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
     tables = _joined([_table_of(file, part, layout.separator, sheet) for part in parts])
-    lines_with_text = frozenset(line for line, _ in filled)
+    lines_with_text = {line for line, _ in filled}
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
         return tables
@@ -252,7 +253,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         title=_number_before(names) or _title(texts[: layout.names or 0], separator),
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
-    return _without_summary(without_statements_beside(table))
+    return _without_summary(without_thousands(without_statements_beside(table)))
 
 
 def _number_before(names: Sequence[str]) -> str:
