@@ -144,3 +144,55 @@ def test_a_group_of_three_digits_is_thousands_only_where_another_number_says_so(
     rows = ["0;0", "500;150", "1,000;290", "1,500.5;420"]
     path = written(tmp_path / "b.csv", "displacement (um);stress (kPa)", *rows)
     assert tq.read(path, length="10 mm").stretch.tolist() == pytest.approx([1, 1.05, 1.1, 1.15005])
+
+
+def test_structures_of_matlab_are_tests_and_what_they_state_is_of_them(tmp_path):
+    savemat = pytest.importorskip("scipy.io").savemat
+    tests = np.zeros((1, 2), dtype=[(name, "O") for name in ("name", "disp_mm", "force_N", "L0_mm", "area_mm2")])
+    tests[0, 0] = ("S1", MOVED, FORCE, 20.0, 10.0)
+    tests[0, 1] = ("S2", 0.5 * MOVED[:50], 2.0 * FORCE[:50], 10.0, 20.0)
+    savemat(tmp_path / "a.mat", {"tests": tests, "fs": 100.0})
+    first, second = read_tests(tmp_path / "a.mat")
+    check([first], ["tests S1"], (1.0,))
+    check([second], ["tests S2"], (1.0,), STRETCH[:50])
+
+
+def test_structures_of_newer_files_of_matlab_are_tests(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        tests = file.create_group("tests")
+        fields = {"stretch": [STRETCH] * 2, "stress_kPa": [1e3 * neo_hookean(STRETCH), 1.1e3 * neo_hookean(STRETCH)]}
+        fields["name"] = [np.frombuffer(name, dtype=np.uint8).astype(np.uint16) for name in (b"S1", b"S2")]
+        for name, values in fields.items():
+            references = tests.create_dataset(name, (1, 2), dtype=h5py.ref_dtype)
+            for number, value in enumerate(values):
+                stored = file.create_dataset(f"#refs#/{name}{number}", data=value[:, None])
+                stored.attrs["MATLAB_class"] = np.bytes_("char" if name == "name" else "double")
+                references[0, number] = stored.ref
+    with (tmp_path / "a.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
+    check(read_tests(tmp_path / "a.mat"), ["tests S1", "tests S2"])
+
+
+@pytest.mark.parametrize("is_upright", [True, False])
+@pytest.mark.parametrize("has_common_stretch", [True, False])
+def test_matrices_of_matlab_hold_a_test_in_each_column(tmp_path, is_upright, has_common_stretch):
+    savemat = pytest.importorskip("scipy.io").savemat
+    stress = np.stack([1e3 * factor * neo_hookean(STRETCH) for factor in (1.0, 1.1, 1.2)])
+    stretch = STRETCH if has_common_stretch else np.stack([STRETCH] * 3)
+    stress[1, 50:] = np.nan
+    upright = {"stretch": stretch.T, "stress_kPa": stress.T}
+    savemat(tmp_path / "a.mat", upright if is_upright else {name: value.T for name, value in upright.items()})
+    tests = read_tests(tmp_path / "a.mat")
+    check(tests[::2], ["test 1", "test 3"], (1.0, 1.2))
+    check(tests[1:2], ["test 2"], (1.1,), STRETCH[:50])
+
+
+def test_two_columns_of_matrices_of_matlab_may_be_axes_and_are_asked_about(tmp_path):
+    savemat = pytest.importorskip("scipy.io").savemat
+    stress = np.stack([1e3 * factor * neo_hookean(STRETCH) for factor in (1.0, 1.1)])
+    savemat(tmp_path / "a.mat", {"stretch": np.stack([STRETCH] * 2).T, "stress_kPa": stress.T})
+    with pytest.raises(InputError, match="is of a biaxial test"):
+        read_tests(tmp_path / "a.mat")
+    (test,) = read_tests(tmp_path / "a.mat", mode="biaxial")
+    assert test.stress.shape == (60, 2)

@@ -1,21 +1,24 @@
-"""Files of MATLAB: vectors of one length are the columns of a table, and so are those of a structure."""
+"""Files of MATLAB: vectors of one length are the columns of a table, and so are those of each structure."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
+from tissuq.experiments.reading.headings import ROLES, heading, measure_in
 
 __all__ = ["MatlabFile"]
 
 FEWEST_ROWS = 2
 """Length of a vector that may be a column."""
+AXES = 2
+"""Columns of a matrix that may be of the axes of one test."""
 VARIABLES = "variables"
 """Name of the sheet of the variables that stand by themselves."""
 
@@ -50,27 +53,113 @@ def _variables(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _of_hdf5(item: Any) -> Any:
-    """Return a dataset as an array, its axes as in MATLAB; a group as a mapping."""
+    """Return a dataset as an array, its axes as in MATLAB, or as a text; a group as a mapping; cells as a list."""
     if hasattr(item, "items"):
-        return {str(name): _of_hdf5(part) for name, part in item.items()}
-    return np.squeeze(np.asarray(item).T)
+        fields = {str(name): _of_hdf5(part) for name, part in item.items()}
+        lists = [part for part in fields.values() if isinstance(part, list)]
+        if len(lists) == len(fields) and len({len(part) for part in lists}) == 1:
+            return [dict(zip(fields, parts, strict=True)) for parts in zip(*lists, strict=True)]
+        return fields
+    values = np.asarray(item)
+    if values.dtype == object:
+        return [_of_hdf5(item.file[reference]) for reference in values.ravel()]
+    if item.attrs.get("MATLAB_class") == b"char":
+        return "".join(map(chr, values.ravel()))
+    return np.squeeze(values.T)
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    """Return the fields of a structure; nothing of anything else."""
+    fields = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
+    return {field: part for field, part in fields.items() if not field.startswith("_")}
 
 
 def _sheets(name: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
-    """Yield the lines of every table among variables; those that stand by themselves make the sheet of that name."""
-    vectors: dict[str, Any] = {}
+    """Yield the lines of every table among variables; those that stand by themselves make the sheet of that name.
+
+    Single numbers and texts beside them are lines above it.
+    """
+    vectors, matrices, statements = dict[str, Any](), dict[str, Any](), list[str]()
     for key, value in variables.items():
-        fields = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
-        parts = {field: part for field, part in fields.items() if not field.startswith("_")}
-        if parts:
-            yield from _sheets(key if name == VARIABLES else f"{name}.{key}", parts)
+        path = key if name == VARIABLES else f"{name}.{key}"
+        is_list = isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object and value.ndim)
+        structures = [_fields(element) for element in np.ravel(value)] if is_list else []
+        if is_list and all(structures):
+            for label, fields in zip(_labels(path, structures), structures, strict=True):
+                yield from _sheets(label, fields)
+        elif fields := _fields(value):
+            yield from _sheets(path, fields)
+        elif isinstance(value, str | int | float) or (isinstance(value, np.ndarray | np.generic) and not value.ndim):
+            statements.append(line_of([key, value if isinstance(value, str) else np.asarray(value).item()]))
         elif isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
             if value.ndim == 1 and len(value) >= FEWEST_ROWS:
                 vectors[key] = value
             elif value.ndim == 2:
-                yield key, [line_of(row) for row in value.tolist()]
+                matrices[key] = value
+    table = _of_tests(matrices, vectors)
+    for key, value in matrices.items():
+        if table is None or key not in table.keys:
+            yield key if name == VARIABLES else f"{name}.{key}", [line_of(row) for row in value.tolist()]
+    if table is not None:
+        yield name, [*statements, *table.lines]
+        vectors = {key: value for key, value in vectors.items() if key not in table.keys}
     by_length = groupby(sorted(vectors.items(), key=lambda item: len(item[1])), key=lambda item: len(item[1]))
     groups = [dict(items) for _, items in by_length]
     for columns in groups:
         rows = np.column_stack(list(columns.values())).tolist()
-        yield name if len(groups) == 1 else f"{name} of {len(rows)}", [line_of(list(columns)), *map(line_of, rows)]
+        sheet = name if len(groups) == 1 and table is None else f"{name} of {len(rows)}"
+        yield sheet, [*statements, line_of(list(columns)), *map(line_of, rows)]
+
+
+def _labels(name: str, structures: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what tells structures apart: a text that is different in each, or else their numbers."""
+    for field in structures[0]:
+        texts = [fields.get(field) for fields in structures]
+        if all(isinstance(text, str) and text for text in texts) and len(set(texts)) == len(texts):
+            return [f"{name} {text}" for text in texts]
+    return [f"{name}({number})" for number in range(1, len(structures) + 1)]
+
+
+class _TableOfTests(NamedTuple):
+    """A table of several tests beside one another, and the names of the variables that are in it."""
+
+    keys: frozenset[str]
+    lines: list[str]
+
+
+def _of_tests(matrices: Mapping[str, Any], vectors: Mapping[str, Any]) -> _TableOfTests | None:
+    """Return the table of matrices of which each holds one quantity of several tests; None where there are none.
+
+    Their names say that they do. Two columns may be of two axes, and are named so that they are asked about.
+    """
+    named = {key: value for key, value in matrices.items() if _is_of_one_quantity(key)}
+    common = {key: value for key, value in vectors.items() if any(len(value) in part.shape for part in named.values())}
+    if len({value.shape for value in named.values()}) != 1 or len(named) + sum(map(_is_of_one_quantity, common)) < 2:
+        return None
+    shape = next(iter(named.values())).shape
+    lengths = {len(value) for value in common.values()} or {max(shape)}
+    if len(lengths) > 1:
+        return None
+    rows = lengths.pop()
+    upright = {key: value if value.shape[0] == rows else value.T for key, value in named.items()}
+    count = min(shape) if rows == max(shape) else max(shape)
+    above, names, columns = [""] * len(common), list(common), list(common.values())
+    for number in range(1, count + 1):
+        for key, value in upright.items():
+            above.append(f"test {number}")
+            names.append(key if count > AXES else _numbered(key, number))
+            columns.append(value[:, number - 1])
+    lines = [line_of(above)] if count > AXES else []
+    content = [*lines, line_of(names), *map(line_of, np.column_stack(columns).tolist())]
+    return _TableOfTests(frozenset([*named, *common]), content)
+
+
+def _numbered(key: str, number: int) -> str:
+    """Return the name of one of the columns of a matrix, such as ``stress 1 (kPa)``."""
+    name = heading(key)
+    return f"{name.quantity} {number} ({name.unit})" if name.unit else f"{name.quantity} {number}"
+
+
+def _is_of_one_quantity(key: str) -> bool:
+    """Tell whether the name of a variable is that of a deformation or a load."""
+    return any(measure_in(heading(key).quantity)[0] in names for names in ROLES.values())
