@@ -196,3 +196,58 @@ def test_two_columns_of_matrices_of_matlab_may_be_axes_and_are_asked_about(tmp_p
         read_tests(tmp_path / "a.mat")
     (test,) = read_tests(tmp_path / "a.mat", mode="biaxial")
     assert test.stress.shape == (60, 2)
+
+
+FACTORS = (1.0, 1.1, 1.2)
+STRESSES = [1e3 * factor * neo_hookean(STRETCH) for factor in FACTORS]
+
+
+@pytest.mark.parametrize("above", ["Strain,Stress (kPa),,", "Strain,Stress (kPa)"])
+@pytest.mark.parametrize("unit", ["(-)", ""])
+def test_specimens_are_named_beneath_the_quantity_that_they_share(tmp_path, above, unit):
+    columns = lines_of(STRETCH - 1, *STRESSES, np.mean(STRESSES, axis=0), np.std(STRESSES, axis=0))
+    path = written(tmp_path / "a.csv", above, f"{unit},ID 12,ID 15,Left,mean,SD", *columns)
+    tests = read_tests(path)
+    check(tests, ["ID 12", "ID 15", "Left"])
+    assert not any(test.standard_error.any() for test in tests)
+
+
+@pytest.mark.parametrize(
+    ("header", "names"),
+    [
+        ("Strain,S1 (kPa),S2 (kPa),S3 (kPa),Mean (kPa),SD (kPa)", ["s1", "s2", "s3"]),
+        ("Strain,Stress 1 (kPa),Stress 2 (kPa),Stress 3 (kPa),Average stress (kPa),Std Dev (kPa)", "123"),
+    ],
+)
+def test_means_and_spreads_beside_specimens_are_none(tmp_path, header, names):
+    mean, sd = np.mean(STRESSES, axis=0), np.std(STRESSES, axis=0)
+    path = written(tmp_path / "a.csv", header, *lines_of(STRETCH - 1, *STRESSES, mean, sd))
+    tests = read_tests(path, mode="uniaxial")
+    check(tests, names)
+    assert not any(test.standard_error.any() for test in tests)
+
+
+def test_numbered_stresses_beside_their_mean_are_no_axes(tmp_path):
+    header = "Strain,Stress 1 (kPa),Stress 2 (kPa)"
+    rows = lines_of(STRETCH - 1, *STRESSES[:2], np.mean(STRESSES[:2], axis=0))
+    check(read_tests(written(tmp_path / "a.csv", f"{header},Average stress (kPa)", *rows)), "12")
+    with pytest.raises(InputError, match="is of a biaxial test"):
+        read_tests(written(tmp_path / "b.csv", f"{header},Temperature (K)", *rows))
+
+
+def test_principal_stresses_and_components_are_no_specimens(tmp_path):
+    for names in ("S1 (kPa),S2 (kPa),T", "S11 (kPa),S22 (kPa),S33 (kPa)"):
+        path = written(tmp_path / "a.csv", f"Strain,{names}", *lines_of(STRETCH - 1, *STRESSES))
+        with pytest.raises(InputError, match="no column is recognised as stress"):
+            read_tests(path)
+
+
+def test_means_of_groups_are_tests_each_with_its_spread(tmp_path):
+    header = "Strain,Control mean (kPa),Control SD (kPa),Treated mean (kPa),Treated SD (kPa)"
+    spreads = [0.1 * STRESSES[0] + 0.01, 0.3 * STRESSES[1] + 0.01]
+    columns = STRETCH - 1, STRESSES[0], spreads[0], STRESSES[1], spreads[1]
+    path = written(tmp_path / "a.csv", header, *lines_of(*columns))
+    tests = read_tests(path, mean_of=10_000)
+    check(tests, ["control", "treated"])
+    for test, spread in zip(tests, spreads, strict=True):
+        np.testing.assert_allclose(test.standard_error, 1e-3 * spread / 100, rtol=1e-3)

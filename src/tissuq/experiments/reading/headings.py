@@ -21,6 +21,8 @@ __all__ = [
     "Heading",
     "heading",
     "is_of_count",
+    "is_of_mean",
+    "is_of_role",
     "is_of_specimens",
     "measure_in",
     "of_spread",
@@ -232,6 +234,11 @@ def measure_in(quantity: str) -> tuple[str, str]:
     return quantity, ""
 
 
+def is_of_role(name: str) -> bool:
+    """Tell whether a name is that of a deformation or a load."""
+    return any(measure_in(heading(name).quantity)[0] in names for names in ROLES.values())
+
+
 def of_spread(quantity: str) -> tuple[str, str]:
     """Return what a column holds beside a mean, ``sem``, ``sd`` or ``open``, and of what; empty texts for others.
 
@@ -251,6 +258,11 @@ def of_spread(quantity: str) -> tuple[str, str]:
 def without_mean(quantity: str) -> str:
     """Return what a column holds without words for a mean."""
     return plain(_words(MEAN_WORDS).sub(" ", quantity))
+
+
+def is_of_mean(quantity: str) -> bool:
+    """Tell whether a column of that name is of a mean of specimens."""
+    return _words(MEAN_WORDS).search(quantity) is not None
 
 
 def is_of_count(quantity: str) -> bool:

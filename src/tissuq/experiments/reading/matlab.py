@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
-from tissuq.experiments.reading.headings import ROLES, heading, measure_in
+from tissuq.experiments.reading.headings import heading, is_of_role
 
 __all__ = ["MatlabFile"]
 
@@ -132,9 +132,9 @@ def _of_tests(matrices: Mapping[str, Any], vectors: Mapping[str, Any]) -> _Table
 
     Their names say that they do. Two columns may be of two axes, and are named so that they are asked about.
     """
-    named = {key: value for key, value in matrices.items() if _is_of_one_quantity(key)}
+    named = {key: value for key, value in matrices.items() if is_of_role(key)}
     common = {key: value for key, value in vectors.items() if any(len(value) in part.shape for part in named.values())}
-    if len({value.shape for value in named.values()}) != 1 or len(named) + sum(map(_is_of_one_quantity, common)) < 2:
+    if len({value.shape for value in named.values()}) != 1 or len(named) + sum(map(is_of_role, common)) < 2:
         return None
     shape = next(iter(named.values())).shape
     lengths = {len(value) for value in common.values()} or {max(shape)}
@@ -158,8 +158,3 @@ def _numbered(key: str, number: int) -> str:
     """Return the name of one of the columns of a matrix, such as ``stress 1 (kPa)``."""
     name = heading(key)
     return f"{name.quantity} {number} ({name.unit})" if name.unit else f"{name.quantity} {number}"
-
-
-def _is_of_one_quantity(key: str) -> bool:
-    """Tell whether the name of a variable is that of a deformation or a load."""
-    return any(measure_in(heading(key).quantity)[0] in names for names in ROLES.values())

@@ -10,15 +10,19 @@ from tissuq.experiments.reading.columns import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.headings import (
     AXES,
     heading,
+    is_of_mean,
     is_of_specimens,
     measure_in,
+    of_spread,
     on_lettered_axis,
     plain,
     role_names,
+    without_mean,
 )
 from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.units import measured_in
 
 __all__ = ["ColumnsOfTest", "columns_side_by_side"]
 
@@ -26,6 +30,8 @@ PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer
 """Words and capacities that tell one load cell from another, and not tests."""
 TENSOR = frozenset(["11", "22", "33", "12", "13", "23", "21", "31", "32"])
 """Components, which are not numbers of tests."""
+LETTERS_OF_STRESS = "spt "
+"""What may stand before the numbers of axes and components in names of stresses."""
 
 
 class ColumnsOfTest(NamedTuple):
@@ -46,14 +52,20 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
     """Return the columns of every test where a table has several beside one another; nothing where it has one.
 
     They are a stress or force for each test, and a deformation for each or one for all. Their names are the same, or
-    differ in the number, letter or name of a specimen; the names of the tests may stand in the line above.
+    differ in the number, letter or name of a specimen; the names of the tests may stand in the line above. Columns of
+    loads that are known by their units alone are of specimens, or means of groups, beside one deformation of all.
     """
     deformations = ("shear",) if is_shear else LENGTHENINGS
     roles = [_role(name, (*deformations, *LOADS), stress_type) for name in table.names]
-    load, loads = _columns_of_first(LOADS, roles)
     measure, measures = _columns_of_first(deformations, roles)
+    is_by_unit = len(measures) == 1 and not any(role.role in LOADS for role in roles)
+    if is_by_unit:
+        roles = [role if role.role else _told_by_unit(table, column) for column, role in enumerate(roles)]
+    load, loads = _columns_of_first(LOADS, roles)
     labels = [roles[column].test for column in loads]
-    if len(loads) < 2 or not measures or set(labels) <= TENSOR or (set(labels) <= AXES.keys() and labels[0]):
+    numbers_of_tests = {label.lstrip(LETTERS_OF_STRESS) if is_by_unit else label for label in labels}
+    is_of_axes = numbers_of_tests <= AXES.keys() and not any(is_of_mean(heading(name).quantity) for name in table.names)
+    if len(loads) < 2 or not measures or numbers_of_tests <= TENSOR or is_of_axes:
         return []
     is_named = len(set(labels)) == len(labels) and all(labels)
     if is_named and (by_label := {roles[column].test: column for column in measures}).keys() == set(labels):
@@ -92,6 +104,15 @@ def _role(name: str, roles: Sequence[str], stress_type: str | None) -> _Role:
             if quantity_alone in role_names(role) and measure in ("", wanted or "engineering"):
                 return _Role(role, test)
     return _Role("", "")
+
+
+def _told_by_unit(table: Table, column: int) -> _Role:
+    """Return the load that a column has by its unit, and the test or the group that its whole name tells."""
+    quantity = heading(table.names[column]).quantity
+    in_heading, beneath = table.stated_units(column)
+    load, test = measured_in(beneath or in_heading), without_mean(quantity)
+    is_of_test = bool(test) and (_is_test(quantity) or is_of_mean(quantity)) and not of_spread(quantity)[0]
+    return _Role(load, test) if load in LOADS and is_of_test else _Role("", "")
 
 
 def _parts(quantity: str) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,15 @@ from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import SPREADS, heading, is_of_count, of_spread, role_names
+from tissuq.experiments.reading.headings import (
+    SPREADS,
+    heading,
+    is_of_count,
+    is_of_mean,
+    of_spread,
+    role_names,
+    without_mean,
+)
 from tissuq.experiments.reading.measures import Load
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
@@ -86,13 +94,21 @@ def spread_of(
 
 
 def _recognised(table: Table, choice: ColumnChoice) -> Spread:
-    """Return the column whose name says that it is of the spread of the stresses: of several the next to the right."""
+    """Return the column whose name says that it is of the spread of the stresses: of several the next to the right.
+
+    Where some columns are of means, those of others have none.
+    """
+    quantities = [heading(name).quantity for name in table.names]
+    of_stress = quantities[choice.stress]
+    if any(map(is_of_mean, quantities)) and not is_of_mean(of_stress):
+        return Spread()
     found: dict[str, list[int]] = {}
-    for column, name in enumerate(table.names):
-        kind, of_what = of_spread(heading(name).quantity)
+    for column in range(len(table.names)):
+        kind, of_what = of_spread(quantities[column])
         in_heading, beneath = table.stated_units(column)
         is_of_load = measured_in(beneath or in_heading) in ("", choice.load) and of_what in (
             "",
+            without_mean(of_stress),
             *role_names(choice.load),
         )
         if kind and is_of_load and not table.is_constant(column):

@@ -29,6 +29,7 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
+from tissuq.experiments.reading.spanning import with_names_above
 from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
@@ -253,6 +254,8 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         title=_number_before(names) or _title(texts[: layout.names or 0], separator),
     )
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
+    if layout.names:
+        table = with_names_above(table, texts[layout.names - 1])
     return _without_summary(without_thousands(without_statements_beside(table)))
 
 

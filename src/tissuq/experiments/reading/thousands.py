@@ -15,7 +15,7 @@ MAY_BE_GROUPED = re.compile(r"\d[.,]\d{3}[.,]\d")
 
 
 def without_thousands(table: Table) -> Table:
-    """Return the table without thousands separators; as it is where there are none, or numbers contradict each other."""
+    """Return the table without thousands separators; as it is where there are none, or numbers contradict."""
     cells = {
         cell: line
         for line, row in reversed(list(zip(table.lines, table.rows, strict=True)))
