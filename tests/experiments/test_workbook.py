@@ -11,6 +11,7 @@ from machine_files import neo_hookean, ramp
 from tissuq.errors import InputError
 from tissuq.experiments.reading import workbooks
 from tissuq.experiments.reading.experiment_file import read_experiment, read_file
+from tissuq.experiments.reading.inspection import inspect
 
 openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed")
 
@@ -93,14 +94,20 @@ def test_a_bad_cell_is_named_by_its_row_and_column(tmp_path):
     assert "sheet 'Sheet', line 3, column 'stress': the cell is empty" in message(tmp_path / "test.xlsx")
 
 
-def test_percentages_of_excel_are_asked_about_because_their_values_are_not_what_is_shown(tmp_path):
+@pytest.mark.parametrize(("heading", "top"), [("strain", 1.2), ("strain (%)", 1.2), ("strain (mm/mm)", None)])
+def test_cells_shown_as_percentages_are_what_is_shown(tmp_path, heading, top):
     book = openpyxl.Workbook()
-    for row in (["time", "strain", "stress"], [0, 0.0, 0], [1, 0.1, 2], [2, 0.2, 3]):
+    for row in (["time", heading, "stress (kPa)"], [0, 0.0, 0], [1, 0.1, 2], [2, 0.2, 3]):
         book.active.append(row)
     for cell in book.active["B"][1:]:
         cell.number_format = "0%"
     book.save(tmp_path / "test.xlsx")
-    assert "'0 %' is a percentage. Write plain numbers" in message(tmp_path / "test.xlsx")
+    if top is None:
+        assert "'0 %' is a percentage. Write plain numbers" in message(tmp_path / "test.xlsx")
+    else:
+        inspection = inspect(tmp_path / "test.xlsx")
+        assert inspection.reading.experiment.stretch.tolist() == pytest.approx([1.0, 1.1, top])
+        assert any("the cells are percentages" in text for text in inspection.warnings)
 
 
 def test_without_openpyxl_it_is_said_what_to_install(book, monkeypatch):

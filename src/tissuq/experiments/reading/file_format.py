@@ -79,8 +79,7 @@ def sheets_with_tables(
     }
     if not tables:
         raise InputError(
-            f"{path} holds no sheet with a table of numbers (cells shown as percentages are not read as numbers). The "
-            f"sheets are: {', '.join(map(repr, sheets))}."
+            f"{path} holds no sheet with a table of numbers. The sheets are: {', '.join(map(repr, sheets)) or 'none'}."
         )
     return tables
 

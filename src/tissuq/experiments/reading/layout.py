@@ -235,7 +235,9 @@ def _with_faulty_rows_above(lines: Sequence[str], cells: Split, row: int) -> int
 
 
 def _is_number(cell: str) -> bool:
-    return any(number.fullmatch(cell) for number in (NUMBER, *GROUPED.values()))
+    """Tell whether a cell is a number, with thousands separators or the sign of a percentage or without."""
+    text = cell.removesuffix("%").rstrip()
+    return any(number.fullmatch(text) for number in (NUMBER, *GROUPED.values()))
 
 
 def _count_numbers(cells: Sequence[str]) -> int:

@@ -16,6 +16,11 @@ NOT_TEXT = {
     b"%PDF": "a PDF document",
     b"\x89HDF": "an HDF5 file",
 }
+JAPANESE = "cp932"
+"""Windows' form of Shift-JIS."""
+JAPANESE_WORD = re.compile(r"[\u3040-\u30fa\u30fc\u4e00-\u9fff]{2,}")
+JAPANESE_SHARE = 0.25
+"""Bytes that begin characters of Shift-JIS, and characters in words of it, over the bytes beyond ASCII, at least."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
 
@@ -23,7 +28,7 @@ LONGEST_LINE = 100_000
 def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """Return the lines of a text file, numbered as an editor shows them, without their ends.
 
-    UTF-8 (with or without byte order mark), UTF-16 and Windows/Latin-1 are told apart by their bytes.
+    UTF-8 (with or without byte order mark), UTF-16, Shift-JIS and Windows/Latin-1 are told apart by their bytes.
 
     Raises
     ------
@@ -80,4 +85,14 @@ def _encodings(content: bytes) -> list[str]:
             return [encoding]
     if b"\0" in content[:2]:
         return ["utf-16-be" if content[0] == 0 else "utf-16-le"]
-    return ["utf-8", "cp1252", "latin-1"]
+    return ["utf-8", *([JAPANESE] if _may_be_japanese(content) else []), "cp1252", "latin-1"]
+
+
+def _may_be_japanese(content: bytes) -> bool:
+    """Tell whether bytes are words of Shift-JIS: bytes that begin its characters are no letters in Western Europe."""
+    non_ascii = content.translate(None, bytes(range(0x80)))
+    beyond_ascii, leading = len(non_ascii), len(non_ascii.translate(None, bytes([0x80, *range(0xA0, 0x100)])))
+    if leading <= JAPANESE_SHARE * beyond_ascii:
+        return False
+    words = JAPANESE_WORD.findall(content.decode(JAPANESE, errors="replace"))
+    return sum(map(len, words)) > JAPANESE_SHARE * beyond_ascii
