@@ -36,7 +36,7 @@ def test_a_given_dimension_goes_before_the_files_and_the_contradiction_is_told(t
     file = instron()
     reading = read_file(file.written(tmp_path), dimensions={"area": "20 mm2", "length": "20.0 mm"})
     np.testing.assert_allclose(reading.experiment.stress, file.stress / 2, atol=1e-5)
-    assert reading.warnings == (
+    assert reading.doubts == (
         "the cross-section is 20 mm2 (as given), but the file says 10 mm2 (width 5 mm in line 3 and thickness 2 mm in "
         "line 4).",
     )
@@ -44,7 +44,8 @@ def test_a_given_dimension_goes_before_the_files_and_the_contradiction_is_told(t
 
 def test_one_part_of_a_cross_section_may_be_given_and_the_other_stated(tmp_path):
     file = instron()
-    data = read_experiment(file.written(tmp_path), dimensions={"thickness": "4 mm"})
+    with pytest.warns(UserWarning, match="thickness 4 mm as given"):
+        data = read_experiment(file.written(tmp_path), dimensions={"thickness": "4 mm"})
     np.testing.assert_allclose(data.stress, file.stress / 2, atol=1e-5)
 
 
@@ -70,7 +71,8 @@ def test_two_lengths_in_one_file_are_asked_about(tmp_path):
     path.write_text("Gauge length (mm),10\nGrip separation,20,mm\nArea,2,mm²\nDisp (mm),Load (N)\n0,0\n1,2\n")
     text = message(path)
     assert "two lengths: 10 mm in line 1 and 20 mm in line 2. Say which: --length" in text
-    data = read_experiment(path, dimensions={"length": "20 mm"})
+    with pytest.warns(UserWarning, match="the file says 10 mm"):
+        data = read_experiment(path, dimensions={"length": "20 mm"})
     assert (data.stretch.tolist(), data.stress.tolist()) == ([1.0, 1.05], [0.0, 1.0])
 
 

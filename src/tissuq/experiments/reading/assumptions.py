@@ -11,6 +11,7 @@ from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
 from tissuq.experiments.reading.measures import MPA_ASSUMED
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
 from tissuq.experiments.reading.positions import ZERO_ASSUMED
+from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 
 __all__ = ["DOUBTFUL_UNIT", "assumptions"]
@@ -34,6 +35,12 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> tupl
         found.append(
             f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which "
             "it is: --strain-unit % or --strain-unit 1."
+        )
+    if UNIT_ASSUMED in source:
+        found.append(
+            f"{DOUBTFUL_UNIT} the file states no unit of the sizes of specimens, so that of displacements was assumed, "
+            f"{source[: source.index(UNIT_ASSUMED)].split()[-1].lstrip('(')}. If it is another, read one specimen at a "
+            'time, and give its sizes: --length "20 mm", --area "10 mm2".'
         )
     if ZERO_ASSUMED in source:
         found += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])

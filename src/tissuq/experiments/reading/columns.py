@@ -14,8 +14,8 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.headings import (
     COMPONENTS,
     CYCLE_NAMES,
-    DIMENSION_NAMES,
     STRESS_NOUNS,
+    dimensions_named,
     heading,
     measure_in,
     of_spread,
@@ -383,8 +383,10 @@ def _told_by_unit(
 
 def _is_of_something_else(quantity: str) -> bool:
     """Tell whether a name is of a dimension of the specimen, a count, a time or a modulus."""
-    return any(quantity in names for names in (*DIMENSION_NAMES.values(), CYCLE_NAMES)) or bool(
-        NEITHER_LOAD_NOR_DEFORMATION.search(quantity)
+    return (
+        quantity in CYCLE_NAMES
+        or bool(dimensions_named(quantity))
+        or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
     )
 
 

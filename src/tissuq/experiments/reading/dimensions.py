@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isclose, pi, prod
 
@@ -13,12 +12,14 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import DIMENSION_NAMES, heading, on_axis
-from tissuq.experiments.reading.layout import WHITESPACE, split
+from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.units import AREA, LENGTH, Quantity, number_and_unit
+from tissuq.experiments.units import AREA, LENGTH, Quantity
 
 __all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
 
+SHOWN = 3
+"""Number of other sizes that a message shows."""
 CONTRADICTION = 0.01
 """Relative difference from which two statements of one dimension contradict each other."""
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
@@ -37,13 +38,17 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """The dimensions of a specimen, those that the user gives, what the file states in two ways, and what differs."""
+    """The dimensions of a specimen.
+
+    Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user.
+    """
 
     file: str
     sizes: Mapping[str, Dimension]
     set_by_user: frozenset[str]
     ambiguous: Mapping[str, str]
-    warnings: tuple[str, ...] = ()
+    others: tuple[StatedSize, ...] = ()
+    contradictions: tuple[str, ...] = ()
 
     @property
     def length(self) -> Dimension:
@@ -57,7 +62,7 @@ class Dimensions:
         return self._size(
             "length",
             "to turn displacements into stretches give the undeformed length: length '20 mm' "
-            '(--length "20 mm"; in Python dimensions={"length": "20 mm"}). The lines above the table state none.',
+            '(--length "20 mm"; in Python dimensions={"length": "20 mm"}).',
         )
 
     @property
@@ -109,7 +114,7 @@ class Dimensions:
         """Return a size that must be known, and be stated once."""
         self._refuse_ambiguous(name)
         if name not in self.sizes:
-            raise InputError(f"{self.file}: {advice}")
+            raise InputError(f"{self.file}: {advice} {self._others(LENGTH, name)}")
         return self.sizes[name]
 
     def _refuse_ambiguous(self, *names: str) -> None:
@@ -122,11 +127,28 @@ class Dimensions:
 
     def _partly_known(self) -> str:
         sides = [name for name in ("width", "thickness") if name in self.sizes]
-        return f"Known is only the {sides[0]}." if sides else "The lines above the table state none."
+        if sides:
+            other = "thickness" if sides[0] == "width" else "width"
+            return f"Known is only the {sides[0]}. {self._others(LENGTH, other, default='')}".rstrip()
+        areas = self._others(AREA, "area", default="")
+        return areas or self._others(LENGTH, "width", "thickness", "diameter")
+
+    def _others(self, kind: Quantity, *names: str, default: str = "None is recognised in the file.") -> str:
+        """Return what other sizes the file states, and the options that say what they are."""
+        sizes = [size for size in self.others if size.kind is kind][:SHOWN]
+        if not sizes:
+            return default
+        said = ", ".join(f"{size.source} '{size.text}'" for size in sizes)
+        which = "that" if len(sizes) == 1 else "one of these"
+        number = f"{sizes[0].value:g}" if len(sizes) == 1 else "NUMBER"
+        options = " or ".join(f'--{name} "{number} {kind.unit}"' for name in names)
+        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}."
 
 
-def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None) -> Dimensions:
+def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None, specimens: Collection[str]) -> Dimensions:
     """Return the dimensions that the user gives, and those of the file where the user gives none.
+
+    The file may state those of several specimens; that in the table is the one which it calls by some names.
 
     Raises
     ------
@@ -139,16 +161,20 @@ def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None) -> Dimens
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
     if len([name for name in ("area", "diameter", "width") if name in texts]) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    stated, ambiguous = {}, {}
+    every_size = stated_sizes(table, specimens)
+    is_cylinder = "diameter" in texts or any(size.is_of("diameter", is_cylinder=False) for size in every_size)
+    stated, ambiguous, others = dict[str, Dimension](), dict[str, str](), every_size
     for name in DIMENSION_NAMES:
-        sizes = list(_stated(table, name))
+        of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
+        others = [size for size in others if size not in of_name]
+        sizes = [Dimension(size.value, size.source) for size in of_name]
         if name not in texts and any(not _agree(size, sizes[0]) for size in sizes):
             ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
         elif sizes:
             stated[name] = sizes[0]
     of_user = {name: Dimension(_quantity(name).value(str(text)), "as given") for name, text in texts.items()}
-    dimensions = Dimensions(table.file, stated | of_user, frozenset(texts), ambiguous)
-    return replace(dimensions, warnings=tuple(_contradictions(dimensions, stated)))
+    dimensions = Dimensions(table.file, stated | of_user, frozenset(texts), ambiguous, tuple(others))
+    return replace(dimensions, contradictions=tuple(_contradictions(dimensions, stated)))
 
 
 def dimensions_of_stresses(
@@ -254,25 +280,6 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
                 f"the {what} is {size.value:g} {unit} ({size.source}), but the file says {in_file.value:g} {unit} "
                 f"({in_file.source})."
             )
-
-
-def _stated(table: Table, name: str) -> Iterator[Dimension]:
-    """Yield what lines above the table like ``Width : 5 mm`` or ``"Probendicke";1,55;"mm"`` state of one dimension."""
-    for line, text in table.head:
-        text = text.lstrip("# ")
-        cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
-        words = [word.strip(' "') for cell in cells for word in re.split(r"[:=\t]|\s{2,}", cell)]
-        words = [word for word in words if word]
-        for position, word in enumerate(words, start=1):
-            label = heading(word)
-            if label.quantity not in DIMENSION_NAMES[name]:
-                continue
-            for texts in (words[position : position + 2], words[position : position + 1]):
-                number, unit = number_and_unit(" ".join(texts))
-                factor = _quantity(name).factor_or_none(unit or label.unit)
-                if number and number > 0 and factor:
-                    yield Dimension(number * factor, f"in line {line}")
-                    break
 
 
 def _quantity(name: str) -> Quantity:

@@ -34,7 +34,12 @@ from tissuq.experiments.reading.regions import (
     slack_error,
     tested_stresses,
 )
-from tissuq.experiments.reading.several_specimens import check_one_specimen, only_rows, specimen_of
+from tissuq.experiments.reading.several_specimens import (
+    SeveralSpecimens,
+    check_one_specimen,
+    only_rows,
+    specimen_of,
+)
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,
@@ -44,6 +49,7 @@ from tissuq.experiments.reading.stated_mode import (
     direction_of,
     mode_of,
 )
+from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tables import read_table
@@ -82,6 +88,8 @@ class Reading:
         Where the loading mode comes from.
     spreads : tuple of Spread
         Standard errors of each stress, where it is the mean of several specimens.
+    doubts : tuple of str
+        What was assumed, and where sizes as given differ from those in the file: `read` warns of it.
     """
 
     experiment: Experiment
@@ -94,6 +102,7 @@ class Reading:
     tested: tuple[TestedStress, ...]
     mode_source: str = ""
     spreads: tuple[Spread, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def used_cycles(self) -> Sequence[Cycle]:
@@ -160,9 +169,10 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         experiment come from a column of them (``sem``), or of standard deviations (``sd``) of so many specimens.
     dimensions : mapping, optional
         Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
-        Without it those in the lines above the table. Only displacements and forces need them. In the mode
-        ``biaxial`` length and width are the sizes along the first and the second axis, and the width of one axis is
-        the length of the other.
+        Without it those that the file states: in the lines above the table, in columns that hold one number, or in a
+        table of specimens above it or in another sheet of the workbook. Only displacements and forces need them. In
+        the mode ``biaxial`` length and width are the sizes along the first and the second axis, and the width of one
+        axis is the length of the other.
     only : mapping, optional
         From the name of a column to what must stand in it, such as ``{"Specimen": "S1"}``: the only rows to read. A
         table of several specimens is refused without it.
@@ -209,7 +219,7 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     Warns
     -----
     UserWarning
-        Of a unit or a zero of displacements that was assumed.
+        Of a unit or a zero of displacements that was assumed, and of dimensions that the file states otherwise.
 
     Raises
     ------
@@ -229,7 +239,7 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     [0.0, 0.0025, 0.0055]
     """
     reading = read_file(path, **options)
-    for text in assumptions(reading.used, reading.choices):
+    for text in reading.doubts:
         warnings.warn(text, stacklevel=2)
     return reading.experiment
 
@@ -268,18 +278,18 @@ def read_rows(
     choices = tuple(labelled_choices.values())
     if mode_source == DEFAULT_SOURCE and (choices[0].measure, choices[0].load) == ("strain", "stress"):
         check_not_sheared(table)
-    dimensions = dimensions_of(table, options.get("dimensions"))
     absent = set[int]()
     try:
-        measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
+        measured, loads, spreads, dimensions = _measured(table, mode, labelled_choices, options)
+    except SeveralSpecimens:
+        raise
     except InputError:
         columns = list(dict.fromkeys(column for choice in choices for column in (choice.deformation, choice.stress)))
         readable = table.without_faulty(columns, options.get("leave_out")).without_missing(columns)
         if readable is table:
             raise
         absent, table = set(table.lines) - set(readable.lines), readable
-        measured, loads, spreads = _measured(table, mode, labelled_choices, dimensions, options)
-    check_one_specimen(table, choices, measured.course)
+        measured, loads, spreads, dimensions = _measured(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
     recorded = with_compression_negative(measured, choices, is_positive, direction_of(*names))
     cycles = find_cycles(table, recorded.course)
@@ -324,20 +334,28 @@ def read_rows(
         least_errors=errors | least_errors(tested),
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
     problems = (spread.problem for spread in spreads if spread.problem)
-    notes = *table.notes, *dimensions.warnings, *problems
-    return Reading(experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads)
+    doubts = *assumptions(used, choices), *dimensions.contradictions
+    notes = *table.notes, *problems
+    return Reading(
+        experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads, doubts
+    )
 
 
 def _measured(
     table: Table,
     mode: LoadingMode,
     choices: Mapping[str, ColumnChoice],
-    dimensions: Dimensions,
     options: ReadingOptions,
-) -> tuple[MeasuredRows, list[Load], tuple[Spread, ...]]:
-    """Return every row as stretch and stress of the kind that the file gives, each stress, and its standard errors."""
+) -> tuple[MeasuredRows, list[Load], tuple[Spread, ...], Dimensions]:
+    """Return every row as stretch and stress of the kind that the file gives.
+
+    With each stress, its standard errors, and the dimensions of the specimen, of which there must be one.
+    """
     labels, columns = tuple(choices), list(choices.values())
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
+    check_one_specimen(table, columns, np.mean([deformation for deformation, _ in numbers], axis=0))
+    specimens = names_of_specimen(table, columns, options.get("only"))
+    dimensions = dimensions_of(table, options.get("dimensions"), specimens)
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
     compliance = options.get("compliance"), options.get("force_unit")
@@ -365,7 +383,7 @@ def _measured(
     measured = measured.with_step(*stretch_steps).with_step(*(load.source for load in loads))
     if any(spread.source for spread in spreads):
         measured = measured.with_step(*(spread.source for spread in spreads))
-    return measured, loads, tuple(spreads)
+    return measured, loads, tuple(spreads), dimensions
 
 
 def _of_stresses(columns: Column) -> Column:

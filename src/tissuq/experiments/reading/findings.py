@@ -8,7 +8,6 @@ from itertools import chain
 import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
-from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.headings import ROLES, heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
@@ -36,10 +35,9 @@ def data_warnings(reading: Reading) -> tuple[str, ...]:
     """Return what a person should look at before a fit, of each stress: what was assumed comes first."""
     labels = reading.used.labels
     texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
-    assumed = assumptions(reading.used, reading.choices)
     kinds = dict.fromkeys(region.kind for regions in reading.regions for region in regions)
     happened = (labelled(labels, [_of_kind(regions, kind) for regions in reading.regions]) for kind in kinds)
-    return (*assumed, *reading.warnings, *filter(None, chain.from_iterable((*happened, *texts))))
+    return (*reading.doubts, *reading.warnings, *filter(None, chain.from_iterable((*happened, *texts))))
 
 
 def _of_kind(regions: Sequence[Region], kind: str) -> str:

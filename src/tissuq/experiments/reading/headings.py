@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from unicodedata import combining, normalize
 
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES, StrainMeasure
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
@@ -19,6 +20,7 @@ __all__ = [
     "SPREADS",
     "STRESS_NOUNS",
     "Heading",
+    "dimensions_named",
     "heading",
     "is_of_count",
     "is_of_mean",
@@ -131,17 +133,48 @@ SPECIMEN_NAME = re.compile(
 
 DIMENSION_NAMES = {
     "area": _names(
-        "area, specimen area, initial area, cross section, cross sectional area, querschnitt, querschnittsfläche, "
-        "probenquerschnitt, s0"
+        "area, cross section, cross sectional area, cross section area, s0, a0, querschnitt, querschnittsfläche, "
+        "probenquerschnitt, anfangsquerschnitt, section, section transversale, section droite, aire, "
+        "aire de la section, sección, sección transversal, área, área de la sección, "
+        "área de la sección transversal, seção, secção, seção transversal, secção transversal, área da seção, "
+        "área da secção, área da seção transversal, área da secção transversal, sezione, sezione trasversale, "
+        "area della sezione, area della sezione trasversale, doorsnede, dwarsdoorsnede, "
+        "oppervlakte van de doorsnede, 横截面积, 截面积, 橫截面積, 截面積, 面积, 面積, 断面積, 原断面積"
     ),
-    "width": _names("width, specimen width, sample width, breite, probenbreite, b0"),
-    "thickness": _names("thickness, specimen thickness, sample thickness, dicke, probendicke, a0"),
-    "diameter": _names("diameter, specimen diameter, sample diameter, durchmesser, probendurchmesser, d0"),
+    "width": _names(
+        "width, b0, breite, probenbreite, largeur, anchura, ancho, largura, larghezza, breedte, 宽度, 寬度, 幅, 板幅"
+    ),
+    "thickness": _names(
+        "thickness, a0, dicke, probendicke, épaisseur, espesor, grosor, espessura, spessore, dikte, 厚度, 厚さ, 板厚"
+    ),
+    "diameter": _names(
+        "diameter, d0, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑"
+    ),
     "length": _names(
-        "length, specimen length, sample length, initial length, gauge length, gage length, l0, grip separation, "
-        "grip to grip separation, messlänge, anfangsmesslänge, einspannlänge"
+        "length, gauge length, gage length, l0, grip separation, grip to grip separation, distance between grips, "
+        "messlänge, anfangsmesslänge, anfangslänge, einspannlänge, probenlänge, longueur, longueur de référence, "
+        "longueur entre repères, longueur entre mors, distance entre mors, longitud, longitud de referencia, "
+        "longitud entre puntos, longitud entre mordazas, distancia entre mordazas, comprimento, "
+        "comprimento de referência, comprimento de medida, distância entre garras, lunghezza, "
+        "lunghezza di riferimento, lunghezza tra i riferimenti, distanza tra gli afferraggi, lengte, "
+        "meetlengte, beginlengte, inklemlengte, 标距, 标距长度, 標距, 长度, 長度, 夹具间距, "
+        "標点距離, 標点間距離, 原標点距離, 長さ, つかみ具間距離, チャック間距離, ゲージ長"
     ),
 }
+"""What the sizes of specimens are called, in the words of testing standards, without those in `OF_SPECIMEN`."""
+HEIGHT_NAMES = _names("height, h0, höhe, probenhöhe, hauteur, altura, altezza, hoogte, 高度, 高さ")
+"""What the length of a cylinder or a disc is called; of other specimens it may be the thickness."""
+OF_SPECIMEN = re.compile(
+    r"\b((de|del|della|di|du|da|do|van) )*(la |het |l'|d')?(specimen|sample|test piece|disc|disk|eprouvette|"
+    r"echantillon|probeta|muestra|provino|campione|corpo de prova|amostra|proefstuk|monster)('s)?\b|"
+    r"\b(initiale?|initieel|inicial|iniziale|original|undeformed|(mean|average)(?! diameter))\b|"
+    r"原始|初始|初期|试样|試樣|試験片|样品|の"
+)
+"""Words beside the name of a size that leave it what it is, without accents; a mean diameter is that of a tube."""
+SYMBOL_AFTER = re.compile(r" [abdhls]_?[0o]$")
+"""That of a size in standards, after its name."""
+MEASURED_ALONG = re.compile(r"(?<=messlange) (?P<way>.+)")
+"""What is measured along a gauge length, as in ``Messlänge Standardweg``."""
 
 
 ROLES_AND_SIZES = frozenset(["size"]).union(*ROLES.values())
@@ -205,6 +238,35 @@ def heading(name: str) -> Heading:
 def plain(name: str) -> str:
     """Return a name in lower case with blanks for hyphens and underscores."""
     return re.sub(r"[\s_–-]+", " ", name).strip().lower()
+
+
+def dimensions_named(quantity: str, *, is_cylinder: bool = False) -> frozenset[str]:
+    """Return the dimensions of a specimen that a name may mean, as its unit says; none for other names.
+
+    A height is the length of a cylinder.
+
+    Examples
+    --------
+    >>> dimensions_named("initial specimen width"), dimensions_named("messlänge standardweg")
+    (frozenset({'width'}), frozenset({'length'}))
+    >>> dimensions_named("height"), dimensions_named("height", is_cylinder=True)
+    (frozenset(), frozenset({'length'}))
+    """
+    name = SYMBOL_AFTER.sub("", plain(OF_SPECIMEN.sub(" ", _without_accents(quantity))))
+    if (along := MEASURED_ALONG.search(name)) and along["way"] in ROLES["displacement"] | ROLES["strain"]:
+        name = name[: along.start()]
+    found = frozenset(dimension for dimension, names in _names_of_dimensions().items() if name in names)
+    return found | {"length"} if is_cylinder and name in map(_without_accents, HEIGHT_NAMES) else found
+
+
+@cache
+def _names_of_dimensions() -> dict[str, frozenset[str]]:
+    return {dimension: frozenset(map(_without_accents, names)) for dimension, names in DIMENSION_NAMES.items()}
+
+
+def _without_accents(text: str) -> str:
+    """Return a text without accents, and with plain digits for lowered ones."""
+    return "".join(filter(lambda letter: not combining(letter), normalize("NFKD", text)))
 
 
 def role_names(role: str) -> frozenset[str]:

@@ -10,7 +10,14 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading, is_of_specimens, plain
+from tissuq.experiments.reading.headings import (
+    CYCLE_NAMES,
+    SET_NAMES,
+    dimensions_named,
+    heading,
+    is_of_specimens,
+    plain,
+)
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import NUMBER
 
@@ -90,14 +97,15 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
     """Refuse a table of several specimens, which would be fitted as one.
 
     They are in a column that is named so, or in one whose words part the rows into tests that each begin anew, or its
-    numbers where no test was unloaded.
+    numbers where no test was unloaded: last of all in those of sizes, which specimens may share.
 
     Raises
     ------
     SeveralSpecimens
         When there are several, with what reads one of them, or all.
     """
-    for column, labels in _parting_columns(table, choices, course):
+    parting = _parting_columns(table, choices, course)
+    for column, labels in sorted(parting, key=lambda pair: len(dimensions_named(_quantity(table, pair[0])))):
         quantity = _quantity(table, column)
         is_numbered = not NOT_OF_TESTS.search(quantity) and _jump(labels, course)
         if not (is_of_specimens(quantity) or _are_words(labels) or is_numbered):

@@ -24,7 +24,7 @@ from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import measured_in
 
-__all__ = ["ColumnsOfTest", "columns_side_by_side"]
+__all__ = ["ColumnsOfTest", "columns_side_by_side", "names_above"]
 
 PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
 """Words and capacities that tell one load cell from another, and not tests."""
@@ -70,14 +70,14 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
     is_named = len(set(labels)) == len(labels) and all(labels)
     if is_named and (by_label := {roles[column].test: column for column in measures}).keys() == set(labels):
         pairs = [(by_label[label], column) for label, column in zip(labels, loads, strict=True)]
-    elif len(measures) == 1 and (is_named or (not any(labels) and _names_above(table, loads))):
+    elif len(measures) == 1 and (is_named or (not any(labels) and names_above(table, loads))):
         pairs = [(measures[0], column) for column in loads]
     elif len(measures) == len(loads) and not any(labels):
         pairs = list(zip(measures, loads, strict=True))
     else:
         return []
     numbers = [str(number) for number in range(1, len(pairs) + 1)]
-    names = labels if is_named else _names_above(table, loads) or numbers
+    names = labels if is_named else names_above(table, loads) or numbers
     return [
         ColumnsOfTest(name, {measure: deformation + 1, load: stress + 1})
         for name, (deformation, stress) in zip(names, pairs, strict=True)
@@ -136,7 +136,7 @@ def _is_test(text: str) -> bool:
     )
 
 
-def _names_above(table: Table, columns: Sequence[int]) -> list[str]:
+def names_above(table: Table, columns: Sequence[int]) -> list[str]:
     """Return what the last line above the names of columns says over each of some; nothing where it says no names.
 
     What stands over the first of neighbouring columns goes for them all.

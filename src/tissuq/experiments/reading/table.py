@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,8 @@ class Table:
         Which of the tables of a text or sheet it is, from 1; 0 for the only one.
     title : str
         What stands alone in the line above the names, such as the name of a step.
+    other_lines : mapping
+        Those of short other tables in its text or sheet, under an empty name, and of other short sheets by their names.
     counted : str
         What ``lines`` counts: lines, or the rows of a table in memory.
     """
@@ -84,6 +86,7 @@ class Table:
     number: int = 0
     title: str = ""
     counted: str = "line"
+    other_lines: Mapping[str, Lines] = field(default_factory=dict)
 
     @property
     def span(self) -> str:

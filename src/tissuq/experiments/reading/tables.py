@@ -44,6 +44,8 @@ LONG_FILE = 10_000
 """Lines from which a file is first tried on a fast parser."""
 HEAD_LINES = 1000
 """Lines of a long file that show its layout."""
+SHORT = 500
+"""Lines up to which a sheet or another table may hold the sizes of specimens."""
 ALL_TESTS = "tissuq.read_tests and tissuq fit read all of them."
 MOST_COLUMNS = 1000
 """Columns of a table that is read in seconds."""
@@ -122,12 +124,20 @@ def read_tables(
 def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | int | None) -> tuple[Table, ...]:
     """Return the tables in a file, which a time of change and a size (bytes) stand for."""
     if (workbook := file_format(path)) is not None:
-        sheets = sheets_with_tables(path, workbook.sheets(path), sheet)
+        every_sheet = workbook.sheets(path)
+        short = {name: list(enumerate(lines, 1)) for name, lines in every_sheet.items() if len(lines) <= SHORT}
+        sheets = sheets_with_tables(path, every_sheet, sheet)
         parts = [
             _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, SEPARATOR_OF_CELLS, name)
             for name, lines in sheets.items()
         ]
-        return tuple(table for tables in parts for table in tables)
+        return tuple(
+            replace(
+                table, other_lines={**table.other_lines, **{name: short[name] for name in short if name != table.sheet}}
+            )
+            for tables in parts
+            for table in tables
+        )
     if sheet is not None:
         raise InputError(f"{path} is not an Excel workbook and has no sheets; leave sheet (--sheet) out.")
     lines = read_lines(path)
@@ -218,9 +228,17 @@ def _read_every_line(
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
         return tables
+    short = [table for table in tables if len(table.rows) <= SHORT]
     return [
-        replace(table, file=f"{file}, table {number}", number=number) for number, table in enumerate(tables, start=1)
+        replace(table, file=f"{file}, table {number}", number=number, other_lines={"": _lines_of(short, table)})
+        for number, table in enumerate(tables, start=1)
     ]
+
+
+def _lines_of(tables: Sequence[Table], but: Table) -> Lines:
+    """Return the lines above and in tables, but for one of them."""
+    others = [table for table in tables if table is not but]
+    return [line for table in others for line in (*table.head, *zip(table.lines, table.rows, strict=True))]
 
 
 def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:

@@ -15,13 +15,12 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.columns import choose_columns
+from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows
+from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
@@ -67,7 +66,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     Warns
     -----
     UserWarning
-        Of units or a zero of displacements that were assumed.
+        Of units or a zero of displacements that were assumed, and of dimensions that the file states otherwise.
 
     Raises
     ------
@@ -81,10 +80,14 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     ['rubber-treloar-uniaxial']
     """
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
-    readings = [test.reading for test in find_tests_in_file(path, **plain)]
-    for text in dict.fromkeys(text for reading in readings for text in assumptions(reading.used, reading.choices)):
-        warnings.warn(text, stacklevel=2)
-    return [reading.experiment for reading in readings]
+    tests = find_tests_in_file(path, **plain)
+    noted: dict[str, list[str]] = {}
+    for test in tests:
+        for text in test.reading.doubts:
+            noted.setdefault(text, []).append(test.name)
+    for text, names in noted.items():
+        warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=2)
+    return [test.reading.experiment for test in tests]
 
 
 def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
@@ -217,7 +220,7 @@ def _of_one_table(
     try:
         reading = read_rows(table, path, words, **of_test)
     except SeveralSpecimens as several:
-        only, labels = options.get("only") or {}, np.array(several.labels)
+        only, labels = options.get("only") or {}, np.array(row_names(table, find_column(table, "only", several.column)))
         for label in dict.fromkeys(several.labels):
             rows = table.taken(np.flatnonzero(labels == label))
             selection: ReadingOptions = {**options, "only": {**only, several.column: label}}
