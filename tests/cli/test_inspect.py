@@ -269,3 +269,26 @@ def test_one_axis_of_a_biaxial_machine_needs_no_mode(cli, here):
     assert (said.status, said.err) == (0, "")
     assert "'stretch y' is stretch" in said.out
     assert "'stress y" in said.out
+
+
+def test_a_tube_is_read_by_the_flags_that_the_first_message_gives(cli, here):
+    inner, outer, radius = 1.25, 1.5, np.linspace(1.5, 1.9, 30)
+    x = (radius**2 - outer**2) / inner**2, (radius**2 - outer**2) / outer**2
+    inside, outside = (np.log(1 + each) - 1 / (1 + each) for each in x)  # p of C10 = 20 kPa, by parts
+    rows = [f"{p / 133.322387415e-6:.8g},{2e3 * r:.8g}" for p, r in zip(0.02 * (inside - outside), radius, strict=True)]
+    (here / "artery.csv").write_text("\n".join(["Pressure (mmHg),Outer diameter (um)", *rows]))
+    asked = cli("inspect", "artery.csv")
+    assert asked.status == 2
+    assert '--mode planar --diameter "3 mm" --thickness "0.5 mm"' in asked.err
+    sizes = ["--mode", "planar", "--diameter", "3 mm", "--thickness", "0.25 mm"]
+    said = cli("inspect", "artery.csv", *sizes)
+    assert (said.status, said.err) == (0, "")
+    assert "'Pressure (mmHg)' is pressure, 'Outer diameter (um)' is outer diameter" in said.out
+    assert "hoop stretch in the middle of the wall = sqrt(1 + (d^2/4 - B^2)/(A B))" in said.out
+    assert "taken as held at its undeformed length" in said.out
+    named = ["--column", "pressure=1", "--column", "outer_diameter=2"]
+    fit = cli("fit", "artery.csv", *sizes, *named, "--discrepancy", "none", "--no-figures")
+    assert fit.status == 0, fit.err
+    data = np.loadtxt(here / "runs" / "artery" / "data.csv", delimiter=",", skiprows=1)
+    stretch = np.sqrt(1 + (radius**2 - outer**2) / (inner * outer))
+    np.testing.assert_allclose(data, np.column_stack([stretch, 40 * (stretch - stretch**-3)]), atol=1e-3)

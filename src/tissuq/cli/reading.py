@@ -36,8 +36,8 @@ OPTIONS: dict[str, Any] = {
         list[str] | None,
         typer.Option(
             help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, "
-            "such as stretch=Strain; of the spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: "
-            "stretch2 ... sem2."
+            "or pressure and outer_diameter (or inner_diameter) of a tube, such as stretch=Strain; "
+            "of the spread of a mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2."
         ),
     ],
     "stress_unit": Annotated[
@@ -58,7 +58,9 @@ OPTIONS: dict[str, Any] = {
     "strain_unit": Annotated[
         str | None, typer.Option(help="Unit of a strain column: 1 or percent; of an angle of shear: rad or deg.")
     ],
-    "force_unit": Annotated[str | None, typer.Option(help="Unit of a force column that states none, such as mN.")],
+    "force_unit": Annotated[
+        str | None, typer.Option(help="Unit of a force, torque or pressure column that states none, such as mN.")
+    ],
     "displacement_unit": Annotated[str | None, typer.Option(help="Unit of a displacement column that states none.")],
     "zero": Annotated[
         str | None,
@@ -77,8 +79,12 @@ OPTIONS: dict[str, Any] = {
     "width": Annotated[
         str | None, typer.Option(help="With --thickness, instead of --area; in mode biaxial the size along y.")
     ],
-    "thickness": Annotated[str | None, typer.Option(help="With --width, instead of --area.")],
-    "diameter": Annotated[str | None, typer.Option(help="Of a round specimen, instead of --area.")],
+    "thickness": Annotated[
+        str | None, typer.Option(help="With --width, instead of --area; with --diameter of a tube its undeformed wall.")
+    ],
+    "diameter": Annotated[
+        str | None, typer.Option(help="Of a round specimen, instead of --area; of a tube the undeformed outer one.")
+    ],
     "only": Annotated[
         list[str] | None,
         typer.Option(help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat."),

@@ -23,6 +23,7 @@ __all__ = [
     "LENGTH",
     "MASSES",
     "NUMBER",
+    "PRESSURE",
     "RATE",
     "TIME",
     "TORQUE",
@@ -81,8 +82,8 @@ UNIT_EXPRESSION = re.compile(
 
 SYMBOLS = (
     {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
-    | {"bar", "mbar", "atm"}
-    | {"mmHg", "torr", "N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
+    | {"bar", "mbar", "atm", "mmHg", "mmhg", "Hg", "torr", "Torr", "cmH2O", "mmH2O"}
+    | {"N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
     | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
     | {"Nm", "mNm", "uNm", "nNm", "kNm", "Ncm", "mNcm", "Nmm", "mNmm"}
     | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
@@ -279,6 +280,11 @@ RATE = Quantity(
     "1/s",
     {form.format(unit): 1 / factor for unit, factor in TIME.factors.items() for form in ("1/{}", "{}-1", "/{}")},
 )
+PRESSURES = {"mmHg": 133.322387415e-6, "mmhg": 133.322387415e-6, "cmH2O": 98.0665e-6, "mmH2O": 9.80665e-6}
+PRESSURES |= dict.fromkeys(["torr", "Torr"], 0.101325 / 760) | {"mbar": 1e-4, "bar": 0.1, "atm": 0.101325}
+"""Conventional columns of mercury (13.5951 g/cm3) and water (1 g/cm3) under standard gravity, and multiples of the
+bar."""
+PRESSURE = Quantity("pressure", "MPa", PRESSURES | COMMON_STRESS_UNITS | {"kpa": 1e-3, "KPa": 1e-3})
 TORQUE = Quantity(
     "torque",
     "N mm",
@@ -293,17 +299,19 @@ TORQUE = Quantity(
 
 
 def measured_in(unit: str) -> str:
-    """Return what a usual unit is one of: stress, force, length, angle, torque, strain or time; nothing for others.
+    """Return what a usual unit is one of: stress, pressure, force, length, angle, torque, strain or time, or nothing.
+
+    Units that pressures and stresses share are those of a stress.
 
     Examples
     --------
-    >>> [measured_in(unit) for unit in ("kPa", "N", "mm", "%", "s", "V", "")]
-    ['stress', 'force', 'length', 'strain', 'time', '', '']
+    >>> [measured_in(unit) for unit in ("kPa", "mmHg", "N", "mm", "%", "s", "V", "")]
+    ['stress', 'pressure', 'force', 'length', 'strain', 'time', '', '']
     """
     compact = re.sub(r"\s+|\^|\*\*", "", unit).replace("²", "2")
     if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
         return "stress"
-    for quantity in (FORCE, LENGTH, ANGLE, TORQUE):
+    for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
     return (
@@ -343,7 +351,11 @@ def looks_like_unit(text: str) -> bool:
     text = text.strip()
     if re.fullmatch(r"[\[({<].*[\])}>]|[%‰°1-]|", text):
         return True
-    symbols = [symbol for symbol in re.split(r"[\s\d·*/.^%°⁻²³-]+", text.replace("µ", "u").replace("μ", "u")) if symbol]
+    symbols = [
+        symbol
+        for symbol in re.split(r"(?:[\s·*/.^%°⁻²³-]|(?<!H)\d)+", text.replace("µ", "u").replace("μ", "u"))
+        if symbol
+    ]
     return bool(symbols) and all(symbol in SYMBOLS for symbol in symbols)
 
 

@@ -28,6 +28,7 @@ from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE, with_columns_of_tube
 from tissuq.experiments.units import measured_in
 
 __all__ = [
@@ -42,8 +43,8 @@ __all__ = [
 
 LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
-DEFORMATIONS = (*LENGTHENINGS, *SHEARS)
-LOADS = ("stress", "torque", "force")
+DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
+LOADS = ("stress", "torque", "force", PRESSURE)
 SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
 DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
@@ -65,9 +66,9 @@ OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
 )
 """Names of what is measured in oscillations."""
-PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
+IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$|" + PRESSURE.pattern
+    r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$|" + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
 
@@ -81,9 +82,10 @@ class ColumnChoice:
     deformation, stress : int
         The columns.
     measure : str
-        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear, its rate, or twist.
+        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear, its rate, twist, or
+        outer or inner diameter.
     load : str
-        What the other column holds: stress, torque or force.
+        What the other column holds: stress, torque, force or pressure.
     strain_type, stress_type : str
         Which measure of strain, or of shear, and of stress.
     """
@@ -147,8 +149,8 @@ def choose_columns(
         The table to choose from.
     mode : LoadingMode
     mapping : mapping or None
-        From a role (stretch, strain, displacement, length, shear or twist; stress, torque or force) to the name of a
-        column, or its number from 1.
+        From a role (stretch, strain, displacement, length, shear, twist or a diameter; stress, torque, force or
+        pressure) to the name of a column, or its number from 1.
     strain_type, stress_type : str or None
         Which measures they are, by the names in `STRAIN_MEASURES` and `STRESS_MEASURES`; what the columns' names say
         where none is given, and engineering where these say nothing.
@@ -160,7 +162,7 @@ def choose_columns(
     InputError
         When a role or column does not exist, several columns fit, or none does.
     """
-    count, is_shear = len(mode.stresses), mode.controls == (SHEAR,)
+    count = len(mode.stresses)
     if count > 1 and axis is not None:
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
     mappings = mapping_of_each_stress(mode, mapping)
@@ -174,7 +176,7 @@ def choose_columns(
         if number and len(mode.controls) == 1:
             roles = roles | {choices[0].measure: choices[0].deformation + 1}
         with about_stress(number, labels, mode):
-            choices.append(_choice(table, roles, (strain_type, stress_type), axis_of_stress, is_shear))
+            choices.append(_choice(table, mode, roles, (strain_type, stress_type), axis_of_stress))
     if count > 1:
         _check_together(table, mode, choices)
     return dict(zip(labels, choices, strict=True))
@@ -252,19 +254,21 @@ def _has_roles(mode: LoadingMode, mapping: Mapping[str, str | int]) -> bool:
 
 def _choice(
     table: Table,
+    mode: LoadingMode,
     mapping: Mapping[str, str | int],
     types: tuple[str | None, str | None],
     axis: str | None,
-    is_shear: bool,
 ) -> ColumnChoice:
     """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
+    is_shear = mode.controls == (SHEAR,)
     _check_roles(table, mapping, is_shear)
     contents = _Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
+    mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
         stress = find_column(table, load, mapping[load])
     else:
-        loads = LOADS if is_shear else tuple(role for role in LOADS if role != "torque")
+        loads = ("stress", "torque", "force") if is_shear else ("stress", "force")
         load = next((role for role in loads if contents.fitting(role)), "")
         by_unit = None if load else _told_by_unit(table, contents, loads)
         load, stress = by_unit or (load, _recognise(table, contents, [load or "force"], loads))
@@ -431,11 +435,8 @@ def _stress_hint(table: Table, contents: _Contents) -> str:
         in_heading, beneath = table.stated_units(column)
         if quantity in role_names("torque"):
             return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
-        if PRESSURE.search(quantity):
-            return (
-                f" Column {table.label(column)} is a pressure. For a tube, convert it to stresses with "
-                "ThinTube.engineering_stresses in Python, and give these with --mode thin-tube."
-            )
+        if IS_PRESSURE.search(quantity):
+            return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
         is_symbol = quantity in COMPONENTS["stress"]
         if measured_in(beneath or in_heading) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
             return f" Column {table.label(column)} may be a stress of several types. {_say_which('stress')}"
@@ -500,13 +501,13 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
             f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
             "(--column stretch=NAME), or rename the column."
         )
-    if choice.load == "torque":
+    if choice.load in ("torque", PRESSURE):
         if stress_type:
             raise InputError(
-                f"{table.place(choice.stress)} is read as a torque, which is no {stress_type} stress. Leave "
+                f"{table.place(choice.stress)} is read as a {choice.load}, which is no {stress_type} stress. Leave "
                 "stress_type (--stress-type) out, or give the column as stress (--column stress=NAME)."
             )
-        stress_type = "torsion"
+        stress_type = "torsion" if choice.load == "torque" else ""
     if strain_type and not is_strain and choice.measure != "shear":
         raise InputError(
             f"{table.place(choice.deformation)} is a {strain_type} strain, as its name or strain_type (--strain-type) "

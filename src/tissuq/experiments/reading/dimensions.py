@@ -82,6 +82,30 @@ class Dimensions:
         return Dimension(diameter.value / 2, f"half the diameter {diameter.source}")
 
     @property
+    def wall_of_tube(self) -> tuple[Dimension, Dimension]:
+        """The undeformed outer diameter of a tube, and the thickness of its wall.
+
+        Raises
+        ------
+        InputError
+            When one of them is not known, or the wall is thicker than half the diameter, or other sizes are given.
+        """
+        advice = (
+            "to turn pressure and diameter of a tube into stress and stretch give its undeformed outer diameter and "
+            'the thickness of its wall: --diameter "3 mm" --thickness "0.5 mm" (in Python '
+            'dimensions={"diameter": "3 mm", "thickness": "0.5 mm"}).'
+        )
+        diameter, thickness = self._size("diameter", advice), self._size("thickness", advice)
+        if others := sorted(self.set_by_user - {"diameter", "thickness"}):
+            raise InputError(f"{self.file} is read as pressure and diameter of a tube, which need no {others[0]}.")
+        if thickness.value >= diameter.value / 2:
+            raise InputError(
+                f"{self.file}: a wall of {thickness.value:g} mm (thickness {thickness.source}) does not fit into an "
+                f"outer diameter of {diameter.value:g} mm ({diameter.source})."
+            )
+        return diameter, thickness
+
+    @property
     def area(self) -> Dimension:
         """The undeformed cross-section.
 

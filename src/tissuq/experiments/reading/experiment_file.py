@@ -130,6 +130,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         ``units`` of xarray.
     stretch, strain, displacement, shear, twist, rate, sliding, stress, torque, force : str or int, optional
         Entries of ``columns``: the name of a column, or its number from 1; those of a second axis end in 2.
+    pressure, outer_diameter, inner_diameter : str or int, optional
+        Likewise, of a tube.
     length, area, width, thickness, diameter : str, optional
         Entries of ``dimensions``, such as ``"10 mm"``, or quantities of pint.
     unit : str, optional
@@ -139,11 +141,11 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         say: both axes of a biaxial machine, or an amount of shear; else uniaxial.
     columns : mapping, optional
         From ``stretch``, ``strain``, ``displacement``, ``length`` (the current one, or the height), ``shear`` (the
-        amount of shear), ``sliding`` (the displacement of one sheared plane, over the height ``length``) or ``twist``
-        (of a disc), and ``stress``, ``force`` or ``torque``, to the name of a column or its
-        number from 1. Columns with usual names (with a unit or not) need none. The second axis or stress of a loading
-        mode that has two is ``stretch2`` ... ``force2``; columns with x and y in their names need none in the mode
-        ``biaxial``.
+        amount of shear), ``sliding`` (the displacement of one sheared plane, over the height ``length``), ``twist``
+        (of a disc), or ``outer_diameter`` or ``inner_diameter`` (of a tube), and ``stress``, ``force``, ``torque`` or
+        ``pressure`` (in a tube), to the name of a column or its number from 1. Columns with usual names (with a unit or
+        not) need none. The second axis or stress of a loading mode that has two is ``stretch2`` ... ``force2``; columns
+        with x and y in their names need none in the mode ``biaxial``.
     stress_unit : str, optional
         Unit of the stresses; without it the file's own, and MPa when the file states none. For a file of forces,
         the unit in which people want to read the stresses, kPa unless given.
@@ -170,9 +172,9 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     dimensions : mapping, optional
         Of the undeformed specimen, with units: ``length``; ``area``, or ``width`` and ``thickness``, or ``diameter``.
         Without it those that the file states: in the lines above the table, in columns that hold one number, or in a
-        table of specimens above it or in another sheet of the workbook. Only displacements and forces need them. In
-        the mode ``biaxial`` length and width are the sizes along the first and the second axis, and the width of one
-        axis is the length of the other.
+        table of specimens above it or in another sheet of the workbook. Only displacements and forces need
+        them, and a tube its outer ``diameter`` and the ``thickness`` of its wall. In the mode ``biaxial`` length and
+        width are the sizes along the first and the second axis, and the width of one axis is the length of the other.
     only : mapping, optional
         From the name of a column to what must stand in it, such as ``{"Specimen": "S1"}``: the only rows to read. A
         table of several specimens is refused without it.
@@ -302,14 +304,14 @@ def read_rows(
         used = used.loaded(slacks, reference)
         errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
     elif preload is not None:
-        thresholds = [preload_stress(preload, load.area) for load in loads]
+        thresholds = [_threshold(preload, load) for load in loads]
         used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference)
     if (stretch_range := options.get("stretch_range")) is not None:
         used = used.within(*stretch_range)
     if options.get("until_peak"):
         used = used.until_peak()
     check_stretches(used, choices)
-    stress_measure = _stress_measure(table, choices)
+    stress_measure = loads[0].measure or _stress_measure(table, choices)
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
         recorded, used = (
@@ -335,7 +337,8 @@ def read_rows(
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
     problems = (spread.problem for spread in spreads if spread.problem)
     doubts = *assumptions(used, choices), *dimensions.contradictions
-    notes = *table.notes, *problems
+    about_loads = filter(None, (load.note for load in loads))
+    notes = *table.notes, *problems, *about_loads
     return Reading(
         experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads, doubts
     )
@@ -386,6 +389,16 @@ def _measured(
     return measured, loads, tuple(spreads), dimensions
 
 
+def _threshold(preload: str, load: Load) -> float:
+    """Return a preload as a stress in MPa."""
+    if load.measure is not None:
+        raise InputError(
+            f"preload '{preload}' (--preload) does not go with the pressure in a tube. Give the outer diameter that it "
+            "has without pressure as --diameter, and leave rows out with --stretch or --leave-out."
+        )
+    return preload_stress(preload, load.area)
+
+
 def _of_stresses(columns: Column) -> Column:
     """Return columns (k, n) of the stresses as an experiment takes them."""
     return np.ascontiguousarray(columns.T) if len(columns) > 1 else columns[0]
@@ -400,7 +413,10 @@ def _converted(mode: LoadingMode, measure: StressMeasure, measured: MeasuredRows
     """Return rows whose stresses of a measure, and their standard errors, are engineering ones."""
     if measure.engineering is None:
         return measured
-    stress, error = measure.engineering(mode, points, measured.stress), measured.standard_error
+    try:
+        stress, error = measure.engineering(mode, points, measured.stress), measured.standard_error
+    except InputError as refusal:
+        raise InputError(f"{measured.table.file}: {refusal}") from refusal
     if error.any():
         error = np.abs(measure.engineering(mode, points, error))
     return replace(measured, stress=stress, standard_error=error)

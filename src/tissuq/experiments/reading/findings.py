@@ -23,6 +23,8 @@ MIN_ROWS_PER_CYCLE = 10
 """Number of rows that a cycle has on average where cycles are meant, and not a table in any order."""
 NOTABLE_SHARE = 0.05
 """Share of the largest stress, or of the range of stretches, that is worth a word."""
+NEGLIGIBLE_STRESS = 0.01
+"""Share of the largest stress that is none."""
 PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
@@ -108,6 +110,20 @@ def _reference(reading: Reading, number: int) -> str:
     )
 
 
+def _diameter(reading: Reading, number: int) -> str:
+    """Return a sentence about a tube that without pressure is not as wide as it is said to be."""
+    if reading.choices[number].load != "pressure":
+        return ""
+    stretch, stress = reading.used.stretch[number], np.abs(reading.used.stress[number])
+    row = int(np.argmin(stress))
+    if stress[row] > NEGLIGIBLE_STRESS * stress.max() or abs(stretch[row] - 1) <= NOTABLE_SHARE * np.ptp(stretch):
+        return ""
+    return (
+        f"in {reading.used.table.counted} {reading.used.table.lines[row]} the tube has hardly any pressure, and the "
+        f"hoop stretch {stretch[row]:.4g} instead of 1: check that its undeformed outer diameter is --diameter."
+    )
+
+
 def _many(reading: Reading, number: int) -> str:
     count = len(reading.used)
     if count < MANY_ROWS:
@@ -142,6 +158,7 @@ CHECKS: tuple[Callable[[Reading, int], str], ...] = (
     _cycles,
     _hysteresis,
     _reference,
+    _diameter,
     _many,
     _other_axis,
 )

@@ -16,6 +16,7 @@ __all__ = [
     "CYCLE_NAMES",
     "DIMENSION_NAMES",
     "ROLES",
+    "ROLES_OF_TUBE",
     "SET_NAMES",
     "SPREADS",
     "STRESS_NOUNS",
@@ -80,6 +81,24 @@ ROLES = {
     ),
     "stress": _names(
         "stress, tensile stress, compressive stress, shear stress, spannung, druckspannung, schubspannung"
+    ),
+    "outer_diameter": _names(
+        "diameter, outer diameter, outside diameter, external diameter, vessel diameter, artery diameter, od, o.d., "
+        "durchmesser, außendurchmesser, aussendurchmesser, gefäßdurchmesser, diamètre, diamètre externe, "
+        "diamètre extérieur, diámetro, diámetro externo, diámetro exterior, diametro, diametro esterno, diâmetro, "
+        "diâmetro externo, 外径, 直径, 外徑, 直徑, 외경, 직경"
+    ),
+    "inner_diameter": _names(
+        "inner diameter, inside diameter, internal diameter, lumen diameter, luminal diameter, i.d., innendurchmesser, "
+        "lumendurchmesser, diamètre interne, diamètre intérieur, diámetro interno, diámetro interior, "
+        "diametro interno, diâmetro interno, 内径, 內徑, 내경"
+    ),
+    "pressure": _names(
+        "pressure, internal pressure, inner pressure, luminal pressure, intraluminal pressure, lumen pressure, "
+        "transmural pressure, distending pressure, inflation pressure, druck, innendruck, transmuraler druck, "
+        "pression, pression interne, pression intraluminale, pression transmurale, presión, presión interna, "
+        "presión intraluminal, presión transmural, pressione, pressione interna, pressione transmurale, pressão, "
+        "pressão interna, pressão transmural, 压力, 内压, 壓力, 圧力, 内圧, 압력, 내압"
     ),
 }
 """Names of columns by their role, as :func:`plain` writes them, without the words for a measure of strain or stress."""
@@ -177,7 +196,8 @@ MEASURED_ALONG = re.compile(r"(?<=messlange) (?P<way>.+)")
 """What is measured along a gauge length, as in ``Messlänge Standardweg``."""
 
 
-ROLES_AND_SIZES = frozenset(["size"]).union(*ROLES.values())
+ROLES_OF_TUBE = ("outer_diameter", "inner_diameter", "pressure")
+ROLES_AND_SIZES = frozenset(["size"]).union(*(names for role, names in ROLES.items() if role not in ROLES_OF_TUBE))
 """Names of what is along an axis of a biaxial machine."""
 STRESS_NOUNS = frozenset(noun for noun in NOUNS["stress"] if len(noun) > 1) | {"σ"}
 """Names of a stress whose measure they leave open; one letter may be anything else."""

@@ -126,7 +126,9 @@ class Inspection:
             suffix = f" of {label}" if label else ""
             measure = _typed(choice.stress_type) if choice.load == "stress" else ""
             roles[choice.stress] = f"{measure}{choice.load}{suffix}"
-            roles[choice.deformation] = _typed(choice.strain_type) + choice.measure + suffix * has_several_controls
+            roles[choice.deformation] = (
+                _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
+            )
         for column in range(len(table.names)):
             yield f"{table.label(column)} {'is ' + roles[column] if column in roles else 'not read'}"
 

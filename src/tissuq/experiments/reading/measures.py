@@ -10,12 +10,26 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, initial_size
+from tissuq.experiments.reading.inflation import Tube
 from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
 from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_lengths, check_positions
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stress_measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.torsion import apparent_stress
-from tissuq.experiments.units import ANGLE, FORCE, LENGTH, RATE, TIME, TORQUE, Quantity, measured_in, number_and_unit
+from tissuq.experiments.reading.tube_columns import DIAMETERS
+from tissuq.experiments.units import (
+    ANGLE,
+    FORCE,
+    LENGTH,
+    PRESSURE,
+    RATE,
+    TIME,
+    TORQUE,
+    Quantity,
+    measured_in,
+    number_and_unit,
+)
 
 __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of", "without_machine"]
 
@@ -35,7 +49,8 @@ class Load:
     """The stress (MPa), the unit in which people want to read it, and how it was obtained.
 
     ``area`` (mm²) is that by which forces were divided; None where the file gives stresses. ``scale`` is what one unit
-    of the column is in MPa.
+    of the column is in MPa. ``measure`` is that of stresses whose conversion needs more than their columns,
+    and ``note`` what to know of them.
     """
 
     stress: Column
@@ -43,6 +58,8 @@ class Load:
     source: str
     area: float | None = None
     scale: float = 1.0
+    measure: StressMeasure | None = None
+    note: str = ""
 
 
 def stretch_of(
@@ -78,6 +95,8 @@ def stretch_of(
         )
     if choice.measure == "length":
         return _from_length(table, choice, values, dimensions, displacement_unit)
+    if choice.measure in DIAMETERS:
+        return _from_diameter(table, choice, values, dimensions, displacement_unit)
     _refuse(table, choice, "displacement_unit", displacement_unit)
     if "length" in dimensions.set_by_user:
         raise InputError(
@@ -175,6 +194,12 @@ def stress_of(
         source = f"apparent stress 2 T / (pi R^3): T = column {label} in {unit_source}, R = {_in_words(radius)}"
         scale = float(apparent_stress(np.array(factor), radius.value))
         return Load(values * scale, units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), source, scale=scale)
+    if choice.load == "pressure":
+        factor, unit_source = _factor(table, choice.stress, PRESSURE, "force_unit", force_unit)
+        tube, _ = _tube(dimensions)
+        source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
+        shown, scale = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), factor / tube.log_ratio
+        return Load(values * scale, shown, source, scale=scale, measure=measure_of_tube(tube), note=tube.note)
     if choice.load == "force":
         if choice.stress_type != "engineering":
             raise InputError(
@@ -281,6 +306,30 @@ def _from_length(
         current / length.value,
         f"stretch = column {label} in {unit_source} / {length.value:g} mm (length {length.source})",
     )
+
+
+def _from_diameter(
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
+) -> tuple[Column, str]:
+    """Return the hoop stretches in the middle of the wall of a tube, and how they were obtained."""
+    factor, unit_source = _factor(table, choice.deformation, LENGTH, "displacement_unit", unit)
+    tube, words = _tube(dimensions)
+    is_outer = choice.measure == DIAMETERS[0]
+    face, letter = (tube.outer, "B") if is_outer else (tube.inner, "A")
+    try:
+        stretch = tube.stretch(values * factor / 2, face)
+    except InputError as error:
+        raise InputError(f"{table.place(choice.deformation, int(np.argmin(values)))}: {error}") from error
+    side = f"{choice.measure.replace('_', ' ')} d = column {table.label(choice.deformation)} in {unit_source}"
+    return stretch, f"hoop stretch in the middle of the wall = sqrt(1 + (d^2/4 - {letter}^2)/(A B)): {side}, {words}"
+
+
+def _tube(dimensions: Dimensions) -> tuple[Tube, str]:
+    """Return the undeformed tube, and its radii in words."""
+    diameter, thickness = dimensions.wall_of_tube
+    tube = Tube(diameter.value / 2 - thickness.value, diameter.value / 2)
+    words = f"A = {tube.inner:g} mm and B = {tube.outer:g} mm (undeformed radii; diameter {diameter.source}, "
+    return tube, f"{words}thickness {thickness.source})"
 
 
 def _position(text: str, quantity: Quantity) -> float:

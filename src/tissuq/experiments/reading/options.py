@@ -10,7 +10,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading.headings import DIMENSION_NAMES
+from tissuq.experiments.reading.headings import DIMENSION_NAMES, ROLES_OF_TUBE
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.units import is_quantity, unit_of
@@ -68,6 +68,9 @@ class PythonOptions(ReadingOptions, total=False):
     stress: str | int | None
     torque: str | int | None
     force: str | int | None
+    pressure: str | int | None
+    outer_diameter: str | int | None
+    inner_diameter: str | int | None
     stretch2: str | int | None
     strain2: str | int | None
     displacement2: str | int | None
@@ -88,9 +91,8 @@ class PythonOptions(ReadingOptions, total=False):
 
 COLUMNS = ("stretch", "strain", "displacement", "shear", "twist", "rate", "sliding", "stress", "torque", "force")
 """Roles of columns that are options by themselves; ``length`` is that of the specimen."""
-PARTS = {name: "columns" for role in COLUMNS for name in (role, f"{role}2")} | dict.fromkeys(
-    DIMENSION_NAMES, "dimensions"
-)
+PARTS = {name: "columns" for role in COLUMNS for name in (role, f"{role}2")}
+PARTS |= dict.fromkeys(ROLES_OF_TUBE, "columns") | dict.fromkeys(DIMENSION_NAMES, "dimensions")
 """Options that are entries of another one."""
 
 

@@ -55,9 +55,10 @@ def with_compression_negative(
         When it does but the stretches are all above 1, or a name says compression and nobody says its sign.
     """
     choice = choices[0]
-    if choice.measure in SHEARS:
+    if choice.measure in SHEARS or choice.load == "pressure":
         if compression_positive:
-            raise InputError("compression_positive=True (--compression-positive) has no meaning for a shear stress.")
+            what = "pressure" if choice.load == "pressure" else "shear stress"
+            raise InputError(f"compression_positive=True (--compression-positive) has no meaning for a {what}.")
         return measured
     if compression_positive is None:
         _check_names(measured, choices, direction)
@@ -108,6 +109,9 @@ def check_signs(measured: MeasuredRows, choices: Sequence[ColumnChoice], compres
     """
     if choices[0].measure in SHEARS:
         _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+        return
+    if choices[0].load == "pressure":
+        _check_inflation(measured.table, choices[0], measured.stretch[0], measured.stress[0])
         return
     change = measured.stretch - 1
     alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
@@ -203,6 +207,16 @@ def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress
             f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
             f"{stress[row]:g} MPa; it must have the sign of the shear. Change one of the signs in the file, or check "
             "which columns are read."
+        )
+
+
+def _check_inflation(table: Table, choice: ColumnChoice, stretch: Column, stress: Column) -> None:
+    row = _wrong_sign(stretch, stress, stretch < 1)
+    if row is not None:
+        raise InputError(
+            f"{table.place(choice.deformation, row)}: the tube is under pressure and narrower than undeformed (stretch "
+            f"{stretch[row]:g} in the middle of the wall). Give the outer diameter that it has without pressure "
+            "(--diameter), or check which columns are read."
         )
 
 

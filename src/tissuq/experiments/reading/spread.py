@@ -73,7 +73,12 @@ def spread_of(
     InputError
         When a column that is given cannot be used.
     """
-    if choice.stress_type == "torsion":
+    if choice.load == "pressure" and mean_of is not None:
+        raise InputError(
+            f"{table.file}: mean_of={mean_of} (--mean-of) is for stresses or forces, not for the pressure in a tube. "
+            "Leave it out."
+        )
+    if choice.stress_type == "torsion" or choice.load == "pressure":
         return Spread()
     given = next((kind for kind in SPREADS if kind in mapping), None)
     if given:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.inflation import Tube
 from tissuq.experiments.reading.torsion import rim_stress
 
-__all__ = ["STRESS_MEASURES", "StressMeasure"]
+__all__ = ["STRESS_MEASURES", "StressMeasure", "measure_of_tube"]
 
 FloatArray = NDArray[np.float64]
 
@@ -88,3 +89,15 @@ STRESS_MEASURES = {
 }
 """Every measure of stress by its name: force over undeformed area P, over deformed area P F', F^-1 P (no change of
 volume), and 2 T / (pi R^3) of the torque T of a disc with the radius R."""
+
+
+def measure_of_tube(tube: Tube) -> StressMeasure:
+    """Return the measure of mean stresses p / ln(B/A) of a tube's wall."""
+    return StressMeasure(
+        name="inflation",
+        words="",
+        engineering=lambda mode, points, stress: tube.engineering_stress(points, stress[0])[None],
+        step="mean stress of the wall times the hoop stretch, and times the stress in its middle over the mean, to "
+        "engineering stress",
+        is_of_file=True,
+    )

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.reading.smooth_curve import log_coefficients
 
 __all__ = ["apparent_stress", "rim_stress"]
 
 FloatArray = NDArray[np.float64]
-
-MAX_DEGREE = 3
-"""Degree, in the square of the shear, of the polynomial that the logarithm of the apparent modulus is fitted by."""
-POINTS_OF_TERM = 4
-"""Different amounts of shear for each of its terms, at least."""
-LARGEST_LOG = 50.0
-SMALLEST_MISFIT = 1e-24
-"""Mean square of the misfit over the largest stress, below which a further term serves nothing."""
 
 
 def apparent_stress(torque: FloatArray, radius: float) -> FloatArray:
@@ -51,28 +42,8 @@ def rim_stress(shear: FloatArray, apparent: FloatArray) -> FloatArray:
     places, sizes = shear / np.abs(shear).max(), apparent / max(float(np.abs(apparent).max()), np.finfo(float).tiny)
     if places @ sizes <= 0:
         raise InputError("the torque does not have the sign of the twist: change one of the signs in the file.")
-    powers = places[:, None] ** (2 * np.arange(MAX_DEGREE + 1))
-    degrees = min(MAX_DEGREE, len(np.unique(np.abs(places))) // POINTS_OF_TERM - 1)
-    start, fits = np.log([places @ sizes / (places @ places)]), []
-    for degree in range(max(degrees, 0) + 1):
-        columns = powers[:, : degree + 1]
-        start, misfit = _fitted(places, sizes, columns, np.append(start, np.zeros(degree + 1 - len(start))))
-        criterion = len(sizes) * np.log(max(misfit, SMALLEST_MISFIT)) + (degree + 1) * np.log(len(sizes))
-        fits.append((criterion, 1 + columns @ (2 * np.arange(degree + 1) * start)))
-    _, slope = min(fits, key=lambda fit: fit[0])
+    squares = places[:, None] ** 2
+    coefficients = log_coefficients(sizes, places[:, None], squares)
+    degrees = np.arange(len(coefficients))
+    slope = 1 + squares**degrees @ (2 * degrees * coefficients)
     return np.asarray(apparent * (3 + slope) / 4)
-
-
-def _fitted(places: FloatArray, sizes: FloatArray, columns: FloatArray, start: FloatArray) -> tuple[FloatArray, float]:
-    """Return the coefficients with which places exp(columns coefficients) are nearest to sizes, and the mean square."""
-    from scipy.optimize import least_squares
-
-    def curve(coefficients: Any) -> Any:
-        return places * np.exp(np.minimum(columns @ coefficients, LARGEST_LOG))
-
-    result = least_squares(
-        lambda coefficients: curve(coefficients) - sizes,
-        start,
-        jac=lambda coefficients: curve(coefficients)[:, None] * columns,
-    )
-    return np.asarray(result.x), 2 * float(result.cost) / len(sizes)
