@@ -37,14 +37,32 @@ def check(path, expected="uniaxial", stretch=L, stress=P, **options):
         ("Circumferential stretch,Circumferential Cauchy stress (kPa)", (L, P * L)),
         ("Strain (mm/m),Stress (kPa)", (1000 * (L - 1), P)),
         ("GreenStrain (%),PK2 (kPa)", (50 * (L**2 - 1), P / L)),
+        ("Green strain E (-),2nd PK stress S (kPa)", ((L**2 - 1) / 2, P / L)),
     ],
 )
 def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, head, columns):
     check(written(tmp_path, "test.csv", head, *columns))
 
 
-def test_words_without_blanks_have_units(tmp_path):
-    check(written(tmp_path, "test.csv", "AxialDisplacement(mm),ForceN", D, N), dimensions=SIZES)
+@pytest.mark.parametrize(
+    "head",
+    [
+        "AxialDisplacement(mm),ForceN",
+        "Position(Linear:Position) (mm),Load(Linear:Load) (N)",
+        "Spostamento [mm],Forza [N]",
+        "変位(mm),荷重(N)",
+        "Verplaatsing (mm),Kracht (N)",
+        "Déplacement (mm),Effort (N)",
+    ],
+)
+def test_displacements_and_forces_are_known_by_many_names(tmp_path, head):
+    path = written(tmp_path, "test.csv", f"Total Cycles,{head},Elapsed Cycles", 1 + 0 * L, D, N, np.arange(len(L)))
+    check(path, dimensions=SIZES)
+
+
+@pytest.mark.parametrize("head", ["Deformazione [%],Tensione [kPa]", "Rek (%),Spanning (kPa)", "ひずみ(%),応力(kPa)"])
+def test_strains_and_stresses_are_known_in_many_languages_beside_forces(tmp_path, head):
+    check(written(tmp_path, "test.csv", f"{head},x (mm),F (N)", 100 * (L - 1), P, D, N))
 
 
 def test_empty_columns_of_stress_and_strain_are_not_read_beside_forces(tmp_path):

@@ -68,7 +68,8 @@ OSCILLATION = re.compile(
 """Names of what is measured in oscillations."""
 IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|energy|rate|index|^(no|nr|n|point|punkt)\.?$|" + IS_PRESSURE.pattern
+    r"modul|time|zeit|temp|tijd|时间|時間|시간|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
+    + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
 

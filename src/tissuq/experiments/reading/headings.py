@@ -45,7 +45,8 @@ ROLES = {
     "stretch": _names("stretch, stretch ratio, lambda, λ"),
     "strain": _names(
         "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung, eps, "
-        "epsilon, ε"
+        "epsilon, ε, déformation, deformación, deformação, deformazione, rek, töjning, tøyning, 应变, 應變, ひずみ, "
+        "歪み, 歪, 변형률"
     ),
     "shear": _names("shear, amount of shear, shear strain, gamma, γ"),
     "twist": _names(
@@ -64,7 +65,9 @@ ROLES = {
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
-        "axial position, crosshead position, stroke"
+        "axial position, crosshead position, stroke, déplacement, allongement, desplazamiento, alargamiento, "
+        "deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
+        "位移, 變位, 変位, 伸び, 伸长, 변위"
     ),
     "length": _names(
         "gap, gap width, gap height, height, sample height, specimen height, current length, current height, spalt, "
@@ -73,14 +76,17 @@ ROLES = {
     "force": _names(
         "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
         "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft, shear force, lateral force, "
-        "horizontal force, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, forza di taglio"
+        "horizontal force, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, "
+        "forza di taglio, effort, charge, fuerza, carga, força, forza, carico, kracht, belasting, "
+        "力, 载荷, 荷重, 试验力, 試験力, 하중"
     ),
     "torque": _names(
         "torque, axial torque, drehmoment, moment, torsionsmoment, couple, couple de torsion, par, par de torsión, "
         "momento torsor, momento torcente, coppia, torque de torção, 扭矩, トルク"
     ),
     "stress": _names(
-        "stress, tensile stress, compressive stress, shear stress, spannung, druckspannung, schubspannung"
+        "stress, tensile stress, compressive stress, shear stress, spannung, druckspannung, schubspannung, "
+        "contrainte, tensión, esfuerzo, tensão, tensione, sforzo, spanning, spänning, 应力, 應力, 応力, 응력"
     ),
     "outer_diameter": _names(
         "diameter, outer diameter, outside diameter, external diameter, vessel diameter, artery diameter, od, o.d., "
@@ -104,14 +110,8 @@ ROLES = {
 """Names of columns by their role, as :func:`plain` writes them, without the words for a measure of strain or stress."""
 
 NOUNS = {
-    "strain": _names(
-        "axial strain, longitudinal strain, e, λ, lambda, déformation, deformación, deformação, deformazione, rek, "
-        "töjning, tøyning, 应变, 應變, ひずみ, 歪み, 歪, 변형률"
-    ),
-    "stress": _names(
-        "axial stress, longitudinal stress, s, sigma, σ, contrainte, tensión, esfuerzo, tensão, tensione, sforzo, "
-        "spanning, spänning, 应力, 應力, 応力, 응력"
-    ),
+    "strain": _names("axial strain, longitudinal strain, e, λ, lambda"),
+    "stress": _names("axial stress, longitudinal stress, s, sigma, σ"),
 }
 """Further names of strain and stress that are known as such beside a word for a measure of them."""
 MEASURES: dict[str, list[StrainMeasure] | list[StressMeasure]] = {
@@ -215,6 +215,10 @@ MEASURE_IN_BRACKETS = re.compile(
     rf"\s*[\[(]({'|'.join(measure.words for kind in MEASURES.values() for measure in kind)})[\])]", re.IGNORECASE
 )
 """As in ``Strain (true) [%]``."""
+CHANNEL = re.compile(r"\([^():]+:[^()]+\)(?=\s*[(\[])")
+"""A channel of the machine before the unit, as in ``Position(Linear:Position) (mm)``."""
+SYMBOL = re.compile(r" [espftλσεγτ]$")
+"""A symbol after a name, as in ``Green strain E``."""
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[({<](?P<unit>[^\])}>]*)[\])}>]?"),
     re.compile(r"(?P<quantity>[^/]+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
@@ -243,6 +247,7 @@ class Heading:
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
+    name = CHANNEL.sub("", name)
     name = MEASURE_IN_BRACKETS.sub(r" \1", COPY.sub("", NEXT_WORD.sub(" ", name.strip()))).strip()
     matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
     suffix = UNIT_AS_SUFFIX.fullmatch(name)
@@ -311,6 +316,8 @@ def measure_in(quantity: str) -> tuple[str, str]:
             axis, name = on_axis(noun)
             if name in ROLES[role]:
                 return noun, measure.name
+            if SYMBOL.sub("", name) in ROLES[role]:
+                return SYMBOL.sub("", noun), measure.name
             if name in NOUNS.get(role, ()) or (not noun and SAYS_ALONE.fullmatch(match[0])):
                 return f"{role} {axis}".strip(), measure.name
     return quantity, ""
