@@ -12,10 +12,6 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.headings import (
-    COMPONENTS,
-    CYCLE_NAMES,
-    STRESS_NOUNS,
-    dimensions_named,
     heading,
     measure_in,
     of_spread,
@@ -25,15 +21,24 @@ from tissuq.experiments.reading.headings import (
     without_mean,
 )
 from tissuq.experiments.reading.layout import split
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
-from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+from tissuq.experiments.reading.recognition import (
+    DEFORMATIONS,
+    DEFORMATIONS_OF_UNITS,
+    LENGTHENINGS,
+    LOADS,
+    OTHER_MEASURE,
+    SHEARS,
+    Contents,
+    ambiguous,
+    columns_there_are,
+    recognise,
+    say_which,
+    told_by_unit,
+)
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE, with_columns_of_tube
-from tissuq.experiments.units import measured_in
+from tissuq.experiments.reading.tube_columns import PRESSURE, with_columns_of_tube
 
 __all__ = [
-    "DEFORMATIONS",
-    "LOADS",
     "ColumnChoice",
     "about_stress",
     "choose_columns",
@@ -41,21 +46,8 @@ __all__ = [
     "mapping_of_each_stress",
 ]
 
-LENGTHENINGS = ("stretch", "strain", "displacement", "length")
-SHEARS = ("shear", "twist", "rate", "sliding")
-DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
-LOADS = ("stress", "torque", "force", PRESSURE)
 SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
-DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
-"""What a column is that alone has such a unit."""
-OTHER_MEASURE = (
-    r"true|cauchy|piola|kirchhoff|pk|log|hencky|green|almansi|lagrang|euler|wahr|vrai|r[ée]elle|verdader|real\b|"
-    r"真|对数|対数"
-)
-"""Within names of a strain or stress that is, or may be, another one than the engineering one."""
-NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
-"""Names of a stress that is, or may be, over another area than the undeformed one."""
 NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak|end of")
 """In a line above the table that speaks of strain or stress without saying what the columns hold."""
 NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
@@ -66,12 +58,6 @@ OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
 )
 """Names of what is measured in oscillations."""
-IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
-NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|tijd|时间|時間|시간|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
-    + IS_PRESSURE.pattern
-)
-"""Names of columns that are no rivals, whatever their unit."""
 
 
 @dataclass(frozen=True)
@@ -97,37 +83,6 @@ class ColumnChoice:
     load: str = "stress"
     strain_type: str = "engineering"
     stress_type: str = "engineering"
-
-
-@dataclass(frozen=True)
-class _Contents:
-    """What the names of columns say they hold, without words for a measure, and that measure where they say one.
-
-    ``strain_type`` and ``stress_type`` are the measures that are asked for; none where the names decide.
-    """
-
-    quantities: Sequence[str]
-    measures: Sequence[str]
-    strain_type: str | None = None
-    stress_type: str | None = None
-
-    def fitting(self, *roles: str) -> list[int]:
-        """Return the columns that may have one of the roles: of several those of the measure that is wanted.
-
-        That is the one asked for, or else the engineering one, or what does not say another.
-        """
-        names = frozenset().union(*(role_names(role) for role in roles))
-        if "stress" in roles and self.stress_type is not None:
-            names |= STRESS_NOUNS | COMPONENTS["stress"]
-        if "strain" in roles and self.strain_type is not None:
-            names |= COMPONENTS["strain"]
-        columns = [column for column, quantity in enumerate(self.quantities) if quantity in names]
-        wanted = self.stress_type if "stress" in roles else self.strain_type
-        for measures in (("", "engineering"),) if wanted is None else ((wanted,), ("",)):
-            preferred = [column for column in columns if self.measures[column] in measures]
-            if preferred:
-                return preferred
-        return columns
 
 
 def choose_columns(
@@ -209,7 +164,7 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
         columns = [column for column, name in enumerate(names) if name and name == key]
         if len(columns) > 1:
-            raise _ambiguous(table, role, columns)
+            raise ambiguous(table, role, columns)
         if columns:
             return columns[0]
     if text.isdecimal() and 1 <= int(text) <= len(table.names):
@@ -217,7 +172,7 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     close = get_close_matches(text.lower(), [name.lower() for name in table.names], n=1)
     suggestion = next((f" Did you mean '{name}'?" for name in table.names if [name.lower()] == close), "")
     raise InputError(
-        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {_columns_there_are(table)}"
+        f"{table.file} has no column '{text}' (asked for as {role}).{suggestion} {columns_there_are(table)}"
     )
 
 
@@ -263,7 +218,7 @@ def _choice(
     """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
     is_shear = mode.controls == (SHEAR,)
     _check_roles(table, mapping, is_shear)
-    contents = _Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
+    contents = Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
     load = next((role for role in LOADS if role in mapping), None)
     if load:
@@ -271,8 +226,8 @@ def _choice(
     else:
         loads = ("stress", "torque", "force") if is_shear else ("stress", "force")
         load = next((role for role in loads if contents.fitting(role)), "")
-        by_unit = None if load else _told_by_unit(table, contents, loads)
-        load, stress = by_unit or (load, _recognise(table, contents, [load or "force"], loads))
+        by_unit = None if load else told_by_unit(table, contents, loads)
+        load, stress = by_unit or (load, recognise(table, contents, [load or "force"], loads))
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
@@ -288,18 +243,18 @@ def _choice(
             measures = ["displacement"] if contents.fitting("displacement") else ["length"]
         is_named = bool(contents.fitting(*measures)) or (is_shear and load != "torque")
         kinds = ("angle",) if is_shear else ("strain", "length")
-        by_unit = None if is_named else _told_by_unit(table, contents, kinds, stress)
+        by_unit = None if is_named else told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
         else:
-            deformation = _recognise(table, contents, measures, roles)
+            deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
             measure = next((measure for measure in measures if name in role_names(measure)), "strain")
             measure = "shear" if is_shear and measure == "strain" else measure
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
-            f"give two columns. {_columns_there_are(table)}"
+            f"give two columns. {columns_there_are(table)}"
         )
     _check_test(table, stress, mapping, is_shear)
     return _with_types(table, ColumnChoice(deformation, stress, measure, load), contents)
@@ -312,7 +267,7 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
         names = _without_empty(table, names)
     if axis is not None and axis not in axes:
         raise InputError(
-            f"{table.file} has no columns of an axis '{axis}'. {_columns_there_are(table)} Leave axis (--axis) out."
+            f"{table.file} has no columns of an axis '{axis}'. {columns_there_are(table)} Leave axis (--axis) out."
         )
     if axis is None and len(axes) == 2 and not mapping:
         raise InputError(
@@ -360,132 +315,7 @@ def _check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool)
         raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
 
 
-def _told_by_unit(
-    table: Table, contents: _Contents, kinds: Sequence[str], load: int | None = None
-) -> tuple[str, int] | None:
-    """Return the first kind of unit (stress, force, length, strain) that one column alone has, and that column.
-
-    None where columns are left that could be meant as well: of a deformation, all that are neither of a load nor of
-    time nor of a known dimension of the specimen. A stress that may be of another kind (sigma, true stress) is not
-    taken unless its kind is said, and nothing that is called shear.
-    """
-    columns_of: dict[str, list[int]] = {}
-    for column, quantity in enumerate(contents.quantities):
-        in_heading, beneath = table.stated_units(column)
-        kind = measured_in(beneath or in_heading)
-        is_rival = column != load and bool(quantity) and kind != "time" and not _is_of_something_else(quantity)
-        if is_rival and not table.is_constant(column):
-            columns_of.setdefault(kind, []).append(column)
-    rivals = [column for kind, columns in columns_of.items() if kind not in LOADS for column in columns]
-    for kind in kinds:
-        columns = columns_of.get(kind, [])
-        if len(columns) == 1 and (load is None or rivals == columns or kind == "angle"):
-            name = contents.quantities[columns[0]]
-            is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
-            return None if is_open or name in role_names("shear") else (kind, columns[0])
-    return None
-
-
-def _is_of_something_else(quantity: str) -> bool:
-    """Tell whether a name is of a dimension of the specimen, a count, a time or a modulus."""
-    return (
-        quantity in CYCLE_NAMES
-        or bool(dimensions_named(quantity))
-        or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
-    )
-
-
-def _recognise(
-    table: Table,
-    contents: _Contents,
-    candidates: Sequence[str],
-    roles: Sequence[str],
-) -> int:
-    """Return the one column whose name says that it has one of the candidate roles, of those that it may have."""
-    columns = contents.fitting(*candidates)
-    if len(columns) > 1:
-        raise _ambiguous(table, candidates, columns)
-    if not columns:
-        hint = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
-        what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
-        by_unit = _likely_by_unit(table, roles)
-        likely = [table.label(column) for columns in by_unit.values() for column in columns]
-        several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""
-        in_order = [*by_unit, *(role for role in roles if role not in by_unit)]
-        raise InputError(
-            f"{table.file}: no column is recognised as {what}.{hint}{several} "
-            f"{_columns_there_are(table)} {_how_to_say(table, in_order)}"
-        )
-    return columns[0]
-
-
-def _likely_by_unit(table: Table, roles: Sequence[str]) -> dict[str, list[int]]:
-    """Return the columns that vary and have a unit of one of some roles, by this."""
-    columns_of: dict[str, list[int]] = {}
-    for column, name in enumerate(table.names):
-        in_heading, beneath = table.stated_units(column)
-        kind = measured_in(beneath or in_heading)
-        role = DEFORMATIONS_OF_UNITS.get(kind, kind)
-        if role in roles and not _is_of_something_else(heading(name).quantity) and not table.is_constant(column):
-            columns_of.setdefault(role, []).append(column)
-    return columns_of
-
-
-def _stress_hint(table: Table, contents: _Contents) -> str:
-    for column, quantity in enumerate(contents.quantities):
-        in_heading, beneath = table.stated_units(column)
-        if quantity in role_names("torque"):
-            return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
-        if IS_PRESSURE.search(quantity):
-            return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
-        is_symbol = quantity in COMPONENTS["stress"]
-        if measured_in(beneath or in_heading) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
-            return f" Column {table.label(column)} may be a stress of several types. {_say_which('stress')}"
-    return ""
-
-
-def _say_which(kind: str) -> str:
-    """Return how to say which measure of strain or stress a column is."""
-    strains = [name for name, measure in STRAIN_MEASURES.items() if measure.stretch]
-    names = strains if kind == "strain" else list(STRESS_MEASURES)
-    return f"Say which it is with {kind}_type (--{kind}-type): {', '.join(names[:-1])} or {names[-1]}."
-
-
-def _deformation_hint(table: Table, contents: _Contents, roles: Sequence[str]) -> str:
-    symbols = [column for column, name in enumerate(contents.quantities) if name in COMPONENTS["strain"]]
-    if symbols and "strain" in roles:
-        return f" Column {table.label(symbols[0])} may be a strain of several types. {_say_which('strain')}"
-    columns = [] if "shear" in roles else contents.fitting("shear")
-    if not columns:
-        return ""
-    return f" Column {table.label(columns[0])} is an amount of shear; if it is simple shear, give --mode simple-shear."
-
-
-def _ambiguous(table: Table, roles: Sequence[str], columns: Sequence[int]) -> InputError:
-    fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in columns)
-    return InputError(
-        f"{table.file}: several columns may be the {roles[0]}: {fitting}. {_how_to_say(table, roles[:1])}"
-    )
-
-
-def _columns_there_are(table: Table) -> str:
-    """Return the sentence that lists the columns of a table."""
-    if not any(table.names):
-        return f"Its {len(table.names)} columns have no names."
-    names = ", ".join(f"'{name}'" if name else "(no name)" for name in table.names)
-    return f"The columns are: {names}."
-
-
-def _how_to_say(table: Table, roles: Sequence[str]) -> str:
-    if not any(table.names):
-        return (
-            'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
-        )
-    others = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
-    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{others}.'
-
-
-def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> ColumnChoice:
+def _with_types(table: Table, choice: ColumnChoice, contents: Contents) -> ColumnChoice:
     """Return a choice with the measures of its strain and stress: those asked for, or that the columns' names say.
 
     Raises
@@ -516,9 +346,9 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
             "(--column strain=NAME)."
         )
     if is_strain and not strain_type and NOT_ENGINEERING_STRAIN.search(name):
-        raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {_say_which('strain')}")
+        raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {say_which('strain')}")
     if choice.load == "stress" and not stress_type and re.search(OTHER_MEASURE, contents.quantities[choice.stress]):
-        raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {_say_which('stress')}")
+        raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {say_which('stress')}")
     if is_strain and not strain_type:
         _check_lines_above(table, choice.deformation, "strain")
     if choice.load == "stress" and not stress_type:
@@ -532,12 +362,12 @@ def _with_types(table: Table, choice: ColumnChoice, contents: _Contents) -> Colu
         if (strain_type or stress_type) != "engineering":
             raise InputError(
                 f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
-                f"{table.label(other)} is {strain_type or stress_type}. {_say_which(unstated)}"
+                f"{table.label(other)} is {strain_type or stress_type}. {say_which(unstated)}"
             )
     return replace(choice, strain_type=strain_type or "engineering", stress_type=stress_type or "engineering")
 
 
-def _type_of(table: Table, column: int, contents: _Contents, kind: str, wanted: str | None) -> str:
+def _type_of(table: Table, column: int, contents: Contents, kind: str, wanted: str | None) -> str:
     """Return the measure that a column is read as: the one asked for, which its name must not contradict."""
     by_name = contents.measures[column]
     if wanted and by_name and wanted != by_name:
@@ -557,7 +387,7 @@ def _check_lines_above(table: Table, column: int, kind: str) -> None:
         if kind in words and not NO_MEASURE.search(words) and re.search(OTHER_MEASURE, words):
             raise InputError(
                 f"{table.place(column)} does not say which type of {kind} it is, and line {line} says "
-                f"'{text.strip()}'. {_say_which(kind)}"
+                f"'{text.strip()}'. {say_which(kind)}"
             )
 
 
@@ -588,7 +418,7 @@ def _roles_missing(table: Table, mode: LoadingMode) -> InputError:
     named = ", or name them 'stretch x', 'stress x', 'stretch y', 'stress y'" if mode.machine_axes else ""
     return InputError(
         f"{table.file}: loading mode '{mode.name}' has {' and '.join(mode.stresses)}, and the file's columns do not "
-        f"tell both. {_columns_there_are(table)} Say which they are: "
+        f"tell both. {columns_there_are(table)} Say which they are: "
         f"{' '.join(f'--column {role}=NAME' for role in roles)} (in Python columns=){named}."
     )
 

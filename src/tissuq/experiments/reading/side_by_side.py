@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from tissuq.experiments.reading.columns import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.headings import (
     AXES,
     heading,
@@ -20,6 +19,7 @@ from tissuq.experiments.reading.headings import (
     without_mean,
 )
 from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import measured_in

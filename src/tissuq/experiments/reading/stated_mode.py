@@ -10,7 +10,6 @@ from pathlib import Path
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_modes
-from tissuq.experiments.reading.columns import SHEARS
 from tissuq.experiments.reading.headings import (
     NEXT_WORD,
     STRESS_NOUNS,
@@ -20,6 +19,7 @@ from tissuq.experiments.reading.headings import (
     role_names,
 )
 from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.recognition import SHEARS
 from tissuq.experiments.reading.table import Table
 
 __all__ = [

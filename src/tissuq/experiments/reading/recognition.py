@@ -1,0 +1,214 @@
+"""Which column of a table has a role, by its name or its unit, and what to say where none has it, or several may."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.headings import (
+    COMPONENTS,
+    CYCLE_NAMES,
+    STRESS_NOUNS,
+    dimensions_named,
+    heading,
+    role_names,
+)
+from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE
+from tissuq.experiments.units import measured_in
+
+__all__ = [
+    "DEFORMATIONS",
+    "DEFORMATIONS_OF_UNITS",
+    "LENGTHENINGS",
+    "LOADS",
+    "OTHER_MEASURE",
+    "SHEARS",
+    "Contents",
+    "ambiguous",
+    "columns_there_are",
+    "recognise",
+    "say_which",
+    "told_by_unit",
+]
+
+LENGTHENINGS = ("stretch", "strain", "displacement", "length")
+SHEARS = ("shear", "twist", "rate", "sliding")
+DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
+LOADS = ("stress", "torque", "force", PRESSURE)
+DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
+"""What a column is that alone has such a unit."""
+OTHER_MEASURE = (
+    r"true|cauchy|piola|kirchhoff|pk|log|hencky|green|almansi|lagrang|euler|wahr|vrai|r[ée]elle|verdader|real\b|"
+    r"真|对数|対数"
+)
+"""Within names of a strain or stress that is, or may be, another one than the engineering one."""
+NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
+"""Names of a stress that is, or may be, over another area than the undeformed one."""
+IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
+NEITHER_LOAD_NOR_DEFORMATION = re.compile(
+    r"modul|time|zeit|temp|tijd|时间|時間|시간|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
+    + IS_PRESSURE.pattern
+)
+"""Names of columns that are no rivals, whatever their unit."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What the names of columns say they hold, without words for a measure, and that measure where they say one.
+
+    ``strain_type`` and ``stress_type`` are the measures that are asked for; none where the names decide.
+    """
+
+    quantities: Sequence[str]
+    measures: Sequence[str]
+    strain_type: str | None = None
+    stress_type: str | None = None
+
+    def fitting(self, *roles: str) -> list[int]:
+        """Return the columns that may have one of the roles: of several those of the measure that is wanted.
+
+        That is the one asked for, or else the engineering one, or what does not say another.
+        """
+        names = frozenset().union(*(role_names(role) for role in roles))
+        if "stress" in roles and self.stress_type is not None:
+            names |= STRESS_NOUNS | COMPONENTS["stress"]
+        if "strain" in roles and self.strain_type is not None:
+            names |= COMPONENTS["strain"]
+        columns = [column for column, quantity in enumerate(self.quantities) if quantity in names]
+        wanted = self.stress_type if "stress" in roles else self.strain_type
+        for measures in (("", "engineering"),) if wanted is None else ((wanted,), ("",)):
+            preferred = [column for column in columns if self.measures[column] in measures]
+            if preferred:
+                return preferred
+        return columns
+
+
+def told_by_unit(
+    table: Table, contents: Contents, kinds: Sequence[str], load: int | None = None
+) -> tuple[str, int] | None:
+    """Return the first kind of unit (stress, force, length, strain) that one column alone has, and that column.
+
+    None where columns are left that could be meant as well: of a deformation, all that are neither of a load nor of
+    time nor of a known dimension of the specimen. A stress that may be of another kind (sigma, true stress) is not
+    taken unless its kind is said, and nothing that is called shear.
+    """
+    columns_of: dict[str, list[int]] = {}
+    for column, quantity in enumerate(contents.quantities):
+        in_heading, beneath = table.stated_units(column)
+        kind = measured_in(beneath or in_heading)
+        is_rival = column != load and bool(quantity) and kind != "time" and not _is_of_something_else(quantity)
+        if is_rival and not table.is_constant(column):
+            columns_of.setdefault(kind, []).append(column)
+    rivals = [column for kind, columns in columns_of.items() if kind not in LOADS for column in columns]
+    for kind in kinds:
+        columns = columns_of.get(kind, [])
+        if len(columns) == 1 and (load is None or rivals == columns or kind == "angle"):
+            name = contents.quantities[columns[0]]
+            is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
+            return None if is_open or name in role_names("shear") else (kind, columns[0])
+    return None
+
+
+def _is_of_something_else(quantity: str) -> bool:
+    """Tell whether a name is of a dimension of the specimen, a count, a time or a modulus."""
+    return (
+        quantity in CYCLE_NAMES
+        or bool(dimensions_named(quantity))
+        or bool(NEITHER_LOAD_NOR_DEFORMATION.search(quantity))
+    )
+
+
+def recognise(
+    table: Table,
+    contents: Contents,
+    candidates: Sequence[str],
+    roles: Sequence[str],
+) -> int:
+    """Return the one column whose name says that it has one of the candidate roles, of those that it may have."""
+    columns = contents.fitting(*candidates)
+    if len(columns) > 1:
+        raise ambiguous(table, candidates, columns)
+    if not columns:
+        hint = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
+        what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
+        by_unit = _likely_by_unit(table, roles)
+        likely = [table.label(column) for columns in by_unit.values() for column in columns]
+        several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""
+        in_order = [*by_unit, *(role for role in roles if role not in by_unit)]
+        raise InputError(
+            f"{table.file}: no column is recognised as {what}.{hint}{several} "
+            f"{columns_there_are(table)} {_how_to_say(table, in_order)}"
+        )
+    return columns[0]
+
+
+def _likely_by_unit(table: Table, roles: Sequence[str]) -> dict[str, list[int]]:
+    """Return the columns that vary and have a unit of one of some roles, by this."""
+    columns_of: dict[str, list[int]] = {}
+    for column, name in enumerate(table.names):
+        in_heading, beneath = table.stated_units(column)
+        kind = measured_in(beneath or in_heading)
+        role = DEFORMATIONS_OF_UNITS.get(kind, kind)
+        if role in roles and not _is_of_something_else(heading(name).quantity) and not table.is_constant(column):
+            columns_of.setdefault(role, []).append(column)
+    return columns_of
+
+
+def _stress_hint(table: Table, contents: Contents) -> str:
+    for column, quantity in enumerate(contents.quantities):
+        in_heading, beneath = table.stated_units(column)
+        if quantity in role_names("torque"):
+            return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
+        if IS_PRESSURE.search(quantity):
+            return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
+        is_symbol = quantity in COMPONENTS["stress"]
+        if measured_in(beneath or in_heading) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
+            return f" Column {table.label(column)} may be a stress of several types. {say_which('stress')}"
+    return ""
+
+
+def say_which(kind: str) -> str:
+    """Return how to say which measure of strain or stress a column is."""
+    strains = [name for name, measure in STRAIN_MEASURES.items() if measure.stretch]
+    names = strains if kind == "strain" else list(STRESS_MEASURES)
+    return f"Say which it is with {kind}_type (--{kind}-type): {', '.join(names[:-1])} or {names[-1]}."
+
+
+def _deformation_hint(table: Table, contents: Contents, roles: Sequence[str]) -> str:
+    symbols = [column for column, name in enumerate(contents.quantities) if name in COMPONENTS["strain"]]
+    if symbols and "strain" in roles:
+        return f" Column {table.label(symbols[0])} may be a strain of several types. {say_which('strain')}"
+    columns = [] if "shear" in roles else contents.fitting("shear")
+    if not columns:
+        return ""
+    return f" Column {table.label(columns[0])} is an amount of shear; if it is simple shear, give --mode simple-shear."
+
+
+def ambiguous(table: Table, roles: Sequence[str], columns: Sequence[int]) -> InputError:
+    """Return that several columns may have a role, and how to say which has it."""
+    fitting = " and ".join(f"{table.label(column)} (number {column + 1})" for column in columns)
+    return InputError(
+        f"{table.file}: several columns may be the {roles[0]}: {fitting}. {_how_to_say(table, roles[:1])}"
+    )
+
+
+def columns_there_are(table: Table) -> str:
+    """Return the sentence that lists the columns of a table."""
+    if not any(table.names):
+        return f"Its {len(table.names)} columns have no names."
+    names = ", ".join(f"'{name}'" if name else "(no name)" for name in table.names)
+    return f"The columns are: {names}."
+
+
+def _how_to_say(table: Table, roles: Sequence[str]) -> str:
+    if not any(table.names):
+        return (
+            'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
+        )
+    others = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
+    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{others}.'
