@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import pi
+from math import isfinite, nan, pi
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
@@ -35,6 +35,7 @@ __all__ = [
     "looks_like_unit",
     "measured_in",
     "number_and_unit",
+    "number_in",
     "strain_factor",
     "stress_in_mpa",
     "stress_unit",
@@ -92,7 +93,7 @@ SYMBOLS = (
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
-MASSES = ("g", "kg")
+MASSES = ("g", "kg", "lb")
 """Units of mass that are written where units of force are meant."""
 
 
@@ -321,6 +322,12 @@ def measured_in(unit: str) -> str:
         if TIME.factor_or_none(compact.lower())
         else ""
     )
+
+
+def number_in(cell: str) -> float:
+    """Return the number in a cell, written with a decimal point or comma; nan where it holds none, or no finite one."""
+    number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else nan
+    return number if isfinite(number) else nan
 
 
 def number_and_unit(text: str) -> tuple[float | None, str]:

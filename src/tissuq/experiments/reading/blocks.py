@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.experiments.reading.layout import FEWEST_ROWS, split
 from tissuq.experiments.reading.table import Table, padded
-from tissuq.experiments.units import NUMBER
+from tissuq.experiments.units import NUMBER, number_in
 
 __all__ = ["blocks_of"]
 
@@ -53,7 +53,7 @@ def _is_named(cells: Sequence[Sequence[str]], row: int) -> bool:
 
 def _numbers(texts: Sequence[Sequence[str]]) -> NDArray[np.float64]:
     """Return the numbers (rows, columns) in columns that change; nan for cells without one."""
-    cells = np.array([[_number(cell) for cell in row] for row in texts])
+    cells = np.array([[number_in(cell) for cell in row] for row in texts])
     has_numbers = np.isfinite(cells[0])
     cells = cells[:, has_numbers]
     return np.asarray(cells[:, np.nanmax(cells, axis=0) > np.nanmin(cells, axis=0)])
@@ -64,8 +64,3 @@ def _begins_anew(numbers: NDArray[np.float64], row: int) -> bool:
     span = np.nanmax(numbers, axis=0) - np.nanmin(numbers, axis=0)
     is_same = np.abs(numbers[row] - numbers[0]) <= SAME * span
     return bool(len(span) and is_same.all() and (np.abs(numbers[row] - numbers[row - 1]) >= FAR * span).any())
-
-
-def _number(cell: str) -> float:
-    number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
-    return number if np.isfinite(number) else np.nan

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.file_format import as_text
+from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, as_text
 from tissuq.experiments.units import is_quantity, unit_of
 
-__all__ = ["DataColumn", "columns_of", "is_data_frame", "kind_of"]
+__all__ = ["DataColumn", "columns_of", "is_data_frame", "kind_of", "lines_of"]
 
 PANDAS, XARRAY, POLARS, LAZY, OTHERS = "iloc", "to_dataframe", "get_columns", "collect", "to_pandas"
 """What a table of each library can do, and no path can."""
@@ -81,6 +81,11 @@ def columns_of(data: Any) -> list[DataColumn]:
         words = ", ".join(f"'{name}' has {length}" for name, length in lengths.items())
         raise InputError(f"{kind}: the columns differ in length: {words}.")
     return columns
+
+
+def lines_of(columns: Sequence[DataColumn]) -> list[str]:
+    """Return the rows of columns as lines of a file: numbers to the last digit, with tabs between cells."""
+    return [SEPARATOR_OF_CELLS.join(row) for row in zip(*(column.texts() for column in columns), strict=True)]
 
 
 def _columns(data: Any) -> Iterator[DataColumn]:

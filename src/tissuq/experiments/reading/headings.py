@@ -205,7 +205,7 @@ AXES = {"x": "x", "y": "y", "1": "x", "2": "y"}
 """Axes of a biaxial machine, by how columns name them."""
 COMPONENTS = {"stress": _names("s, p, t"), "strain": _names("e")}
 """Symbols of which a component such as S11 or Eyy is along an axis, of a measure that they leave open."""
-DIRECTIONS = {
+DIRECTIONS_OF_WALL = {
     "x": r"circumferential|circumf\.?|circ\.?|hoop|umfangs|circonf[ée]rentielle?|circunferencial|circonferenziale|fd",
     "y": r"axial|longitudinal|long\.?|axiale?|längs|longitudinale|xd",
 }
@@ -396,7 +396,7 @@ def on_axis(quantity: str) -> tuple[str, str]:
     for axis, name in parts:
         if axis in AXES and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
             return AXES[axis], name
-    for axis, words in DIRECTIONS.items():
+    for axis, words in DIRECTIONS_OF_WALL.items():
         name = plain(_words(words).sub(" ", quantity, count=1))
         if name != quantity and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
             return axis, name

@@ -36,8 +36,6 @@ __all__ = ["MPA_ASSUMED", "Load", "stress_of", "stretch_of", "without_machine"]
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"
-MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf", "lbs": "lbf"}
-"""Units of mass that stand for the weight of it."""
 NOTABLE_TWIST = 0.05
 """Share of its range by which a twist may begin away from 0."""
 LARGEST_ASSUMED_STRESS = 100.0
@@ -356,13 +354,13 @@ def _declared_unit(table: Table, column: int) -> str:
             f"{table.place(column)}: the name says '{in_heading}' but the row of units beneath it says "
             f"'{beneath}'. Correct the file."
         )
-    return beneath or in_heading
+    return table.unit(column)
 
 
 def _factor(table: Table, column: int, quantity: Quantity, option: str, unit: str | None) -> tuple[float, str]:
     """Return the factor from a column's unit of force or length, and the words for where it comes from."""
     declared = _declared_unit(table, column)
-    proposed = MASSES.get(declared, quantity.unit) if quantity is FORCE else quantity.unit
+    proposed = f"{declared}f" if quantity is FORCE and declared in units.MASSES else quantity.unit
     hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
     if unit is None:
         if not declared:

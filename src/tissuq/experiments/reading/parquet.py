@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.data_frame import columns_of
+from tissuq.experiments.reading.data_frame import columns_of, lines_of
 from tissuq.experiments.reading.file_format import FileFormat, explained, line_of
 
 __all__ = ["ParquetFile"]
@@ -31,5 +31,4 @@ class ParquetFile(FileFormat):
         if frame is None:
             raise InputError(f"{path} has {rows} rows; at most {MOST_ROWS} are read. Export fewer.")
         columns = columns_of(frame)
-        cells = zip(*(column.texts() for column in columns), strict=True)
-        return {"table": [line_of([column.name for column in columns]), *map(line_of, cells)]}
+        return {"table": [line_of([column.name for column in columns]), *lines_of(columns)]}

@@ -97,13 +97,11 @@ def told_by_unit(
     time nor of a known dimension of the specimen. A stress that may be of another kind (sigma, true stress) is not
     taken unless its kind is said, and nothing that is called shear.
     """
-    columns_of: dict[str, list[int]] = {}
-    for column, quantity in enumerate(contents.quantities):
-        in_heading, beneath = table.stated_units(column)
-        kind = measured_in(beneath or in_heading)
-        is_rival = column != load and bool(quantity) and kind != "time" and not _is_of_something_else(quantity)
-        if is_rival and not table.is_constant(column):
-            columns_of.setdefault(kind, []).append(column)
+    columns_of = {
+        kind: [column for column in columns if column != load and contents.quantities[column]]
+        for kind, columns in _by_unit(table, contents.quantities).items()
+        if kind != "time"
+    }
     rivals = [column for kind, columns in columns_of.items() if kind not in LOADS for column in columns]
     for kind in kinds:
         columns = columns_of.get(kind, [])
@@ -112,6 +110,15 @@ def told_by_unit(
             is_open = kind == "stress" and not contents.stress_type and NOT_ENGINEERING.search(name)
             return None if is_open or name in role_names("shear") else (kind, columns[0])
     return None
+
+
+def _by_unit(table: Table, quantities: Sequence[str]) -> dict[str, list[int]]:
+    """Return the columns that vary, and that no name says are of something else, by the kind of their unit."""
+    columns_of: dict[str, list[int]] = {}
+    for column, quantity in enumerate(quantities):
+        if not _is_of_something_else(quantity) and not table.is_constant(column):
+            columns_of.setdefault(measured_in(table.unit(column)), []).append(column)
+    return columns_of
 
 
 def _is_of_something_else(quantity: str) -> bool:
@@ -136,7 +143,9 @@ def recognise(
     if not columns:
         hint = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
-        by_unit = _likely_by_unit(table, roles)
+        quantities = [heading(name).quantity for name in table.names]
+        of_roles = ((DEFORMATIONS_OF_UNITS.get(kind, kind), of) for kind, of in _by_unit(table, quantities).items())
+        by_unit = {role: columns for role, columns in of_roles if role in roles}
         likely = [table.label(column) for columns in by_unit.values() for column in columns]
         several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""
         in_order = [*by_unit, *(role for role in roles if role not in by_unit)]
@@ -147,27 +156,14 @@ def recognise(
     return columns[0]
 
 
-def _likely_by_unit(table: Table, roles: Sequence[str]) -> dict[str, list[int]]:
-    """Return the columns that vary and have a unit of one of some roles, by this."""
-    columns_of: dict[str, list[int]] = {}
-    for column, name in enumerate(table.names):
-        in_heading, beneath = table.stated_units(column)
-        kind = measured_in(beneath or in_heading)
-        role = DEFORMATIONS_OF_UNITS.get(kind, kind)
-        if role in roles and not _is_of_something_else(heading(name).quantity) and not table.is_constant(column):
-            columns_of.setdefault(role, []).append(column)
-    return columns_of
-
-
 def _stress_hint(table: Table, contents: Contents) -> str:
     for column, quantity in enumerate(contents.quantities):
-        in_heading, beneath = table.stated_units(column)
         if quantity in role_names("torque"):
             return f" Column {table.label(column)} is a torque; if a disc was twisted, give --mode simple-shear."
         if IS_PRESSURE.search(quantity):
             return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
         is_symbol = quantity in COMPONENTS["stress"]
-        if measured_in(beneath or in_heading) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
+        if measured_in(table.unit(column)) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
             return f" Column {table.label(column)} may be a stress of several types. {say_which('stress')}"
     return ""
 

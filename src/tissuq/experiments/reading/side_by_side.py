@@ -109,8 +109,7 @@ def _role(name: str, roles: Sequence[str], stress_type: str | None) -> _Role:
 def _told_by_unit(table: Table, column: int) -> _Role:
     """Return the load that a column has by its unit, and the test or the group that its whole name tells."""
     quantity = heading(table.names[column]).quantity
-    in_heading, beneath = table.stated_units(column)
-    load, test = measured_in(beneath or in_heading), without_mean(quantity)
+    load, test = measured_in(table.unit(column)), without_mean(quantity)
     is_of_test = bool(test) and (_is_test(quantity) or is_of_mean(quantity)) and not of_spread(quantity)[0]
     return _Role(load, test) if load in LOADS and is_of_test else _Role("", "")
 

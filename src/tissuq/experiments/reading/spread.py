@@ -110,8 +110,7 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
     found: dict[str, list[int]] = {}
     for column in range(len(table.names)):
         kind, of_what = of_spread(quantities[column])
-        in_heading, beneath = table.stated_units(column)
-        is_of_load = measured_in(beneath or in_heading) in ("", choice.load) and of_what in (
+        is_of_load = measured_in(table.unit(column)) in ("", choice.load) and of_what in (
             "",
             without_mean(of_stress),
             *role_names(choice.load),
@@ -186,8 +185,7 @@ def _count(table: Table, mapping: Mapping[str, str | int], mean_of: int | None) 
 
 def _scale(table: Table, choice: ColumnChoice, column: int, load: Load) -> tuple[float, str]:
     """Return what one unit of a column of spreads is in MPa, and where its unit comes from."""
-    in_heading, beneath = table.stated_units(column)
-    unit = beneath or in_heading
+    unit = table.unit(column)
     if measured_in(unit) != choice.load:
         return load.scale, f"the unit of {table.label(choice.stress)}"
     if load.area is not None:

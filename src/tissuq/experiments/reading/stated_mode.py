@@ -47,7 +47,7 @@ CONFINED = re.compile(r"(^|-)confined($|-)")
 """Words for compression between walls, which no loading mode is."""
 RHEOMETER = re.compile(r"parallel[ -]plate|plate[ -/]plate|platte[ -/]platte|cone|kegel|geometry name|rheomet")
 """Words above a table of a rheometer."""
-DIRECTIONS = {
+DIRECTIONS_OF_LOAD = {
     "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축"),
     "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장"),
 }
@@ -115,7 +115,7 @@ def direction_of(*texts: str) -> str:
     >>> direction_of("Compression", "sample 3"), direction_of("liver", "tension and compression")
     ('compression', '')
     """
-    said = [{name for name, words in DIRECTIONS.items() if words.search(text.lower())} for text in texts]
+    said = [{name for name, words in DIRECTIONS_OF_LOAD.items() if words.search(text.lower())} for text in texts]
     last = next((names for names in reversed(said) if names), set())
     return last.pop() if len(last) == 1 else ""
 

@@ -19,7 +19,7 @@ from tissuq.experiments.reading.headings import (
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
 from tissuq.experiments.reading.side_by_side import names_above
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.units import AREA, LENGTH, NUMBER, Quantity, number_and_unit
+from tissuq.experiments.units import AREA, LENGTH, NUMBER, Quantity, number_and_unit, number_in
 
 __all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "stated_sizes"]
 
@@ -127,7 +127,7 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
         if not dimensions_named(heading(name).quantity, is_cylinder=True):
             continue
         cells = {cell for cell in table.texts(column) if cell.lower() not in MISSING}
-        if not all(map(NUMBER.fullmatch, cells)) or len({float(cell.replace(",", ".")) for cell in cells}) != 1:
+        if not all(map(NUMBER.fullmatch, cells)) or len(set(map(number_in, cells))) != 1:
             continue
         value, source = next(iter(cells)), f"in column {table.label(column)}"
         named = (Heading(heading(name).quantity, unit) for unit in table.stated_units(column))

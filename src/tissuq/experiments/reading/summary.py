@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.reading.layout import MISSING
-from tissuq.experiments.units import NUMBER
+from tissuq.experiments.units import NUMBER, number_in
 
 __all__ = ["Summary", "find_summary"]
 
@@ -101,7 +101,7 @@ def _parted(
     rows: Sequence[str], start: int, split: Callable[[str], list[str]]
 ) -> tuple[NDArray[np.float64], list[list[str]], NDArray[np.bool_]]:
     """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
-    above = np.array(_same_width([[_number(cell) for cell in split(row)] for row in rows[:start]]))
+    above = np.array(_same_width([[number_in(cell) for cell in split(row)] for row in rows[:start]]))
     beneath = [(split(row) + [""] * above.shape[1])[: above.shape[1]] for row in rows[start:]]
     return above, beneath, np.isfinite(above).all(axis=0)
 
@@ -132,14 +132,14 @@ def _statistic(row: Sequence[str], above: NDArray[np.float64], of_numbers: NDArr
     if len(columns) < 2 and not (columns and _has_word(row, of_numbers)):
         return ""
     for name, statistic in STATISTICS.items():
-        if all(abs(_number(row[k]) - statistic(above[:, k])) <= _rounding(row[k]) for k in columns):
+        if all(abs(number_in(row[k]) - statistic(above[:, k])) <= _rounding(row[k]) for k in columns):
             return name
     return ""
 
 
 def _jumps(above: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_numbers: NDArray[np.bool_]) -> bool:
     """Tell whether rows do not go on from the ones above as those do among themselves."""
-    values = np.array([[_number(cell) for cell in row] for row in beneath])
+    values = np.array([[number_in(cell) for cell in row] for row in beneath])
     above, steps = above[:, of_numbers], np.abs(np.diff(np.vstack([above[-1:], values])[:, of_numbers], axis=0))
     allowed = JUMP * np.abs(np.diff(above, axis=0)).max(axis=0) + JUMP_OF_RANGE * np.ptp(above, axis=0)
     return bool((np.nan_to_num(steps) > allowed).any())
@@ -153,16 +153,11 @@ def _is_word(cell: str) -> bool:
     return cell.lower() not in MISSING and not NUMBER.fullmatch(cell)
 
 
-def _number(cell: str) -> float:
-    number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
-    return number if np.isfinite(number) else np.nan
-
-
 def _rounding(cell: str) -> float:
     """Return by how much a number may differ from the statistic that it was rounded from."""
     mantissa, _, exponent = cell.lower().replace(",", ".").partition("e")
     decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
-    return float(ROUNDED * float(f"1e{-decimals}") + FLOATING * abs(_number(cell)))
+    return float(ROUNDED * float(f"1e{-decimals}") + FLOATING * abs(number_in(cell)))
 
 
 def _same_width(rows: list[list[float]]) -> list[list[float]]:

@@ -122,6 +122,11 @@ class Table:
         """Return the units in a column's name and in the row of units; empty texts where there is none."""
         return heading(self.names[column]).unit, self.units[column].strip(f"{BRACKETS} ")
 
+    def unit(self, column: int) -> str:
+        """Return the unit of a column: that beneath its name, or else the one in it."""
+        in_heading, beneath = self.stated_units(column)
+        return beneath or in_heading
+
     def is_constant(self, column: int) -> bool:
         """Tell whether a column (counted from 0) has the same cell, or no number, in some rows all along."""
         cells = set(self.some_rows(FEW_ROWS).texts(column))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.reading.beside import without_statements_beside
 from tissuq.experiments.reading.blocks import blocks_of
-from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of
+from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.headings import heading, is_of_specimens
 from tissuq.experiments.reading.layout import (
@@ -148,8 +148,7 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
 def _of_data_frame(data: Any) -> Table:
     """Return the table in memory, with cells as they are in a file: numbers to the last digit."""
     columns = columns_of(data)
-    cells = zip(*(column.texts() for column in columns), strict=True)
-    rows = [SEPARATOR_OF_CELLS.join(row) for row in cells]
+    rows = lines_of(columns)
     table = Table(
         file=kind_of(data),
         names=tuple(column.name for column in columns),
@@ -216,7 +215,7 @@ def _read_every_line(
     """Return the tables of any text or sheet, looking at every line."""
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
-    content = [(line, text) for line, text in filled if ("#" not in text and "//" not in text) or not is_comment(text)]
+    content = _without_comments(filled)
     layout = find_layout([text for _, text in content], separator)
     if layout is None:
         raise _no_table(file, content)
@@ -235,6 +234,10 @@ def _read_every_line(
     ]
 
 
+def _without_comments(lines: Lines) -> Lines:
+    return [(line, text) for line, text in lines if ("#" not in text and "//" not in text) or not is_comment(text)]
+
+
 def _lines_of(tables: Sequence[Table], but: Table) -> Lines:
     """Return the lines above and in tables, but for one of them."""
     others = [table for table in tables if table is not but]
@@ -243,7 +246,7 @@ def _lines_of(tables: Sequence[Table], but: Table) -> Lines:
 
 def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
     """Return the table in numbered lines that are not blank."""
-    content = [(line, text) for line, text in filled if ("#" not in text and "//" not in text) or not is_comment(text)]
+    content = _without_comments(filled)
     texts = [text for _, text in content]
     layout = find_layout(texts, separator)
     if layout is None:

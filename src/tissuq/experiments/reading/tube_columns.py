@@ -80,8 +80,7 @@ def _columns(table: Table, quantities: Sequence[str], role: str) -> Iterator[int
     names = role_names(role)
     is_named = any(quantity in names for quantity in quantities)
     for column, quantity in enumerate(quantities):
-        in_heading, beneath = table.stated_units(column)
-        is_one = quantity in names if is_named or role != PRESSURE else measured_in(beneath or in_heading) == PRESSURE
+        is_one = quantity in names if is_named or role != PRESSURE else measured_in(table.unit(column)) == PRESSURE
         if is_one and not table.is_constant(column):
             yield column
 
