@@ -53,6 +53,7 @@ def test_measures_are_known_by_words_without_blanks_and_directions(tmp_path, hea
         "変位(mm),荷重(N)",
         "Verplaatsing (mm),Kracht (N)",
         "Déplacement (mm),Effort (N)",
+        "Deplacement (mm),Pruefkraft (N)",
     ],
 )
 def test_displacements_and_forces_are_known_by_many_names(tmp_path, head):
@@ -60,7 +61,15 @@ def test_displacements_and_forces_are_known_by_many_names(tmp_path, head):
     check(path, dimensions=SIZES)
 
 
-@pytest.mark.parametrize("head", ["Deformazione [%],Tensione [kPa]", "Rek (%),Spanning (kPa)", "ひずみ(%),応力(kPa)"])
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Deformazione [%],Tensione [kPa]",
+        "Rek (%),Spanning (kPa)",
+        "ひずみ(%),応力(kPa)",
+        "Deformacion (%),Tension (kPa)",
+    ],
+)
 def test_strains_and_stresses_are_known_in_many_languages_beside_forces(tmp_path, head):
     check(written(tmp_path, "test.csv", f"{head},x (mm),F (N)", 100 * (L - 1), P, D, N))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import tissuq as tq
 from tissuq.errors import InputError
 from tissuq.experiments.reading.experiment_file import read_experiment
 from tissuq.experiments.reading.torsion import apparent_stress, rim_stress
@@ -179,3 +180,15 @@ def test_a_rate_of_shear_without_a_time_that_goes_on_is_refused(tmp_path):
         read_experiment(rate_file(tmp_path, "Step,Shear rate [1/s],Stress [Pa]"), mode="simple-shear")
     with pytest.raises(InputError, match=r"line 4, column 'Step time .s.': the time goes back"):
         read_experiment(rate_file(tmp_path, time=np.array([0, 1, 0.5, 2, 3])), mode="simple-shear")
+
+
+@pytest.mark.parametrize("options", [{"mean_of": 6}, {"columns": {"sem": "SEM (mN m)"}}])
+def test_the_spread_of_torques_is_not_used_and_this_is_said(tmp_path, options):
+    torque = mooney_rivlin(SHEAR)[1]
+    rows = (f"{a:.12g},{b:.12g},{0.01 * b + 1:.12g}" for a, b in zip(TWIST, torque, strict=True))
+    file = tmp_path / "disc.csv"
+    file.write_text("\n".join(["Twist (rad),Torque (mN m),SEM (mN m)", *rows]))
+    test = {"mode": "simple-shear", "dimensions": SIZES}
+    assert any("column 'SEM (mN m)' is not used" in text for text in tq.inspect(file, **test).warnings)
+    with pytest.raises(InputError, match=r"not for the torque of a disc. Leave it out"):
+        tq.inspect(file, **test, **options)

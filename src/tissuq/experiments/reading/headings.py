@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from unicodedata import combining, normalize
+from unicodedata import normalize
 
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES, StrainMeasure
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
@@ -37,8 +37,21 @@ __all__ = [
 ]
 
 
+ACCENTS = re.compile(r"(?<=[A-Za-z])[\u0300-\u036f]+")
+"""Accents of Latin letters, where these are written apart from them."""
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe"})
+"""How keyboards without them write umlauts and their like."""
+
+
+def _without_accents(text: str) -> str:
+    """Return a text without the accents of Latin letters, and with plain digits for lowered ones."""
+    return normalize("NFKC", ACCENTS.sub("", normalize("NFKD", text)))
+
+
 def _names(text: str) -> frozenset[str]:
-    return frozenset(text.split(", "))
+    """Return names, as they are and as keyboards without accents and umlauts write them."""
+    names = [*text.split(", "), *text.translate(UMLAUTS).split(", ")]
+    return frozenset(names).union(map(_without_accents, names))
 
 
 ROLES = {
@@ -90,7 +103,7 @@ ROLES = {
     ),
     "outer_diameter": _names(
         "diameter, outer diameter, outside diameter, external diameter, vessel diameter, artery diameter, od, o.d., "
-        "durchmesser, außendurchmesser, aussendurchmesser, gefäßdurchmesser, diamètre, diamètre externe, "
+        "durchmesser, außendurchmesser, gefäßdurchmesser, diamètre, diamètre externe, "
         "diamètre extérieur, diámetro, diámetro externo, diámetro exterior, diametro, diametro esterno, diâmetro, "
         "diâmetro externo, 外径, 直径, 外徑, 直徑, 외경, 직경"
     ),
@@ -280,18 +293,8 @@ def dimensions_named(quantity: str, *, is_cylinder: bool = False) -> frozenset[s
     name = SYMBOL_AFTER.sub("", plain(OF_SPECIMEN.sub(" ", _without_accents(quantity))))
     if (along := MEASURED_ALONG.search(name)) and along["way"] in ROLES["displacement"] | ROLES["strain"]:
         name = name[: along.start()]
-    found = frozenset(dimension for dimension, names in _names_of_dimensions().items() if name in names)
-    return found | {"length"} if is_cylinder and name in map(_without_accents, HEIGHT_NAMES) else found
-
-
-@cache
-def _names_of_dimensions() -> dict[str, frozenset[str]]:
-    return {dimension: frozenset(map(_without_accents, names)) for dimension, names in DIMENSION_NAMES.items()}
-
-
-def _without_accents(text: str) -> str:
-    """Return a text without accents, and with plain digits for lowered ones."""
-    return "".join(filter(lambda letter: not combining(letter), normalize("NFKD", text)))
+    dimensions = frozenset(dimension for dimension, names in DIMENSION_NAMES.items() if name in names)
+    return dimensions | {"length"} if is_cylinder and name in HEIGHT_NAMES else dimensions
 
 
 def role_names(role: str) -> frozenset[str]:

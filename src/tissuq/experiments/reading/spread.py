@@ -73,14 +73,17 @@ def spread_of(
     InputError
         When a column that is given cannot be used.
     """
-    if choice.load == "pressure" and mean_of is not None:
-        raise InputError(
-            f"{table.file}: mean_of={mean_of} (--mean-of) is for stresses or forces, not for the pressure in a tube. "
-            "Leave it out."
-        )
-    if choice.stress_type == "torsion" or choice.load == "pressure":
-        return Spread()
     given = next((kind for kind in SPREADS if kind in mapping), None)
+    if choice.stress_type == "torsion" or choice.load == "pressure":
+        of_load = "the pressure in a tube" if choice.load == "pressure" else "the torque of a disc"
+        if given or mean_of is not None:
+            option = f"--column {given}={mapping[given]}" if given else f"mean_of={mean_of} (--mean-of)"
+            raise InputError(f"{table.file}: {option} is for stresses or forces, not for {of_load}. Leave it out.")
+        spread = _recognised(table, choice)
+        if spread.column is None:
+            return spread
+        unused = f"column {table.label(spread.column)} is not used: standard deviations and standard errors"
+        return replace(spread, problem=f"{unused} are taken of stresses or forces, not of {of_load}.")
     if given:
         column = find_column(table, given, mapping[given])
         return _with_errors(table, choice, Spread(column, given), mapping, load, mean_of)
