@@ -86,7 +86,8 @@ STRAIN_MEASURES = {
     for measure in (
         StrainMeasure(
             name="engineering",
-            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称",
+            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|unitari[ao]|"
+            r"unitaire|relative|工程|公称",
             stretch=lambda strain: 1 + strain,
             strain=lambda stretch: stretch - 1,
             formula="1 + {}",
