@@ -86,6 +86,22 @@ def test_directions_in_a_wall_are_axes(tmp_path):
     check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1))
 
 
+@pytest.mark.parametrize(
+    ("names", "stress_type"), [("P1,P2", None), ("P_x,P_y", None), ("S1,S2", "second-piola-kirchhoff")]
+)
+def test_a_letter_beside_two_axes_is_a_stress_by_its_unit(tmp_path, names, stress_type):
+    across, symbols = 1 + (L - 1) / 2, names.split(",")
+    divisors = (L, across) if stress_type else (1, 1)
+    heads = f"lambda_1,lambda_2,{symbols[0]} (kPa),{symbols[1]} (kPa)"
+    path = written(tmp_path, "sheet.csv", heads, L, across, P / divisors[0], P / 2 / divisors[1])
+    options = {} if stress_type is None else {"stress_type": stress_type}
+    stretch, stress = np.stack([L, across], axis=1), np.stack([P, P / 2], axis=1)
+    check(path, "biaxial", stretch, stress, mode="biaxial", **options)
+    if stress_type:
+        with pytest.raises(InputError, match="may be a stress of several types"):
+            tq.read(path, mode="biaxial")
+
+
 def test_a_plane_that_slides_over_another_is_sheared(tmp_path):
     path = written(tmp_path, "shear.csv", "Shear displacement (mm),Shear force (N)", D, N)
     check(path, "simple-shear", L - 1, dimensions=SIZES)

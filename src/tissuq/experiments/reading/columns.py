@@ -12,6 +12,8 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.headings import (
+    AXES,
+    COMPONENTS,
     heading,
     measure_in,
     of_spread,
@@ -37,6 +39,7 @@ from tissuq.experiments.reading.recognition import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import PRESSURE, with_columns_of_tube
+from tissuq.experiments.units import measured_in
 
 __all__ = [
     "ColumnChoice",
@@ -263,6 +266,8 @@ def _choice(
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:
     """Return what the columns' names say they hold; of the columns of two axes only those of the one asked for."""
     names, axes = [on_axis(name) for name, _ in _names(table)], _axes_of(table)
+    if len(axes) == 2:
+        names = [_on_axis_by_unit(table, column, *name) for column, name in enumerate(names)]
     if not mapping:
         names = _without_empty(table, names)
     if axis is not None and axis not in axes:
@@ -277,6 +282,13 @@ def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]
         )
     wanted = axis or (axes[0] if len(axes) == 1 else "")
     return [name if axis_of_name in ("", wanted) else "" for axis_of_name, name in names]
+
+
+def _on_axis_by_unit(table: Table, column: int, axis: str, name: str) -> tuple[str, str]:
+    """Return the axis and the name of a column: where others have axes, ``P1`` with a unit of stress is along one."""
+    symbol, number = name[:1], name[1:].strip()
+    is_component = not axis and symbol in COMPONENTS["stress"] and number in AXES
+    return (AXES[number], symbol) if is_component and measured_in(table.unit(column)) == "stress" else (axis, name)
 
 
 def _without_empty(table: Table, names: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:

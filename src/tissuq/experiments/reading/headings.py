@@ -12,6 +12,7 @@ from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMe
 from tissuq.experiments.units import BRACKETS, looks_like_unit
 
 __all__ = [
+    "AXES",
     "COMPONENTS",
     "CYCLE_NAMES",
     "DIMENSION_NAMES",
