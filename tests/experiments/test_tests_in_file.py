@@ -130,6 +130,10 @@ def test_missing_rows_are_left_out_and_many_with_a_missing_cell_are_not(tmp_path
     test = find_tests_in_file(written(tmp_path / "b.csv", rows))[0].reading
     assert len(test.experiment) == 58
     assert test.warnings[1] == "1 row without a value of 'stretch' or 'stress [kPa]' left out, in line 21."
+    for read in (tq.read, tq.read_tests):
+        with pytest.warns(UserWarning, match="left out") as caught:
+            read(tmp_path / "b.csv")
+        assert [str(warning.message) for warning in caught] == list(test.warnings)
     for row in (31, 32, 33, 40):
         rows[row] = ["1.1", ""]
     lines = "21,32:34,41"

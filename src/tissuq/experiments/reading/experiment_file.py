@@ -82,6 +82,7 @@ class Reading:
     cycles : tuple of Cycle
         Of the recorded rows.
     warnings : tuple of str
+        What was left out or taken for what, such as rows without values.
     tested : tuple of TestedStress
         Each stress of these rows.
     mode_source : str
@@ -89,7 +90,7 @@ class Reading:
     spreads : tuple of Spread
         Standard errors of each stress, where it is the mean of several specimens.
     doubts : tuple of str
-        What was assumed, and where sizes as given differ from those in the file: `read` warns of it.
+        What was assumed, and where sizes as given differ from those in the file.
     """
 
     experiment: Experiment
@@ -103,6 +104,11 @@ class Reading:
     mode_source: str = ""
     spreads: tuple[Spread, ...] = ()
     doubts: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What `read` warns of: doubts, and what was left out."""
+        return *self.doubts, *self.warnings
 
     @property
     def used_cycles(self) -> Sequence[Cycle]:
@@ -221,7 +227,8 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     Warns
     -----
     UserWarning
-        Of a unit or a zero of displacements that was assumed, and of dimensions that the file states otherwise.
+        Of a unit or a zero of displacements that was assumed, of dimensions that the file states otherwise, and of rows
+        and columns that cannot be used and are left out.
 
     Raises
     ------
@@ -241,7 +248,7 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
     [0.0, 0.0025, 0.0055]
     """
     reading = read_file(path, **options)
-    for text in reading.doubts:
+    for text in reading.notes:
         warnings.warn(text, stacklevel=2)
     return reading.experiment
 

@@ -39,7 +39,7 @@ def data_warnings(reading: Reading) -> tuple[str, ...]:
     texts = (labelled(labels, [check(reading, number) for number in range(len(labels))]) for check in CHECKS)
     kinds = dict.fromkeys(region.kind for regions in reading.regions for region in regions)
     happened = (labelled(labels, [_of_kind(regions, kind) for regions in reading.regions]) for kind in kinds)
-    return (*reading.doubts, *reading.warnings, *filter(None, chain.from_iterable((*happened, *texts))))
+    return (*reading.notes, *filter(None, chain.from_iterable((*happened, *texts))))
 
 
 def _of_kind(regions: Sequence[Region], kind: str) -> str:

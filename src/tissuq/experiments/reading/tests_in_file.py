@@ -66,7 +66,8 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     Warns
     -----
     UserWarning
-        Of units or a zero of displacements that were assumed, and of dimensions that the file states otherwise.
+        Of units or a zero of displacements that were assumed, of dimensions that the file states otherwise, and of
+        rows, columns and tables that cannot be used and are left out.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     tests = find_tests_in_file(path, **plain)
     noted: dict[str, list[str]] = {}
     for test in tests:
-        for text in test.reading.doubts:
+        for text in test.reading.notes:
             noted.setdefault(text, []).append(test.name)
     for text, names in noted.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=2)
@@ -170,9 +171,7 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
     notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in refused]
-    first = tests[0]
-    reading = replace(first.reading, warnings=(*first.reading.warnings, *notes))
-    return [first._replace(reading=reading), *tests[1:]]
+    return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
 
 
 def _are_few(rows: int, longest: int) -> bool:
