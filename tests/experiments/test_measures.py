@@ -205,6 +205,10 @@ def test_words_for_measures_are_known_in_several_languages(quantity, meaning):
         ("déformation vraie (%)", "contrainte vraie (MPa)", ("true", "cauchy")),
         ("Green-Lagrange strain (%)", "PK2 (MPa)", ("green", "second-piola-kirchhoff")),
         ("Hencky_strain_%", "Cauchy_stress_MPa", ("true", "cauchy")),
+        ("Green strain E11 (%)", "Cauchy stress T11 (MPa)", ("green", "cauchy")),
+        ("Green-Lagrange strain E_xx [%]", "PK2 stress S11 (MPa)", ("green", "second-piola-kirchhoff")),
+        ("Green strain E_GL (%)", "2nd Piola-Kirchhoff stress S_11 [MPa]", ("green", "second-piola-kirchhoff")),
+        ("E11 (Green) [%]", "Cauchy T11 [MPa]", ("green", "cauchy")),
     ],
 )
 def test_names_that_say_the_measure_need_no_option(tmp_path, strain, stress, expected):
@@ -213,6 +217,28 @@ def test_names_that_say_the_measure_need_no_option(tmp_path, strain, stress, exp
     data = read_experiment(file)
     np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
     np.testing.assert_allclose(data.stress, P11, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["F11", "F_11 [-]", "Fxx", "lambda11", "λ_11"])
+def test_a_diagonal_component_of_the_deformation_gradient_is_a_stretch(tmp_path, name):
+    data = read_experiment(written(tmp_path, **{name: STRETCH, "P11 [MPa]": P11}))
+    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-9)
+    np.testing.assert_allclose(data.stress, P11, atol=1e-12)
+
+
+def test_what_is_called_like_a_component_but_has_a_unit_of_force_is_a_force(tmp_path):
+    file = written(tmp_path, **{"stretch": STRETCH, "Fxx (N)": 10 * np.array(P11)})
+    data = read_experiment(file, dimensions={"area": "10 mm2"})
+    np.testing.assert_allclose(data.stress, P11, atol=1e-9)
+
+
+def test_components_of_both_axes_are_a_biaxial_test(tmp_path):
+    points = np.column_stack([STRETCH, np.sqrt(STRETCH)])
+    names = ("F11", "F22", "Cauchy stress T11 [MPa]", "Cauchy stress T22 [MPa]")
+    file = written(tmp_path, **dict(zip(names, (*points.T, *(points**2 - 1).T), strict=True)))
+    data = read_experiment(file, mode="biaxial")
+    np.testing.assert_allclose(data.stretch, points, rtol=1e-9)
+    np.testing.assert_allclose(data.stress, points - 1 / points, atol=1e-9)
 
 
 def test_the_engineering_pair_goes_before_the_true_one(tmp_path):

@@ -20,6 +20,7 @@ from tissuq.experiments.reading.headings import (
     on_axis,
     plain,
     role_names,
+    without_gradient,
     without_mean,
 )
 from tissuq.experiments.reading.layout import split
@@ -190,6 +191,8 @@ def _names(table: Table) -> list[tuple[str, str]]:
     Beside columns of a spread without words for a mean.
     """
     quantities = [heading(name).quantity for name in table.names]
+    is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]
+    quantities = [without_gradient(name) if ratio else name for name, ratio in zip(quantities, is_ratio, strict=True)]
     is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]
     if any(is_spread):
         quantities = [without_mean(quantity) or quantity for quantity in quantities]

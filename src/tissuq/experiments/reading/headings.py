@@ -34,6 +34,7 @@ __all__ = [
     "on_lettered_axis",
     "plain",
     "role_names",
+    "without_gradient",
     "without_mean",
 ]
 
@@ -231,8 +232,12 @@ MEASURE_IN_BRACKETS = re.compile(
 """As in ``Strain (true) [%]``."""
 CHANNEL = re.compile(r"\([^():]+:[^()]+\)(?=\s*[(\[])")
 """A channel of the machine before the unit, as in ``Position(Linear:Position) (mm)``."""
-SYMBOL = re.compile(r" [espftλσεγτ]$")
+SYMBOL = re.compile(r" ([espftλσεγτ]|e ?gl)$")
 """A symbol after a name, as in ``Green strain E``."""
+COMPONENT = re.compile(r" (sigma|eps|[espft]|[σετ]) ?([1x]{2}|[2y]{2})$")
+"""Likewise, of what is along an axis, as in ``Cauchy stress T11``."""
+DEFORMATION_GRADIENT = re.compile(r"f ?(11|22|xx|yy)")
+"""Its components that are stretches, where they have no unit as forces do."""
 UNIT_IN_HEADING = (
     re.compile(r"(?P<quantity>.+?)\s*[\[({<](?P<unit>[^\])}>]*)[\])}>]?"),
     re.compile(r"(?P<quantity>[^/]+?)(?:,\s*|\s+in\s+)(?P<unit>\S+)"),
@@ -298,6 +303,17 @@ def dimensions_named(quantity: str, *, is_cylinder: bool = False) -> frozenset[s
     return dimensions | {"length"} if is_cylinder and name in HEIGHT_NAMES else dimensions
 
 
+def without_gradient(quantity: str) -> str:
+    """Return the name of a column without a unit, a component of the deformation gradient as a stretch along its axis.
+
+    Examples
+    --------
+    >>> without_gradient("f11"), without_gradient("f yy"), without_gradient("f1")
+    ('stretch 11', 'stretch yy', 'f1')
+    """
+    return DEFORMATION_GRADIENT.sub(r"stretch \1", quantity) if DEFORMATION_GRADIENT.fullmatch(quantity) else quantity
+
+
 def role_names(role: str) -> frozenset[str]:
     """Return the names that columns of a role may have."""
     return ROLES[role]
@@ -317,12 +333,14 @@ def measure_in(quantity: str) -> tuple[str, str]:
             if not match:
                 continue
             noun = plain(LINK.sub(" ", f"{quantity[: match.start()]} {quantity[match.end() :]}"))
+            noun = COMPONENT.sub(r" \2", noun)
             axis, name = on_axis(noun)
             if name in ROLES[role]:
                 return noun, measure.name
             if SYMBOL.sub("", name) in ROLES[role]:
                 return SYMBOL.sub("", noun), measure.name
-            if name in NOUNS.get(role, ()) or (not noun and SAYS_ALONE.fullmatch(match[0])):
+            is_component = bool(axis) and name in COMPONENTS.get(role, ())
+            if name in NOUNS.get(role, ()) or is_component or (not noun and SAYS_ALONE.fullmatch(match[0])):
                 return f"{role} {axis}".strip(), measure.name
     return quantity, ""
 
