@@ -156,7 +156,7 @@ def test_the_source_tells_that_cauchy_stress_was_divided_by_stretch():
 
 def test_the_source_tells_that_the_sign_was_changed():
     data = read_experiment(LAB_FILES / "compression_positive.csv", compression_positive=True)
-    assert "sign changed at stretch < 1" in data.source
+    assert "sign of stress changed: compression is positive" in data.source
 
 
 def test_mode_and_name_are_those_given():
@@ -299,7 +299,6 @@ def test_a_heading_with_millipascal_is_asked_about(written):
             {"stress_type": "Kirchhoff"},
             "stress_type must be one of engineering, cauchy, second-piola-kirchhoff, torsion, not 'Kirchhoff'",
         ),
-        ({"compression_positive": True}, "the stress is already negative in the file"),
         ({"skip_rows": -1}, "skip_rows must be a number of lines"),
         ({"skip_rows": 99}, "holds only comments and blank lines"),
     ],

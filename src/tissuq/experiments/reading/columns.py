@@ -57,6 +57,11 @@ NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak
 NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
 SHEAR_STRESS = re.compile(r"shear|lateral|horizontal|schub|scher|quer|cisaillement|cort[ae]|taglio|cisalhamento|τ|tau")
+ON_SPECIMEN = re.compile(
+    r"exten[sz]om|estensim|aufnehmer|video|opti[ck]|[oó]ptic|ottic|camera|kamera|laser|marker|clip|gau?ge|lvdt|\bdic\b|"
+    r"伸び計|引伸[计計]"
+)
+"""Names of a deformation that is measured on the specimen itself, not by the displacement of the machine."""
 NORMAL = re.compile(r"normal|axial|^f ?[nz]$")
 OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
@@ -257,6 +262,8 @@ def _choice(
             name = contents.quantities[deformation]
             measure = next((measure for measure in measures if name in role_names(measure)), "strain")
             measure = "shear" if is_shear and measure == "strain" else measure
+        if measure == "displacement":
+            _check_machine(table, contents.quantities, deformation)
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "
@@ -264,6 +271,31 @@ def _choice(
         )
     _check_test(table, stress, mapping, is_shear)
     return _with_types(table, ColumnChoice(deformation, stress, measure, load), contents)
+
+
+def _check_machine(table: Table, quantities: Sequence[str], displacement: int) -> None:
+    """Ask which is read where an extensometer or a camera measures the specimen beside the machine's displacement."""
+    roles = {"length": "displacement", "strain": "strain"}
+    seen = {column: roles.get(measured_in(table.unit(column))) for column in _columns_on_specimen(table, quantities)}
+    seen = {column: role for column, role in seen.items() if role}
+    if displacement in _columns_on_specimen(table, quantities) or not seen:
+        return
+    labels = " and ".join(map(table.label, seen))
+    choices = [("displacement", displacement), *((str(role), column) for column, role in seen.items())]
+    flags = " or ".join(f'--column {role}="{table.names[column]}"' for role, column in choices)
+    raise InputError(
+        f"{table.file}: column {table.label(displacement)} is the displacement of the machine, and {labels} was "
+        "measured on the specimen, by an extensometer or a camera. They give different stretches. Say which is read: "
+        f"{flags}."
+    )
+
+
+def _columns_on_specimen(table: Table, quantities: Sequence[str]) -> list[int]:
+    return [
+        column
+        for column, quantity in enumerate(quantities)
+        if ON_SPECIMEN.search(quantity) and not table.is_constant(column)
+    ]
 
 
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:

@@ -47,8 +47,8 @@ def with_compression_negative(
 
     The direction is that of the load as names say it: compression, tension or an empty text.
 
-    Where the file counts compression as positive, stresses at stretches below 1 change their sign. Where its strains
-    or displacements are positive, too, they do as well.
+    Where the file counts compression as positive, all stresses change their sign: only those at stretches below 1 where
+    those above are positive, too. Strains and displacements do as well where compression is positive there.
 
     Raises
     ------
@@ -84,8 +84,18 @@ def with_compression_negative(
         return replace(measured, stretch=_of_other_sign(measured.stretch, choice), stress=stress).with_step(
             f"{what} changed: compression is positive"
         )
-    stress = np.where(strain < 0, -measured.stress, measured.stress)
-    return replace(measured, stress=stress).with_step("sign changed at stretch < 1")
+    limit = NEGLIGIBLE_STRAIN * np.abs(strain).max()
+    in_tension, in_compression = (
+        float((measured.stress * strain)[side].sum()) for side in (strain > limit, strain < -limit)
+    )
+    if in_tension > 0 and (in_compression < 0 or says_direction):
+        stress = np.where(strain < 0, -measured.stress, measured.stress)
+        return replace(measured, stress=stress).with_step("sign changed at stretch < 1")
+    turned = replace(measured, stress=-measured.stress)
+    if in_tension > 0 and not says_direction:
+        turned = replace(turned, stretch=_of_other_sign(measured.stretch, choice))
+        return turned.with_step(f"signs of {choice.measure} and {choice.load} changed: compression is positive")
+    return turned.with_step(f"sign of {choice.load} changed: compression is positive")
 
 
 def _of_other_sign(stretch: Column, choice: ColumnChoice) -> Column:
