@@ -192,3 +192,13 @@ def test_the_spread_of_torques_is_not_used_and_this_is_said(tmp_path, options):
     assert any("column 'SEM (mN m)' is not used" in text for text in tq.inspect(file, **test).warnings)
     with pytest.raises(InputError, match=r"not for the torque of a disc. Leave it out"):
         tq.inspect(file, **test, **options)
+
+
+@pytest.mark.parametrize("stress_type", [None, "engineering", "torsion"])
+def test_a_torque_beside_the_stress_raises_a_note_until_the_type_of_stress_is_said(tmp_path, stress_type):
+    shear = np.linspace(0.01, 0.5, 30)
+    path = tmp_path / "shear.csv"
+    rows = "".join(f"{100 * g:.6f},{1000 * g:.6f},{g:.6f}\n" for g in shear)
+    path.write_text(f"Shear strain (%),Shear stress (Pa),Torque (mN m)\n{rows}")
+    warnings = tq.inspect(path, mode="simple-shear", stress_type=stress_type).warnings
+    assert any("--stress-type torsion, which corrects it" in text for text in warnings) is (stress_type is None)

@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from tissuq.errors import InputError
-from tissuq.experiments.units import looks_like_unit, strain_factor, stress_unit
+from tissuq.experiments.units import FORCE, LENGTH, looks_like_unit, strain_factor, stress_unit
 
 MPA = {
     "MPa": 1.0,
@@ -90,6 +90,7 @@ def test_what_is_not_a_stress_is_refused(text, words):
     [
         *[("", 1), ("1", 1), ("-", 1), ("mm/mm", 1), ("mm / mm", 1), ("%", 0.01), ("percent", 0.01), ("‰", 0.001)],
         *[("\N{MICRO SIGN}ε", 1e-6), ("\N{GREEK SMALL LETTER MU}ε", 1e-6), ("microstrain", 1e-6)],
+        *[("mε", 1e-3), ("millistrain", 1e-3), ("permille", 1e-3), ("mm/m", 1e-3)],
     ],
 )
 def test_a_strain_unit_is_converted_to_a_ratio(text, factor):
@@ -125,3 +126,22 @@ def test_arithmetic_of_numbers_in_a_unit_is_not_carried_out(unit, monkeypatch):
     monkeypatch.setattr("tissuq.experiments.units._pint_registry", lambda: pytest.fail("it was evaluated"))
     with pytest.raises(InputError, match="is not known"):
         stress_unit(unit)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text", "factor"),
+    [
+        *[(LENGTH, text, 1e-3) for text in ("micron", "Microns", "µm", "micrometre")],
+        *[(LENGTH, text, 25.4) for text in ("in", "inch", "Inches")],
+        *[(FORCE, text, 0.45359237 * 9.80665) for text in ("lbf", "lbF", "LBF")],
+        *[(FORCE, text, 9.80665) for text in ("kgf", "KGF")],
+        *[(FORCE, text, factor) for text, factor in (("mN", 1e-3), ("kN", 1e3), ("newtons", 1.0))],
+    ],
+)
+def test_other_spellings_of_units_have_their_size(quantity, text, factor):
+    assert quantity.factor(text) == pytest.approx(factor, rel=1e-12)
+
+
+def test_capital_letters_tell_prefixes_apart():
+    assert FORCE.factor_or_none("MN") is None
+    assert LENGTH.factor_or_none("MM") is None

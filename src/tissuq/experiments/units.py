@@ -72,8 +72,12 @@ PASCALS = {unit.lower(): unit for unit in COMMON_STRESS_UNITS if unit.endswith("
 
 STRAIN_UNITS = dict.fromkeys(["", "1", "-", "mm/mm"], 1.0)
 STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
-STRAIN_UNITS |= {"‰": 1e-3} | dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
+STRAIN_UNITS |= dict.fromkeys(["‰", "permille", "mε", "millistrain"], 1e-3)
+STRAIN_UNITS |= dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
 
+SPELLINGS = dict.fromkeys(["micron", "microns", "micrometer", "micrometre"], "um") | {"inch": "in", "inches": "in"}
+SPELLINGS |= {"lbf": "lbf", "kgf": "kgf", "newton": "N", "newtons": "N", "millimeter": "mm", "millimetre": "mm"}
+"""Units in other spellings, in small letters."""
 LONGEST_UNIT = 40
 """Characters."""
 UNIT_EXPRESSION = re.compile(
@@ -84,8 +88,28 @@ UNIT_EXPRESSION = re.compile(
 SYMBOLS = (
     {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
     | {"bar", "mbar", "atm", "mmHg", "mmhg", "Hg", "torr", "Torr", "cmH2O", "mmH2O"}
-    | {"N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lb", "kg", "g"}
-    | {"m", "cm", "mm", "um", "nm", "in", "inch", "ft", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F"}
+    | {"N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lbF", "lb", "kg", "g"}
+    | {
+        "m",
+        "cm",
+        "mm",
+        "um",
+        "micron",
+        "nm",
+        "in",
+        "inch",
+        "ft",
+        "h",
+        "min",
+        "sec",
+        "Sec",
+        "s",
+        "ms",
+        "Hz",
+        "K",
+        "C",
+        "F",
+    }
     | {"Nm", "mNm", "uNm", "nNm", "kNm", "Ncm", "mNcm", "Nmm", "mNmm"}
     | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
 )
@@ -224,7 +248,8 @@ class Quantity:
 
     def factor_or_none(self, text: str) -> float | None:
         """Return what one unit of that name is in the unit of this quantity; None for other quantities."""
-        return self.factors.get(re.sub(self.ignored, "", text).replace("µ", "u").replace("μ", "u").replace("²", "2"))
+        compact = re.sub(self.ignored, "", text).replace("µ", "u").replace("μ", "u").replace("²", "2")
+        return self.factors.get(SPELLINGS.get(compact.lower(), compact))
 
     def factor(self, text: str) -> float:
         """Return what one unit of that name is in the unit of this quantity.

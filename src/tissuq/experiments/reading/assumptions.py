@@ -11,6 +11,7 @@ from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
 from tissuq.experiments.reading.measures import MPA_ASSUMED
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
 from tissuq.experiments.reading.positions import ZERO_ASSUMED
+from tissuq.experiments.reading.stated_mode import is_torque
 from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 
@@ -20,8 +21,11 @@ DOUBTFUL_UNIT = "check the unit:"
 """How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000."""
 
 
-def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> tuple[str, ...]:
-    """Return a sentence about everything that the steps of reading say was assumed, units first."""
+def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_type: str | None) -> tuple[str, ...]:
+    """Return a sentence about everything that the steps of reading say was assumed, units first.
+
+    The type of stress is that which is asked for, if one is.
+    """
     source = "; ".join(measured.steps)
     found = []
     if MPA_ASSUMED in source:
@@ -42,6 +46,8 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> tupl
             f"{source[: source.index(UNIT_ASSUMED)].split()[-1].lstrip('(')}. If it is another, read one specimen at a "
             'time, and give its sizes: --length "20 mm", --area "10 mm2".'
         )
+    if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
+        found += [_about_rim(name) for name in measured.table.names if is_torque(name)]
     if ZERO_ASSUMED in source:
         found += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
     return tuple(found)
@@ -53,4 +59,12 @@ def _about_zero(measured: MeasuredRows, choice: ColumnChoice) -> str:
         f"column {table.label(column)} does not begin at 0, and the load there is small: it was taken for positions, "
         "and counted from its first row. To say so give --zero first; if it holds displacements, --zero '0 mm'; if it "
         f"holds the length or height of the specimen, --column 'length={table.key(column)}'."
+    )
+
+
+def _about_rim(torque: str) -> str:
+    return (
+        f"column '{torque}' stands beside the shear stress, which a rheometer states as if a twisted disc were of a "
+        "linear material. If a disc was twisted, give --stress-type torsion, which corrects it; if not, --stress-type "
+        "engineering."
     )

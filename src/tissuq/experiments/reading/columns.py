@@ -262,6 +262,8 @@ def _choice(
             name = contents.quantities[deformation]
             measure = next((measure for measure in measures if name in role_names(measure)), "strain")
             measure = "shear" if is_shear and measure == "strain" else measure
+        if measure == "displacement" and measured_in(table.unit(deformation)) == "strain":
+            measure = "strain"
         if measure == "displacement":
             _check_machine(table, contents.quantities, deformation)
     if deformation == stress:

@@ -343,7 +343,7 @@ def read_rows(
         least_errors=errors | least_errors(tested),
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
     problems = (spread.problem for spread in spreads if spread.problem)
-    doubts = *assumptions(used, choices), *dimensions.contradictions
+    doubts = *assumptions(used, choices, types[1]), *dimensions.contradictions
     about_loads = filter(None, (load.note for load in loads))
     notes = *table.notes, *problems, *about_loads
     return Reading(

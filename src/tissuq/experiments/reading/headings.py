@@ -57,13 +57,17 @@ def _names(text: str) -> frozenset[str]:
 
 
 ROLES = {
-    "stretch": _names("stretch, stretch ratio, lambda, λ"),
+    "stretch": _names(
+        "stretch, stretch ratio, extension ratio, lambda, λ, streckung, étirement, estiramiento, stiramento"
+    ),
     "strain": _names(
         "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung, eps, "
         "epsilon, ε, déformation, deformación, deformação, deformazione, rek, töjning, tøyning, 应变, 應變, ひずみ, "
         "歪み, 歪, 변형률"
     ),
-    "shear": _names("shear, amount of shear, shear strain, gamma, γ"),
+    "shear": _names(
+        "shear, amount of shear, shear strain, gamma, γ, scherung, schiebung, scherdeformation, cisaillement"
+    ),
     "twist": _names(
         "twist, twist angle, angle of twist, torsion angle, rotation, rotation angle, angle, angular displacement, "
         "angular position, deflection angle, encoder, drehwinkel, verdrehwinkel, torsionswinkel, auslenkwinkel, "
@@ -80,8 +84,8 @@ ROLES = {
     "displacement": _names(
         "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
-        "axial position, crosshead position, stroke, déplacement, allongement, desplazamiento, alargamiento, "
-        "deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
+        "axial position, crosshead position, stroke, travel, traverse, déplacement, allongement, desplazamiento, "
+        "alargamiento, deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
         "位移, 變位, 変位, 伸び, 伸长, 변위"
     ),
     "length": _names(

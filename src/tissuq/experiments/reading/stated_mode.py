@@ -31,6 +31,7 @@ __all__ = [
     "comment_on_mode",
     "direction_of",
     "find_mode",
+    "is_torque",
     "mode_in_comment",
     "mode_of",
 ]
@@ -120,9 +121,14 @@ def direction_of(*texts: str) -> str:
     return last.pop() if len(last) == 1 else ""
 
 
+def is_torque(name: str) -> bool:
+    """Return whether the name of a column is that of a torque."""
+    return measure_in(heading(name).quantity)[0] in role_names("torque")
+
+
 def check_not_sheared(table: Table) -> None:
     """Refuse strains and stresses of which nothing says the mode, and that a rheometer seems to have measured."""
-    torque = [name for name in table.names if measure_in(heading(name).quantity)[0] in role_names("torque")]
+    torque = [name for name in table.names if is_torque(name)]
     lines = [f"line {line} says '{text.strip()}'" for line, text in table.head if RHEOMETER.search(text.lower())]
     signs = lines or [f"column '{name}' is a torque" for name in torque]
     if signs:
