@@ -264,3 +264,38 @@ def test_japanese_of_windows_is_read_and_latin_letters_are_none(tmp_path):
         (tmp_path / "a.csv").write_bytes(content.encode(encoding))
         table = find_tests_in_file(tmp_path / "a.csv", columns={"strain": 1, "stress": 2})[0].reading.table
         assert table.names[0] == name
+
+
+@pytest.mark.parametrize("above", ["", ",,Results,", ",,Results"])
+@pytest.mark.parametrize("results", [["Modulus (kPa),120", "Peak,3.2"], ["", "Modulus,120,kPa", "Peak,3.2,kPa"]])
+def test_results_typed_beside_the_rows_are_no_cells_of_them(tmp_path, above, results):
+    stretch = np.linspace(1, 1.3, 31)
+    stress = 50 * (stretch - stretch**-2)
+    rows = [f"{x:.8g},{y:.8g}" for x, y in zip(stretch, stress, strict=True)]
+    beside = [f"{row},,{text}" for row, text in zip(rows, results, strict=False)] + rows[len(results) :]
+    path = tmp_path / "test.csv"
+    path.write_text("\n".join([f"Stretch,Stress (kPa){above}", *beside]) + "\n", encoding="utf-8")
+    data = tq.read(path)
+    np.testing.assert_allclose(data.stretch, stretch, rtol=1e-7)
+    np.testing.assert_allclose(data.stress, stress / 1000, rtol=1e-7)
+
+
+def test_a_sheet_of_statistics_is_left_out_beside_a_long_test(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet, statistics = book.active, book.create_sheet("Statistik")
+    sheet.title = "Probe 1"
+    for row in (["Stretch", "Stress (kPa)"], *([1 + k / 200, float(k)] for k in range(60))):
+        sheet.append(row)
+    for row in (
+        ["Serie", "Fm", "dL bei Fm"],
+        ["n = 2", "N", "mm"],
+        ["x", 3.1, 2.2],
+        ["s", 0.4, 0.3],
+        ["v", 12.9, 13.6],
+    ):
+        statistics.append(row)
+    book.save(path := tmp_path / "series.xlsx")
+    with pytest.warns(UserWarning, match="sheet 'Statistik' is left out: it is short"):
+        (test,) = tq.read_tests(path)
+    assert len(test) == 60

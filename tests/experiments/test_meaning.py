@@ -192,3 +192,22 @@ def test_components_of_tensors_are_of_axes_once_their_measures_are_said(tmp_path
             tq.read(path, **options)
         options |= option
     check(path, "biaxial", np.stack([L, across], axis=1), np.stack([P, P], axis=1), **options)
+
+
+@pytest.mark.parametrize("head", ["Stretch λ [-],Stress [kPa]", "λ [-],Spannung σ [kPa]", "Streckung λ,Stress σ (kPa)"])
+def test_a_symbol_after_a_name_leaves_it_what_it_is(tmp_path, head):
+    check(written(tmp_path, "test.csv", head, L, P))
+
+
+def test_a_displacement_in_simple_shear_is_asked_about_as_sliding_and_the_advice_reads_it(tmp_path):
+    path = written(tmp_path, "test.csv", "Displacement (mm),Force (N)", 10 * (L - 1), N)
+    options = {"mode": "simple-shear", "dimensions": SIZES}
+    with pytest.raises(InputError, match="--column sliding=NAME"):
+        tq.read(path, **options)
+    check(path, "simple-shear", L - 1, sliding="Displacement (mm)", **options)
+
+
+def test_a_name_that_stands_twice_is_asked_about_in_its_role(tmp_path):
+    path = written(tmp_path, "test.csv", "Strain (%),Strain (%),Stress (kPa)", 100 * (L - 1), 50 * (L - 1), P)
+    with pytest.raises(InputError, match=r"several columns may be the strain: .* --column strain=NAME"):
+        tq.read(path, columns={"strain": "Strain (%)"})

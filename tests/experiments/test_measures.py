@@ -270,7 +270,7 @@ def test_the_engineering_pair_goes_before_the_true_one(tmp_path):
             {"strain_type": "angle", "strain_unit": "rad"},
             "does not tell a stretch",
         ),
-        ("strain,Shear stress [MPa]", {}, "is a shear stress"),
+        ("strain,Shear stress [MPa]", {}, "is a load in shear"),
         ("Truestrain (%),Engineering stress (MPa)", {}, "may be a strain of several types"),
         ("stretch,Truestress (MPa)", {}, "'Truestress (MPa)' may be a stress of several types"),
         ("stretch,Truestress (MPa)", {"columns": {"stress": 2}}, "'Truestress (MPa)' may be a stress of several types"),

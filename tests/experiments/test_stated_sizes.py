@@ -230,3 +230,18 @@ def test_a_file_that_states_what_is_given_warns_of_nothing(tmp_path):
         tq.read(written(tmp_path, text), area="10 mm2", length="20 mm")
     with pytest.warns(UserWarning, match="the length is 25 mm .as given., but the file says 20 mm .in line 1."):
         tq.read(written(tmp_path, text), length="25 mm")
+
+
+def test_sizes_in_one_line_are_read_between_semicolons_and_commas(tmp_path):
+    text = rows(LENGTH * (STRETCH - 1), forces(5), separator=",")
+    for head in ("Width 5 mm; thickness 2 mm; gauge length 20 mm", "sheet, width 5 mm, thickness 2 mm, length 20 mm"):
+        data = tq.read(written(tmp_path, f"{head}\nDisplacement (mm),Force (N)\n{text}"))
+        np.testing.assert_allclose(data.stress, STRESS, rtol=1e-6)
+
+
+@pytest.mark.parametrize("product", ["5 x 2 mm", "5 mm x 2 mm", "5×2 mm", "5 * 2 mm"])
+def test_a_product_of_sizes_is_not_quoted_as_one_of_them(tmp_path, product):
+    text = rows(LENGTH * (STRETCH - 1), forces(5), separator=",")
+    path = written(tmp_path, f"Specimen {product}\nDisplacement (mm),Force (N)\n{text}")
+    with pytest.raises(InputError, match="None is recognised in the file"):
+        tq.read(path, dimensions={"length": "20 mm"})

@@ -1,11 +1,12 @@
-"""What a table holds beside its columns: statements about the specimen behind an empty column."""
+"""What a table holds beside its columns: statements about the specimen, or results, behind an empty column."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import methodcaller
 
-from tissuq.experiments.reading.layout import joined, split
+from tissuq.experiments.reading.layout import WHITESPACE, joined, split
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import NUMBER
 
@@ -20,11 +21,14 @@ GAPS = 2
 def without_statements_beside(table: Table) -> Table:
     """Return the table without statements such as ``Width (mm) | 5`` to its right, which are added to the lines above.
 
-    They stand behind a column without name and cells, from the first rows on, and each begins with a word.
+    They stand behind a column without name and cells, from the first rows on, and each begins with a word. A name may
+    stand over them, or none.
     """
-    for gap in range(1, len(table.names) - 2):
-        if table.names[gap] or not any(table.names[gap + 1 :]):
-            continue
+    gaps = [gap for gap in range(1, len(table.names) - 1) if not table.names[gap] and any(table.names[gap + 1 :])]
+    longest = max(map(methodcaller("count", table.separator), table.rows))
+    if table.separator != WHITESPACE and longest > len(table.names):
+        gaps.append(len(table.names))
+    for gap in gaps:
         cells = [split(row, table.separator) for row in table.rows]
         if any(row[gap] for row in cells if len(row) > gap):
             continue

@@ -173,7 +173,7 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
         columns = [column for column, name in enumerate(names) if name and name == key]
         if len(columns) > 1:
-            raise ambiguous(table, role, columns)
+            raise ambiguous(table, [role], columns)
         if columns:
             return columns[0]
     if text.isdecimal() and 1 <= int(text) <= len(table.names):
@@ -450,7 +450,7 @@ def _check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_
         )
     if not is_shear and "stress" not in mapping and SHEAR_STRESS.search(quantities[stress]):
         raise InputError(
-            f"{table.place(stress)} is a shear stress. If the specimen was sheared, give --mode simple-shear and the "
+            f"{table.place(stress)} is a load in shear. If the specimen was sheared, give --mode simple-shear and the "
             "column of the amount of shear (--column shear=NAME), or of the displacement (sliding=NAME)."
         )
     moduli = [k for k, name in enumerate(quantities) if OSCILLATION.search(name) and not table.is_constant(k)]

@@ -238,6 +238,8 @@ CHANNEL = re.compile(r"\([^():]+:[^()]+\)(?=\s*[(\[])")
 """A channel of the machine before the unit, as in ``Position(Linear:Position) (mm)``."""
 SYMBOL = re.compile(r" ([espftλσεγτ]|e ?gl)$")
 """A symbol after a name, as in ``Green strain E``."""
+GREEK_SYMBOL = re.compile(r" [λεσγ]$")
+"""One that leaves open which measure it is, as in ``Stretch λ``."""
 COMPONENT = re.compile(r" (sigma|eps|[espft]|[σετ]) ?([1x]{2}|[2y]{2})$")
 """Likewise, of what is along an axis, as in ``Cauchy stress T11``."""
 DEFORMATION_GRADIENT = re.compile(r"f ?(11|22|xx|yy)")
@@ -346,7 +348,8 @@ def measure_in(quantity: str) -> tuple[str, str]:
             is_component = bool(axis) and name in COMPONENTS.get(role, ())
             if name in NOUNS.get(role, ()) or is_component or (not noun and SAYS_ALONE.fullmatch(match[0])):
                 return f"{role} {axis}".strip(), measure.name
-    return quantity, ""
+    noun = GREEK_SYMBOL.sub("", quantity)
+    return (noun if any(noun in names for names in ROLES.values()) else quantity), ""
 
 
 def is_of_role(name: str) -> bool:

@@ -144,7 +144,8 @@ def recognise(
         hint = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         quantities = [heading(name).quantity for name in table.names]
-        of_roles = ((DEFORMATIONS_OF_UNITS.get(kind, kind), of) for kind, of in _by_unit(table, quantities).items())
+        of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
+        of_roles = ((of_units.get(kind, kind), of) for kind, of in _by_unit(table, quantities).items())
         by_unit = {role: columns for role, columns in of_roles if role in roles}
         likely = [table.label(column) for columns in by_unit.values() for column in columns]
         several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""

@@ -27,15 +27,19 @@ UNIT_ASSUMED = "as of displacements)"
 """What follows the unit of a size that a table of specimens states without one."""
 UNITS = r"(?P<unit>(?:mm|cm|um|µm)[2²]?)"
 """Of sizes, where they stand among other words."""
-BETWEEN_WORDS = re.compile(rf"[:=\t]|\s{{2,}}|(?<=\w)\s+(?={NUMBER.pattern}\s*[\[(]?{UNITS})".replace("?P<unit>", "?:"))
+BETWEEN_STATEMENTS = re.compile(r";|,\s+(?=[^\W\d])")
+"""As in ``Width 5 mm; thickness 2 mm``."""
+BETWEEN_WORDS = re.compile(
+    rf"[:=\t]|\s{{2,}}|(?<=\w)(?<! x)\s+(?={NUMBER.pattern}\s*[\[(]?{UNITS})".replace("?P<unit>", "?:")
+)
 """What stands between the name of a size and its value, as in ``Width : 5 mm`` and ``Width 5 mm``."""
 DEVIATION = re.compile(rf"\s*(?:±|\+/?-)\s*{NUMBER.pattern}")
 """As in ``Width (mm): 5.0 ± 0.2``."""
 UNCLEAR = (
-    re.compile(rf"(?<![\w.,])(?P<number>{NUMBER.pattern})\s*[\[(]?{UNITS}(?![\w/²^])"),
+    re.compile(rf"(?<![\w.,×*])(?<![x×*] )(?P<number>{NUMBER.pattern})\s*[\[(]?{UNITS}(?![\w/²^]|\s*[x×*]\s*\d)"),
     re.compile(rf"[\[(]{UNITS}[\])]\W*(?P<number>{NUMBER.pattern})"),
 )
-"""Numbers with a unit of a size among other words."""
+"""Numbers with a unit of a size among other words, but for products such as ``5 x 2 mm``."""
 LONGEST_QUOTE = 60
 """Characters of a line that a message shows."""
 
@@ -96,7 +100,8 @@ def _in_lines(table: Table) -> Iterator[StatedSize]:
     for line, text in table.head:
         text = text.lstrip("# ")
         cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
-        words = [word.strip(' "') for cell in cells for word in BETWEEN_WORDS.split(cell)]
+        statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
+        words = [word.strip(' "') for statement in statements for word in BETWEEN_WORDS.split(statement)]
         words = [word for word in words if word]
         pairs = list(zip(words, words[1:], [*words[2:], ""], strict=False))
         clear = [sizes for pair in pairs if (sizes := _of_words(*pair, f"in line {line}"))]

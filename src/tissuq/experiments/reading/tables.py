@@ -275,10 +275,11 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         sheet=sheet,
         title=_number_before(names) or _title(texts[: layout.names or 0], separator),
     )
+    table = without_statements_beside(table)
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     if layout.names:
         table = with_names_above(table, texts[layout.names - 1])
-    table = without_percent_signs(without_thousands(without_statements_beside(table)))
+    table = without_percent_signs(without_thousands(table))
     return _without_summary(table)
 
 

@@ -134,7 +134,7 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
     """Return all tests in one file, as `read_tests` reads them, each with the options that read it alone.
 
     Shorter tables without columns of deformation and load, such as one of results, are no tests, nor are a few rows
-    beside one of many.
+    beside one of many; those of statistics, in which these columns may be, are far shorter.
 
     Raises
     ------
@@ -144,7 +144,8 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
     tables = read_tables(path, options.get("skip_rows", 0), options.get("sheet"), options.get("table"))
     path = tables[0].file if is_data_frame(path) else path
     has_sheets = len({table.sheet for table in tables}) > 1
-    tests, refused = list[TestInFile](), list[tuple[Table, InputError]]()
+    tests = list[TestInFile]()
+    unrecognised, unreadable = list[tuple[Table, InputError]](), list[tuple[Table, InputError]]()
     for table in tables:
         selection, names = options.copy(), list[str]()
         if has_sheets:
@@ -157,20 +158,24 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
             rows = only_rows(table, options.get("only"))
             of_table = _side_by_side(rows, path, selection, names)
         except InputError as error:
-            refused.append((table, error))
+            unrecognised.append((table, error))
             continue
-        for columns in of_table:
-            tests += _of_one_table(rows, path, selection, names, columns)
+        try:
+            tests += [test for columns in of_table for test in _of_one_table(rows, path, selection, names, columns)]
+        except InputError as error:
+            unreadable.append((table, error))
     longest = max((len(test.reading.table.rows) for test in tests), default=0)
-    for table, refusal in refused:
-        if len(table.rows) >= MIN_SHARE_OF_TEST * longest:
-            raise _may_be_test(refusal, tests) if tests else refusal
+    for refused, share in ((unrecognised, MIN_SHARE_OF_TEST), (unreadable, 1 / LENGTH_RATIO)):
+        for table, refusal in refused:
+            if len(table.rows) >= share * longest:
+                raise _may_be_test(refusal, tests) if tests else refusal
     longest = max((len(test.reading.recorded) for test in tests), default=0)
     of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
     tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
-    notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in refused]
+    notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in unrecognised]
+    notes += [f"{table.file} is left out: it is short, and cannot be read as a test." for table, _ in unreadable]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
 
 
