@@ -354,3 +354,10 @@ def test_the_page_and_the_terminal_say_that_errors_are_correlated(cli, here):
     assert said.status == 0, said.err
     assert "errors of consecutive measurements are correlated (lag-1 correlation 0." in " ".join(said.out.split())
     assert "correlated (lag-1 correlation 0." in (here / "run" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_doubtful_unit_is_warned_of_once(cli, here):
+    rows = "".join(f"{1 + k / 40},{k * 0.02 / 12}\n" for k in range(13))
+    (here / "test.csv").write_text(f"stretch,stress\n{rows}", encoding="utf-8")
+    result = cli("fit", "test.csv", "--discrepancy", "none", "--no-figures")
+    assert (result.out + result.err).count("check the unit") == 1

@@ -196,7 +196,7 @@ def test_a_height_is_the_length_of_a_cylinder_only(tmp_path):
         ("Abc;20;mm", {}, "The file says in line 1 'Abc: 20 mm': if that is the length, give --length \"20 mm\"."),
         ("Abc;2;cm\nDef (mm);7", {}, "'Def (mm): 7': if one of these is the length, give --length \"NUMBER mm\"."),
         ("clamps (about 20 mm apart)", {}, "'clamps (about 20 mm apart)': if that is the length"),
-        ("Rate;10;mm/min", {}, 'dimensions={"length": "20 mm"}). None is recognised in the file.'),
+        ("Rate;10;mm/min", {}, '(--diameter "4 mm"). None is recognised in the file.'),
         ("Abc;9;mm²", {"length": "20 mm"}, "'Abc: 9 mm²': if that is the area, give --area \"9 mm2\"."),
         ("Width;5;mm\nAbc;2;mm", {"length": "20 mm"}, "if that is the thickness, give --thickness \"2 mm\"."),
         ("Abc;2;mm", {"length": "20 mm"}, "width or thickness or diameter, give --width \"2 mm\" or --thickness"),
@@ -245,3 +245,16 @@ def test_a_product_of_sizes_is_not_quoted_as_one_of_them(tmp_path, product):
     path = written(tmp_path, f"Specimen {product}\nDisplacement (mm),Force (N)\n{text}")
     with pytest.raises(InputError, match="None is recognised in the file"):
         tq.read(path, dimensions={"length": "20 mm"})
+
+
+def test_all_sizes_that_are_missing_are_asked_for_at_once_and_the_advice_reads_the_file(tmp_path):
+    path = written(tmp_path, TABLE + MEASURED)
+    with pytest.raises(InputError) as refusal:
+        tq.read(path)
+    for option in ("--length", "--area", "--width", "--diameter"):
+        assert option in str(refusal.value)
+    with pytest.raises(InputError) as refusal:
+        tq.read(path, area="10 mm2")
+    assert "--length" in str(refusal.value)
+    assert "--area" not in str(refusal.value)
+    np.testing.assert_allclose(tq.read(path, area="10 mm2", length="20 mm").stress, STRESS, rtol=1e-6)

@@ -197,10 +197,11 @@ def _written(
 
 
 def _print_remarks(study: SpecimenStudy | LawStudy, *lines: str) -> None:
-    """Print the warnings of a study, what could not be fitted, and some lines; say what has not converged."""
+    """Print what could not be fitted, some lines, and the warnings that `_written` left; say what has not converged."""
     from tissuq.cli.tables import print_warnings
+    from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 
-    print_warnings(study.warnings)
+    print_warnings([text for text in study.warnings if DOUBTFUL_UNIT not in text])
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     print(*lines, sep="\n", end="\n" * bool(lines))

@@ -22,6 +22,10 @@ SHOWN = 3
 """Number of other sizes that a message shows."""
 CONTRADICTION = 0.01
 """Relative difference from which two statements of one dimension contradict each other."""
+HOW_TO_GIVE_SECTION = (
+    'area (--area "10 mm2"), or width and thickness (--width "5 mm" --thickness "2 mm"), or diameter '
+    '(--diameter "4 mm").'
+)
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
 TURNED = {"length": "width", "width": "length"}
@@ -40,7 +44,8 @@ class Dimension:
 class Dimensions:
     """The dimensions of a specimen.
 
-    Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user.
+    Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user;
+    ``divide_forces`` says that the cross-section is needed, beside whatever else is.
     """
 
     file: str
@@ -49,6 +54,7 @@ class Dimensions:
     ambiguous: Mapping[str, str]
     others: tuple[StatedSize, ...] = ()
     contradictions: tuple[str, ...] = ()
+    divide_forces: bool = False
 
     @property
     def length(self) -> Dimension:
@@ -59,10 +65,13 @@ class Dimensions:
         InputError
             When it is not known.
         """
+        area_too = f" Forces need the undeformed cross-section, too: {HOW_TO_GIVE_SECTION}"
         return self._size(
             "length",
             "to turn displacements into stretches give the undeformed length: length '20 mm' "
-            '(--length "20 mm"; in Python dimensions={"length": "20 mm"}).',
+            '(--length "20 mm"; in Python dimensions={"length": "20 mm"}).'
+            + area_too
+            * (self.divide_forces and not _sections(self.sizes)),
         )
 
     @property
@@ -121,9 +130,8 @@ class Dimensions:
         areas = areas_of_user or areas
         if not areas:
             raise InputError(
-                f"{self.file}: to turn forces into stresses give the undeformed cross-section: area "
-                '(--area "10 mm2"), or width and thickness (--width "5 mm" --thickness "2 mm"), or diameter '
-                f'(--diameter "4 mm"). {self._partly_known()}'
+                f"{self.file}: to turn forces into stresses give the undeformed cross-section: {HOW_TO_GIVE_SECTION} "
+                f"{self._partly_known()}"
             )
         area, *alternatives = areas.values()
         if any(not _agree(area, alternative) for alternative in alternatives):

@@ -372,6 +372,7 @@ def _measured(
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
+        size = replace(size, divide_forces=choice.load == "force")
         with about_stress(number, labels, mode):
             deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
             stretch, step = stretch_of(table, choice, deformation, load, size, *units)
