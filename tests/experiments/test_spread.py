@@ -172,3 +172,34 @@ def test_python_takes_standard_errors_in_the_unit_of_the_stresses_and_joins_them
     assert data.joined(tq.Experiment("biaxial", both, both)).standard_error.tolist() == [
         0.001, 0.003, 0.0, 0.0, 0.002, 0.004, 0.0, 0.0
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("sign", [" ± ", "±", " +/- ", " +- "])
+@pytest.mark.parametrize(
+    ("name", "options", "error"),
+    [
+        ("Stress, mean ± SEM [kPa]", {}, SPREAD * 1e-3),
+        ("Stress (kPa) ± SE", {}, SPREAD * 1e-3),
+        ("Stress ± SD (kPa)", {"mean_of": 6}, SPREAD * 1e-3 * OF_SIX / 6**0.5),
+        ("Stress (mean ± std dev) (kPa)", {"mean_of": 6}, SPREAD * 1e-3 * OF_SIX / 6**0.5),
+    ],
+)
+def test_a_mean_and_its_spread_may_stand_in_one_cell(tmp_path, sign, name, options, error):
+    rows = zip(STRETCH, STRESS, SPREAD, strict=True)
+    lines = [f"Stretch;{name}", *(f"{stretch:.12g};{mean:.12g}{sign}{spread:.12g}" for stretch, mean, spread in rows)]
+    (path := tmp_path / "test.csv").write_text("\n".join(lines), encoding="utf-8")
+    data = read_experiment(path, **options)
+    np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(data.standard_error, error, rtol=1e-9)
+
+
+def test_a_spread_in_the_cell_of_a_mean_that_says_not_what_it_is_is_asked_about(tmp_path):
+    rows = zip(STRETCH, STRESS, SPREAD, strict=True)
+    lines = ["Stretch,Stress (kPa)", *(f"{stretch:.12g},{mean:.12g} ± {spread:.12g}" for stretch, mean, spread in rows)]
+    (path := tmp_path / "test.csv").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.warns(UserWarning, match="'sem=stress ± \\(kPa\\)'"):
+        data = read_experiment(path)
+    np.testing.assert_allclose(data.stress, STRESS * 1e-3, rtol=1e-9, atol=1e-15)
+    assert not data.standard_error.any()
+    data = read_experiment(path, columns={"sem": "stress ± (kPa)"})
+    np.testing.assert_allclose(data.standard_error, SPREAD * 1e-3, rtol=1e-9)

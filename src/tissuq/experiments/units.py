@@ -22,6 +22,7 @@ __all__ = [
     "GROUPED",
     "LENGTH",
     "MASSES",
+    "MEAN_WITH_SPREAD",
     "NUMBER",
     "PRESSURE",
     "RATE",
@@ -49,6 +50,7 @@ GROUPED = {
     ".": re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+(?:,\d+)?"),
 }
 """Numbers with a mark between thousands, by that mark; with one mark in all they may be decimal numbers as well."""
+MEAN_WITH_SPREAD = re.compile(rf"({NUMBER.pattern})\s*(?:±|\+/?[-−])\s*({NUMBER.pattern})")
 
 COMMON_STRESS_UNITS = {
     "Pa": 1e-6,

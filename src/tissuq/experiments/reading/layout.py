@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tissuq.experiments.units import GROUPED, NUMBER, looks_like_unit
+from tissuq.experiments.units import GROUPED, MEAN_WITH_SPREAD, NUMBER, looks_like_unit
 
 __all__ = [
     "LENGTH_RATIO",
@@ -235,9 +235,9 @@ def _with_faulty_rows_above(lines: Sequence[str], cells: Split, row: int) -> int
 
 
 def _is_number(cell: str) -> bool:
-    """Tell whether a cell is a number, with thousands separators or the sign of a percentage or without."""
+    """Tell whether a cell is a number, with thousands separators, the sign of a percentage or a spread or without."""
     text = cell.removesuffix("%").rstrip()
-    return any(number.fullmatch(text) for number in (NUMBER, *GROUPED.values()))
+    return any(number.fullmatch(text) for number in (NUMBER, *GROUPED.values(), MEAN_WITH_SPREAD))
 
 
 def _count_numbers(cells: Sequence[str]) -> int:

@@ -29,6 +29,7 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
+from tissuq.experiments.reading.means_with_spreads import with_spreads_apart
 from tissuq.experiments.reading.percentages import without_percent_signs
 from tissuq.experiments.reading.spanning import with_names_above
 from tissuq.experiments.reading.summary import find_summary
@@ -279,7 +280,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     if layout.names:
         table = with_names_above(table, texts[layout.names - 1])
-    table = without_percent_signs(without_thousands(table))
+    table = with_spreads_apart(without_percent_signs(without_thousands(table)))
     return _without_summary(table)
 
 
