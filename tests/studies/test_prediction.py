@@ -9,6 +9,7 @@ import xarray as xr
 import tissuq as tq
 from tissuq.assessment.stability import calibrated_range
 from tissuq.experiments.modes import loading_mode
+from tissuq.prediction import moments
 from tissuq.report.specimen import write_specimen_run
 from tissuq.studies.prediction import predicted
 from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings, run_prediction, stretches
@@ -86,6 +87,24 @@ def test_what_is_beyond_the_data_is_marked_and_told_once(fits, data, planar):
     assert told.startswith(f"2 of 4 points and {outside} of 8 measurements lie outside the measured range")
     assert f"from {low:.4g} to {high:.4g}" in told
     assert found.is_data_calibrated.sum() == 8 - outside
+
+
+def test_the_share_of_the_variance_beyond_the_data_is_that_of_the_errors_of_their_exponents(fits, monkeypatch):
+    """The band is the same where these errors are taken to be their medians, and the share follows from both widths."""
+    stretches = [1.2, 3.0, 4.0]
+    found = predicted(fits["auto"], stretch=stretches)
+    monkeypatch.setattr(moments, "scores", np.zeros_like)
+    band, without = found.curves[0, True, False], predicted(fits["auto"], stretch=stretches).curves[0, True, False]
+    np.testing.assert_array_equal(without.high[0], band.high[0])
+    expected = 1 - ((without.high - without.low) / (band.high - band.low)) ** 2
+    np.testing.assert_allclose(found.extrapolated[0], expected, rtol=1e-9, atol=1e-12)
+    assert found.extrapolated[0][0] == 0
+    assert (found.extrapolated[0][1:] > 0.01).all()
+    assert found.table["extrapolated"].tolist() == found.extrapolated[0].tolist()
+    assert (
+        f"up to {expected.max():.0%} of the variance of the stress is due to how the energy goes on"
+        in found.warnings[0]
+    )
 
 
 def test_an_error_of_the_stress_is_left_out_elsewhere_and_that_is_said(fits):

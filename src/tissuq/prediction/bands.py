@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Curve, Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
@@ -27,6 +26,7 @@ __all__ = [
     "Mixtures",
     "asked_for",
     "centre_and_ends",
+    "extrapolation_share",
     "inside_band",
     "predict_average",
     "predict_band",
@@ -213,18 +213,45 @@ def predict_bands(
     prob: float = 0.95,
     mode: str | LoadingMode | None = None,
     channel: int = 0,
+    errs_beyond: bool = True,
 ) -> list[Band]:
-    """Return the bands of `predict_average` for new measurements, for the stress itself, or for both at once."""
+    """Return the bands of `predict_average` for new measurements, for the stress itself, or for both at once.
+
+    Without the errors of the energy beyond the range of the data, if asked for.
+    """
     solutions = [solution for _, solution in weighted_solutions]
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)
     probabilities = centre_and_ends(prob)
     with one_thread():
         blocks = predictive_mixtures(
-            weighted_solutions, points, loading, channel, discrepancy=discrepancy, noises=noises
+            weighted_solutions,
+            points,
+            loading,
+            channel,
+            discrepancy=discrepancy,
+            noises=noises,
+            errs_beyond=errs_beyond,
         )
         curves = [[(*map(mixture.quantile, probabilities),) for mixture in mixtures] for mixtures in blocks]
     abscissa = loading.paths[channel].abscissa(points)
     return [Band(abscissa, *np.concatenate(of_noise, axis=1)) for of_noise in zip(*curves, strict=True)]
+
+
+def extrapolation_share(band: Band, without_errors: Band) -> FloatArray:
+    """Return the share (g,) of a stress's variance that is due to errors of extrapolation.
+
+    One less the squared ratio of the widths of a band without these errors and with them, as variances may not exist:
+    the errors have the tails of Student's t with two degrees of freedom (`tissuq.mechanics.rays`).
+
+    Examples
+    --------
+    >>> at, ends = np.ones(2), np.array([2.0, 1.0])
+    >>> extrapolation_share(Band(at, 0 * at, -ends, ends), Band(at, 0 * at, -at, at))
+    array([0.75, 0.  ])
+    """
+    wide, narrow = band.high - band.low, without_errors.high - without_errors.low
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(wide > narrow, 1 - (narrow / wide) ** 2, 0.0)
 
 
 def centre_and_ends(prob: float) -> tuple[float, float, float]:
@@ -240,6 +267,7 @@ def predictive_mixtures(
     *,
     discrepancy: bool,
     noises: Sequence[bool],
+    errs_beyond: bool = True,
 ) -> Iterator[list[Mixtures]]:
     """Yield the predictive distributions of a stress, with noise or without, at points of a mode, some at a time."""
     count = COMPONENTS_OF_MANY_BLOCKS if len(points) > STRETCHES_OF_BLOCK else COMPONENTS_OF_BLOCK
@@ -249,7 +277,7 @@ def predictive_mixtures(
     ]
     for block in np.array_split(points, max(1, len(points) // STRETCHES_OF_BLOCK)):
         moments = [
-            _moments(model, components, block, mode, channel, discrepancy=discrepancy, noises=noises)
+            _moments(Stress(model, components, discrepancy, errs_beyond), block, mode, channel, noises=noises)
             for model, components in mixture
         ]
         weights, mean, *variances = (np.concatenate(arrays) for arrays in zip(*moments, strict=True))
@@ -319,21 +347,19 @@ def inside_band(solution: Solution, curve: Curve, *, discrepancy: bool, prob: fl
 
 
 def _moments(
-    model: StatisticalModel,
-    components: GaussianMixture,
+    stress: Stress,
     points: FloatArray,
     mode: LoadingMode,
     channel: int,
     *,
-    discrepancy: bool,
     noises: Sequence[bool],
 ) -> tuple[FloatArray, ...]:
     """Return weights (M,) and means (M, g) of a stress at points of a mode and its variances, with noise or without.
 
     With noise they are those of a new test with its own errors.
     """
+    model = stress.model
     states = model.experiment.states_at(points, mode, channel)
-    stress = Stress(model, components, discrepancy)
     components, mean, of_stress = stress.at(states)
     of_stress = of_stress + (model.common_error * mean) ** 2
     if not any(noises):

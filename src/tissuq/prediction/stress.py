@@ -35,11 +35,14 @@ class Stress:
     components : GaussianMixture
     with_discrepancy : bool
         Whether the discrepancy's share is in it.
+    errs_beyond : bool
+        Whether the exponents with which the energy goes on beyond the range have errors; else they are the medians.
     """
 
     model: StatisticalModel
     components: GaussianMixture
     with_discrepancy: bool
+    errs_beyond: bool = True
 
     def at(self, states: States) -> tuple[GaussianMixture, FloatArray, FloatArray]:
         """Return components (M,) with means and variances (M, g) of the stress at states (g,).
@@ -88,4 +91,5 @@ class Stress:
         uniform = qmc.Sobol(scores + 1, rng=0).random_base2((count * copies - 1).bit_length())[: count * copies]
         many = self.components[np.repeat(np.arange(count), copies)]
         mean = many.mean + np.einsum("mpq,mq->mp", many.root, ndtri(uniform[:, 1:]))
-        return replace(many, mean=mean, weights=many.weights / copies), uniform[:, 0]
+        probability = uniform[:, 0] if self.errs_beyond else np.full(len(uniform), 0.5)
+        return replace(many, mean=mean, weights=many.weights / copies), probability

@@ -22,7 +22,7 @@ from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import Band, predict_bands, speaks_of, stress_ratio
+from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
 
 if TYPE_CHECKING:
@@ -55,6 +55,9 @@ class Prediction:
         With the discrepancy and without, as far as they differ and the discrepancy says something about the mode.
     curves : mapping of (int, bool, bool) to Band
         Median, low and high (MPa) by number of the stress, with the discrepancy or not, and with noise or not.
+    extrapolated : mapping of int to (g,) array
+        Share of the variance of each stress, with the discrepancy, that is due to how the energy goes on beyond the
+        measured range, by the number of the stress; 0 in that range.
     data : Experiment, optional
         The measurements that it is compared with.
     scores : pandas.DataFrame, optional
@@ -71,6 +74,7 @@ class Prediction:
     stress_type: str
     kinds: tuple[bool, ...]
     curves: Mapping[tuple[int, bool, bool], Band]
+    extrapolated: Mapping[int, FloatArray]
     data: Experiment | None
     scores: pd.DataFrame | None
     warnings: tuple[str, ...]
@@ -127,7 +131,8 @@ class Prediction:
         """All bands: a row for every stress and point, and the unit of stress in the names of the columns.
 
         Columns measured (of several stresses), stretch (and stretch2), is_calibrated; ``median [kPa]``, low, high of
-        the stress with the discrepancy and predictive_low, predictive_high of a measurement of it; and the same of the
+        the stress with the discrepancy and predictive_low, predictive_high of a measurement of it; extrapolated, the
+        share of the variance of the stress that is due to how the energy goes on beyond the range; and the bands of the
         material alone, from alone_median on.
         """
         import pandas as pd
@@ -147,6 +152,7 @@ class Prediction:
                 bands = {end: getattr(stress, end) for end in ("median", "low", "high")}
                 bands |= {f"predictive_{end}": getattr(noisy, end) for end in ("low", "high")}
                 columns |= {f"{prefix}{name} [{unit.name}]": band / unit.to_mpa for name, band in bands.items()}
+                columns |= {"extrapolated": self.extrapolated[channel]} if kind else {}
             label = {"measured": name} if len(self.stresses) > 1 else {}
             values = (column.tolist() for column in columns.values())
             rows += [label | dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
@@ -262,9 +268,25 @@ def predicted(
         for channel, kind in product(range(len(target.stresses)), kinds)
         for noise, curve in _bands(posterior, target, grid, channel, kind, **options).items()
     }
+    extrapolated = {
+        channel: _extrapolated(posterior, target, grid, channel, curves[channel, True, False], **options)
+        for channel in range(len(target.stresses) if True in kinds else 0)
+    }
     scores = None if data is None else _scores(posterior, data, kinds, options)
-    warnings = tuple(_prediction_warnings(posterior, target, grid, data))
-    return Prediction(posterior, target, grid, prob, stress_type, kinds, curves, data, scores, warnings)
+    warnings = tuple(_prediction_warnings(posterior, target, grid, data, extrapolated))
+    return Prediction(posterior, target, grid, prob, stress_type, kinds, curves, extrapolated, data, scores, warnings)
+
+
+def _extrapolated(
+    posterior: Posterior, mode: LoadingMode, grid: FloatArray, channel: int, band: Band, **options: Any
+) -> FloatArray:
+    """Return the share (g,) of the variance of a stress due to how the energy goes on beyond the measured range."""
+    is_beyond, shares = ~is_calibrated(posterior.model.experiment, mode, grid), np.zeros(len(grid))
+    if is_beyond.any():
+        without = _bands(posterior, mode, grid[is_beyond], channel, True, errs_beyond=False, **options)[False]
+        beyond = Band(*(column[is_beyond] for column in vars(band).values()))
+        shares[is_beyond] = extrapolation_share(beyond, without)
+    return shares
 
 
 def _bands(
@@ -276,6 +298,7 @@ def _bands(
     *,
     prob: float,
     stress_type: str,
+    errs_beyond: bool = True,
 ) -> dict[bool, Band]:
     """Return median, low and high of a stress at points, without noise and with it; refuse what is no number."""
     options: dict[str, Any] = {"discrepancy": kind, "prob": prob, "mode": mode, "channel": channel}
@@ -283,7 +306,7 @@ def _bands(
     with np.errstate(over="ignore", invalid="ignore"):
         bands = [
             replace(band, median=ratio * band.median, low=ratio * band.low, high=ratio * band.high)
-            for band in predict_bands([(1.0, posterior.solution)], grid, noises, **options)
+            for band in predict_bands([(1.0, posterior.solution)], grid, noises, errs_beyond=errs_beyond, **options)
         ]
     for band in bands:
         is_finite = np.isfinite([band.median, band.low, band.high]).all(axis=0)
@@ -356,7 +379,11 @@ def _scores(posterior: Posterior, data: Experiment, kinds: tuple[bool, ...], opt
 
 
 def _prediction_warnings(
-    posterior: Posterior, mode: LoadingMode, points: FloatArray, data: Experiment | None
+    posterior: Posterior,
+    mode: LoadingMode,
+    points: FloatArray,
+    data: Experiment | None,
+    extrapolated: Mapping[int, FloatArray],
 ) -> list[str]:
     """Return the warnings about a prediction."""
     model, texts = posterior.model, []
@@ -387,7 +414,10 @@ def _prediction_warnings(
         outside_counts.append((int((~is_inside).sum()), len(data), "measurements"))
     outside = " and ".join(f"{count} of {total} {what}" for count, total, what in outside_counts if count)
     if outside:
-        texts.append(f"{outside} lie outside the measured range: {_calibrated_in_words(posterior, mode)}.")
+        largest = max((shares.max() for shares in extrapolated.values()), default=0.0)
+        due = f"; beyond, up to {largest:.0%} of the variance of the stress is due to how the energy goes on"
+        calibrated = f"{_calibrated_in_words(posterior, mode)}{due if largest else ''}"
+        texts.append(f"{outside} lie outside the measured range: {calibrated}.")
     if data is not None and not was_fitted and model.tolerances.estimand in (AS_TESTED, SPECIMEN):
         texts.append(
             f"the bands of this run are of {model.tolerances.meaning}: they do not cover another specimen. To include "
