@@ -43,7 +43,7 @@ def test_the_exit_status_is_3_and_the_message_names_the_discrepancy(fitted):
 
 def test_the_report_warns_and_shows_rhat_and_ess(fitted, here):
     report = (here / "runs" / "specimen" / "report.html").read_text()
-    assert f'<div class="warning">none: {VERDICT}</div>' in report
+    assert f'<div class="warning problem">{VERDICT}</div>' in report
     assert "<th>R-hat</th><th>ESS</th>" in report
     assert "<td>1.730</td><td>12</td>" in report
 
@@ -52,8 +52,10 @@ def test_the_tables_and_the_terminal_hold_rhat_and_ess_and_no_evidence(fitted, c
     (row,) = json.loads((here / "runs" / "specimen" / "summary.json").read_text())
     assert (row["rhat"], row["ess"], row["log_evidence"]) == (1.73, 12.0, None)
     for said in (fitted, cli("show", "runs/specimen")):
-        line = next(line for line in said.out.splitlines() if line.strip().startswith("none"))
-        assert line.split()[-2:] == ["1.730", "12"]
+        assert said.out.startswith(f"Warning: {VERDICT}")
+    said = cli("show", "runs/specimen", "--details")
+    line = next(line for line in said.out.splitlines() if line.strip().startswith("none"))
+    assert line.split()[-2:] == ["1.730", "12"]
 
 
 def test_an_rhat_that_is_not_a_number_is_null_in_json(cli, stuck, here, specimen):

@@ -191,7 +191,7 @@ HUGE = b"9" * 5000
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        *((name, content) for name in ("summary.json", "assessment.json") for content in
+        *((name, content) for name in ("answer.json", "summary.json", "assessment.json") for content in
           (b"", b"\xff\xfe", b"null", b"[{}]", NESTED, HUGE, b'[{"formulation": 3, "C10_mean": [1]}]')),
         *(("run.toml", content) for content in
           (b"\xff\xfe", b"a = " + NESTED, b"a = " + HUGE, b"a.b" * 2000 + b" = 1")),
@@ -202,7 +202,8 @@ def test_a_damaged_file_of_a_run_is_one_message(cli, here, fit_run, name, conten
     folder, _ = fit_run
     shutil.copytree(folder, here / "run")
     (here / "run" / name).write_bytes(content)
-    said = cli(*(("fit", "--config", "run/run.toml", "--out", "again") if name == "run.toml" else ("show", "run")))
+    repeat, show = ("fit", "--config", "run/run.toml", "--out", "again"), ("show", "run", "--details")
+    said = cli(*(repeat if name == "run.toml" else show))
     assert said.status == 2
     assert said.err.startswith("tissuq: ")
     assert said.err.count("\n") == 1

@@ -10,6 +10,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.inference.solution import Solution
 from tissuq.prediction.moments import mean_curve
+from tissuq.result_warning import ResultWarning, Severity
 
 __all__ = ["factors_of_tests", "measurement_warnings"]
 
@@ -19,35 +20,41 @@ NEAR_STRAIN_SHARE = 0.15
 """Share of the largest strain within which a measurement is near the reference."""
 
 
-def measurement_warnings(experiment: Experiment) -> Iterator[str]:
+def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
     """Yield a warning for each gap in the measured range of a test, with advice what to measure next."""
     strain = np.concatenate([curve.abscissa - curve.mode.controls[0].reference for curve in experiment.curves])
     reach = float(np.abs(strain).max())
     has_directions = len(experiment.modes) == 1 and experiment.modes[0].controls[0] != SHEAR
     if has_directions and not ((strain > 1e-9).any() and (strain < -1e-9).any()):
         measured, missing = ("tension", "compression") if (strain > 0).any() else ("compression", "tension")
-        yield (
+        yield ResultWarning(
             f"there is {measured} only, which leaves the initial modulus about twice as uncertain as both directions: "
-            f"measure in {missing}, too, if the specimen allows it."
+            f"measure in {missing}, too, if the specimen allows it.",
+            "one-direction",
+            Severity.NOTE,
         )
     is_near = (np.abs(strain) <= NEAR_STRAIN_SHARE * reach) & (strain != 0)
     if not is_near.any():
         control = experiment.curves[0].mode.controls[0]
         nearest = control.reference + strain[np.abs(strain) > 0][np.abs(strain[np.abs(strain) > 0]).argmin()]
-        yield (
+        yield ResultWarning(
             f"nothing is measured near the reference (the nearest {control.name} is {nearest:.4g}), so the initial "
             f"modulus is extrapolated: measure within {NEAR_STRAIN_SHARE * reach:.2g} of {control.name} "
-            f"{control.reference:g}."
+            f"{control.reference:g}.",
+            "not-near-reference",
         )
     if not experiment.shows_direction and any(test.shows_direction for test in experiment.tests):
-        yield (
+        yield ResultWarning(
             "a preferred direction is looked for only where every test measured the stresses of both axes: fit those "
-            "that did by themselves to see one."
+            "that did by themselves to see one.",
+            "no-direction-looked-for",
+            Severity.NOTE,
         )
     if experiment.size < MIN_MEASUREMENTS:
-        yield (
+        yield ResultWarning(
             f"{experiment.size} measurements are too few to show how the stress deviates from the material: "
-            f"measure at {MIN_MEASUREMENTS} stretches or more."
+            f"measure at {MIN_MEASUREMENTS} stretches or more.",
+            "few-measurements",
         )
 
 

@@ -13,6 +13,7 @@ from tissuq.cli import reading
 from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, once_each, parse_prior, progress
 from tissuq.cli.reading import one_noise
 from tissuq.errors import InputError
+from tissuq.result_warning import Severity
 from tissuq.studies.settings import load_settings, setting_of
 
 if TYPE_CHECKING:
@@ -156,21 +157,25 @@ def _fit_one(
     run = partial(run_specimen, settings, beside, law=next(iter(own.values()), None))
     study = _written(run, write_specimen_run, sources, target, **options)
     print_summary(target, study.experiment)
-    _print_remarks(study)
+    _print_omissions(study)
 
 
 def _compare_laws(
     settings: Any, beside: Path, own: dict[str, Material], sources: list[Path], target: Path, **options: bool
 ) -> None:
     """Fit several laws, write the run and print their table."""
-    from tissuq.cli.tables import print_rows
+    from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
     from tissuq.studies.laws import run_laws
 
     study = _written(partial(run_laws, settings, beside, own=own), write_law_run, sources, target, **options)
+    problems = [warning for warning in study.warnings if warning.severity is Severity.PROBLEM]
+    print_warnings(problems)
     print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))
     print(law_lead(study))
-    _print_remarks(study, f"Report: {target / 'report.html'}")
+    print_warnings([warning for warning in study.warnings if warning not in problems])
+    print(f"Report: {target / 'report.html'}")
+    _print_omissions(study)
 
 
 def _written(
@@ -183,8 +188,6 @@ def _written(
     force: bool,
 ) -> Study:
     """Return what comes of a run, when it is written into its folder."""
-    from tissuq.cli.tables import print_warnings
-    from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
     from tissuq.report.run_folder import run_folder
 
     with progress() as step:
@@ -192,19 +195,13 @@ def _written(
         step("writing")
         with run_folder(target, force=force) as folder:
             write(study, sources, folder, figures=figures)
-    print_warnings([text for text in study.warnings if DOUBTFUL_UNIT in text])
     return study
 
 
-def _print_remarks(study: SpecimenStudy | LawStudy, *lines: str) -> None:
-    """Print what could not be fitted, some lines, and the warnings that `_written` left; say what has not converged."""
-    from tissuq.cli.tables import print_warnings
-    from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
-
-    print_warnings([text for text in study.warnings if DOUBTFUL_UNIT not in text])
+def _print_omissions(study: SpecimenStudy | LawStudy) -> None:
+    """Print what could not be fitted; say what has not converged."""
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
-    print(*lines, sep="\n", end="\n" * bool(lines))
     not_converged(study.not_converged)
 
 

@@ -307,8 +307,13 @@ def _assessed(path: Path) -> dict[str, float]:
         return {}  # a single file, or a run without an assessment
 
 
-def show(run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> None:
-    """Print the summary of a run and where its report lies."""
+def show(
+    run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    details: Annotated[
+        bool, typer.Option("--details", help="Also stability, what the discrepancy does, and all warnings.")
+    ] = False,
+) -> None:
+    """Print the answer of a run and where its report lies."""
     from tissuq.cli.tables import print_summary
 
-    print_summary(run_folder)
+    print_summary(run_folder, details=details)

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
+from tissuq.report.answer import ANSWER, readable_estimates, shown_and_folded
 from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, RECIPE
 from tissuq.report.tables import headline_of
+from tissuq.result_warning import Severity, in_shell
 from tissuq.studies.settings import DAMAGE, damage_reported, load_settings
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
 
 __all__ = ["print_explanations", "print_rows", "print_summary", "print_warnings"]
+
+TEXT_WIDTH = 96
+"""Letters in a line of prose."""
 
 SUMMARY = "summary.json"
 
@@ -45,14 +51,16 @@ def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
     console.print(table)
 
 
-def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
-    """Print the summary of a run folder, and where its report lies.
+def print_summary(folder: Path, experiment: Experiment | None = None, *, details: bool = False) -> None:
+    """Print the answer of a run folder, its summary where that says more, and where its report lies.
 
     Parameters
     ----------
     folder : Path
     experiment : Experiment, optional
         The measurements of the run, which are otherwise read from its folder.
+    details : bool
+        Everything: the summary of a single formulation, to what extent the material is wrong, and all warnings.
 
     Raises
     ------
@@ -62,29 +70,87 @@ def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
     from tissuq.model.tolerances import ESTIMANDS
 
     try:
+        answer = _answer(folder)
         rows, readable, unit, title = _read_run(folder, experiment)
-        has_verdict = [row["contains_truth"] is not None for row in rows]
-        sampled = any(row["rhat"] is not None for row in rows)
-        headers = ["formulation", f"{headline_of(rows[0])}, {unit}", "sd", "HPD low", "high"]
-        headers += ["log ev.", "in band", "alone"]
-        has_stability = any(row["stable"] for row in readable)
-        headers += ["stable", "lost at stretch"] * has_stability
-        headers += ["truth"] * any(has_verdict) + ["R-hat", "ESS"] * sampled
-        table = []
-        for row in readable:
-            cells = [row["formulation"], row["mean"], row["sd"], row["low"], row["high"], row["log_evidence"]]
-            cells += [row["coverage"], row["coverage_model_only"]] + [row["stable"], row["lost_at"]] * has_stability
-            cells += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * any(has_verdict)
-            table.append(cells + [row["rhat"], row["ess"]] * sampled)
+        headers, cells, has_stability = _summary_cells(rows, readable, unit)
     except (OSError, *DAMAGE) as error:
         raise InputError(
-            f"'{folder}' is not the folder of a complete run: {SUMMARY} or {RECIPE} is missing or damaged."
+            f"'{folder}' is not the folder of a complete run: {SUMMARY}, {ANSWER} or {RECIPE} is missing or damaged."
         ) from error
-    print_rows(title, headers, table)
-    if rows[0].get("estimand") in ESTIMANDS:
-        print(f"The intervals are of {ESTIMANDS[rows[0]['estimand']].description}.")
+    folded: list[dict[str, str]] = []
+    if answer is not None:
+        shown, folded = shown_and_folded(answer)
+        shown += folded * details
+        print_warnings([warning["text"] for warning in shown if warning["severity"] == Severity.PROBLEM])
+        _print_answer(answer, folder)
+        print_warnings([warning["text"] for warning in shown if warning["severity"] != Severity.PROBLEM])
     if rows[0].get("noise_lag"):
         print(f"The errors of consecutive measurements are correlated (lag-1 correlation {rows[0]['noise_lag']:.2f}).")
+    if answer is None or details or len(rows) > 1:
+        print_rows(title, headers, cells)
+        if answer is None and rows[0].get("estimand") in ESTIMANDS:
+            print(f"The intervals are of {ESTIMANDS[rows[0]['estimand']].description}.")
+        _print_legend(headline_of(rows[0]), has_stability)
+    if details:
+        _print_assessment(folder / ASSESSMENT)
+    _print_held_out(folder / HELD_OUT_TESTS, headline_of(rows[0]), unit)
+    if answer is not None and not details:
+        count = f" and {len(folded)} more warnings" if folded else ""
+        print(f"Stability, shares, weights{count}: tissuq show {shlex.quote(str(folder))} --details")
+    print(f"Report: {folder / 'report.html'}")
+
+
+def _answer(folder: Path) -> dict[str, Any] | None:
+    """Return the answer of a run, or None of one that has none, such as the study of the paper."""
+    path = folder / ANSWER
+    if not path.exists():
+        return None
+    answer: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    readable_estimates(answer)  # complains of what is damaged
+    return answer
+
+
+def _print_answer(answer: dict[str, Any], folder: Path) -> None:
+    """Print the numbers with their intervals, for what they can be used, and what to do next."""
+    print(f"\n{answer['title']}")
+    estimates = readable_estimates(answer)
+    name_width = max(len(estimate["name"]) for estimate in estimates)
+    for estimate in estimates:
+        print(f"  {estimate['name']:<{name_width}}  {estimate['value']}, 95 % interval {estimate['interval']}")
+    print(f"  The intervals are of {answer['meaning']}.\n")
+    verdict_width = max(len(use["verdict"]) for use in answer["uses"])
+    for use in answer["uses"]:
+        start = f"  {use['verdict'].upper():<{verdict_width}}  "
+        print(
+            fill(f"{use['purpose']}: {use['reason']}", TEXT_WIDTH, initial_indent=start,
+                 subsequent_indent=" " * len(start))
+        )  # fmt: skip
+    print()
+    step = answer["next"].format(run=shlex.quote(str(folder)))
+    print(fill(step, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
+
+
+def _summary_cells(
+    rows: list[dict[str, Any]], readable: list[dict[str, Any]], unit: str
+) -> tuple[list[str], list[list[str]], bool]:
+    """Return headers and cells of the summary, and whether it tells of stability."""
+    has_verdict = any(row["contains_truth"] is not None for row in rows)
+    is_sampled = any(row["rhat"] is not None for row in rows)
+    has_stability = any(row["stable"] for row in readable)
+    headers = ["formulation", f"{headline_of(rows[0])}, {unit}", "sd", "HPD low", "high"]
+    headers += ["log ev.", "in band", "alone"] + ["stable", "lost at stretch"] * has_stability
+    headers += ["truth"] * has_verdict + ["R-hat", "ESS"] * is_sampled
+    table = []
+    for row in readable:
+        cells = [row["formulation"], row["mean"], row["sd"], row["low"], row["high"], row["log_evidence"]]
+        cells += [row["coverage"], row["coverage_model_only"]] + [row["stable"], row["lost_at"]] * has_stability
+        cells += [{True: "yes", False: "no", None: ""}[row["contains_truth"]]] * has_verdict
+        table.append(cells + [row["rhat"], row["ess"]] * is_sampled)
+    return headers, table, has_stability
+
+
+def _print_legend(headline: str, has_stability: bool) -> None:
+    """Print what the columns of the summary mean."""
     print(
         "HPD: 95 %. In band, alone: share of measurements inside the 95 % band with the discrepancy, and inside that "
         "of the material alone."
@@ -94,10 +160,7 @@ def print_summary(folder: Path, experiment: Experiment | None = None) -> None:
             "Stable: probability of stability over the measured stretches. Lost at stretch: median [95 %] of the draws "
             "that become unstable. All loading modes: stability.csv."
         )
-    print(f"A good predictive check does not mean that {headline_of(rows[0])} is right.")
-    _print_assessment(folder / ASSESSMENT)
-    _print_held_out(folder / HELD_OUT_TESTS, headline_of(rows[0]), unit)
-    print(f"Report: {folder / 'report.html'}")
+    print(f"A good predictive check does not mean that {headline} is right.")
 
 
 def _print_assessment(path: Path) -> None:
@@ -127,14 +190,14 @@ def _print_held_out(path: Path, headline: str, unit: str) -> None:
 
 def print_warnings(warnings: Sequence[str]) -> None:
     """Print warnings about a result."""
-    for text in warnings:
-        print(fill(text, 96, initial_indent="Warning: ", subsequent_indent="  "))
+    for text in map(in_shell, warnings):
+        print(fill(text, TEXT_WIDTH, initial_indent="Warning: ", subsequent_indent="  ", break_on_hyphens=False))
 
 
 def print_explanations(explanations: Sequence[str]) -> None:
     """Print how to read a table."""
     for text in explanations:
-        print(fill(text, 96, initial_indent="- ", subsequent_indent="  "))
+        print(fill(text, TEXT_WIDTH, initial_indent="- ", subsequent_indent="  "))
 
 
 def _read_run(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment import Assessment, assess
+from tissuq.assessment.answer import Answer, answer_of
 from tissuq.assessment.comparison import scores_of
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
@@ -32,6 +33,7 @@ from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import inside_band, predict_band, stress_ratio
+from tissuq.result_warning import ResultWarning, most_severe_first
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -128,9 +130,29 @@ class Posterior:
         return self.solution.diagnostics
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """What a reader of this posterior must know, in sentences."""
-        return tuple(warnings_about(self.solution, self.stable_ranges))
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """What a reader of this posterior must know, in sentences with a code and a severity, the severest first."""
+        inside = np.concatenate(self.inside_bands()) if self.solution.is_of_data else np.ones(0, dtype=np.bool_)
+        return tuple(most_severe_first(warnings_about(self.solution, self.stable_ranges, inside)))
+
+    @cached_property
+    def answer(self) -> Answer:
+        """What it says before everything else: the modulus, for what the result can be used, and what to do next.
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> data = tq.simulate("neo-hookean", {"C10": 0.5}, [0.7, 0.8, 0.9, 1.1, 1.2, 1.4, 1.7, 2], 0.02, seed=1)
+        >>> answer = tq.fit(data, discrepancy="none", noise_sd=0.02).answer
+        >>> for use in answer.uses:
+        ...     print(use.purpose, "-", use.verdict)
+        report the modulus - with care
+        predict these tests - yes
+        predict other loading modes - with care
+        simulate with finite elements - with care
+        """
+        inside = np.concatenate(self.inside_bands())
+        return answer_of(self.solution, self.stable_ranges, self.warnings, inside)
 
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import bdtr
 
 from tissuq.assessment.extent import has_energy
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, StableRange
@@ -13,6 +15,7 @@ from tissuq.inference.solution import Solution
 from tissuq.model.error_model import widening_of_lag
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.prediction.moments import level_of_errors, mean_curve
+from tissuq.result_warning import ResultWarning, Severity
 
 __all__ = ["warnings_about"]
 
@@ -38,72 +41,124 @@ MIN_LAG1_CORRELATION, MIN_STANDARD_ERRORS = 0.3, 4.0
 """Lag-1 correlation of residuals that is reported, and by how many standard errors (1 / sqrt(n)) it must exceed 0."""
 
 
-def warnings_about(solution: Solution, ranges: Mapping[str, StableRange]) -> Iterator[str]:
-    """Yield the warnings that a posterior carries, the most severe first."""
+MAX_PROBABILITY_OF_MISSES = 1e-3
+"""Probability that so few measurements are inside their 95 % bands, were these right, below which they are not."""
+
+
+def warnings_about(
+    solution: Solution, ranges: Mapping[str, StableRange], inside: NDArray[np.bool_]
+) -> Iterator[ResultWarning]:
+    """Yield the warnings that a posterior carries.
+
+    Parameters
+    ----------
+    solution : Solution
+    ranges : mapping of str to StableRange
+        Stable range by loading mode.
+    inside : (n,) array of bool
+        Which measurements are inside their 95 % predictive bands.
+    """
     if solution.is_approximate and solution.diagnostics is not None:
-        yield solution.diagnostics.verdict
+        yield ResultWarning(solution.diagnostics.verdict, "not-converged", Severity.PROBLEM)
     if contradiction := solution.model.fitted_errors.contradiction:
-        yield contradiction
+        yield ResultWarning(contradiction, "contradicting-tests")
     if ranges and min(stable_range.probability for stable_range in ranges.values()) < MIN_STABLE_PROBABILITY:
         yield _instability(solution, min(ranges.values(), key=lambda stable_range: stable_range.probability))
     if not solution.is_of_data:
         return
     if solution.stable_share < MIN_LOSS_PROBABILITY:
-        yield (
+        yield ResultWarning(
             "the data contradict the stability constraint (stable_in): without it, only a fraction of "
             f"{solution.stable_share:.1g} of the posterior is stable. The constrained posterior describes the data "
-            "less well."
+            "less well.",
+            "stability-contradicted",
         )
     if solution.model.discrepancy.is_best_fit:
-        yield solution.model.discrepancy.caution
+        yield ResultWarning(solution.model.discrepancy.caution, "best-fit-target")
     if _is_sum_of_variances(solution.model):
-        yield (
+        yield ResultWarning(
             "noise_sd and S are both unknown, but the data determine only noise_sd^2 + S^2: do not interpret either "
-            "one alone, or give the noise (repeated measurements at one stretch determine it: noise 'repeats')."
+            "one alone, or give the noise (repeated measurements at one stretch determine it: {noise}).",
+            "inseparable-noise",
+            Severity.NOTE,
+            noise="repeats",
         )
     elif _noise_is_inseparable(solution):
-        yield (
+        yield ResultWarning(
             "the data cannot separate noise from discrepancy: the larger one is, the smaller the other. Do not "
-            "interpret either one alone, or give the noise (repeated measurements at one stretch determine it)."
+            "interpret either one alone, or give the noise (repeated measurements at one stretch determine it).",
+            "inseparable-noise",
+            Severity.NOTE,
         )
     error = solution.log_evidence_error
     if error is not None and not error <= MAX_LOG_EVIDENCE_ERROR and solution.diagnostics is None:
         size = f"about {error:.1g}" if isfinite(error) else "unknown"
-        yield (
+        yield ResultWarning(
             f"numerical integration is inaccurate (error of the log evidence: {size}). This happens when the given "
-            "noise is far smaller than the scatter of the data: give a larger noise, or leave it unknown."
+            "noise is far smaller than the scatter of the data: give a larger noise, or leave it unknown.",
+            "inaccurate-integral",
         )
-    lag1 = _lag1_correlation(solution)
+    lag1, held = _lag1_correlation(solution), int(inside.sum())
     if lag1 is not None:
-        cure = "" if solution.model.noise.is_consecutive else "with the noise 'autoregressive', or "
-        yield (
-            f"residuals are autocorrelated (lag-1 correlation {lag1:.2f}): the measurements are not independent and "
-            f"the intervals are too narrow. Fit {cure}with fewer points."
-        )
+        yield _correlated_residuals(solution.model, lag1)
+    elif bdtr(held, len(inside), 0.95) < MAX_PROBABILITY_OF_MISSES:
+        yield _missed_measurements(solution.model, f"{held} of {len(inside)}")
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
     if high - low > MAX_RELATIVE_WIDTH * abs(float(solution.marginals[headline].quantile(0.5))):
-        yield (
+        yield ResultWarning(
             f"the data determine {headline} poorly: its 95 % interval is wider than its median. Measure more points, "
-            "nearer to stretch 1, or with less noise."
+            "nearer to stretch 1, or with less noise.",
+            "poorly-determined",
         )
     cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:
-        yield (
+        yield ResultWarning(
             f"{PRIOR_BOUND_REACHED} of {', '.join(cut)}: there the bound, not the data, determines the result. Give a "
-            "wider prior, unless the bound is intended."
+            "wider prior, unless the bound is intended.",
+            "prior-bound",
         )
 
 
-def _instability(solution: Solution, stable_range: StableRange) -> str:
+def _instability(solution: Solution, stable_range: StableRange) -> ResultWarning:
     """Return the warning for a material that is rarely stable, in the loading mode in which it is least stable."""
     what = "material and discrepancy together are" if has_energy(solution.model) else "the material is"
     how = "rarely stable" if stable_range.probability < MIN_LOSS_PROBABILITY else "unstable more often than stable"
     at_rest = " (already at rest: the initial shear modulus is negative)" if stable_range.loss.median == 1 else ""
-    return (
+    return ResultWarning(
         f"over the measured range {what} {how}{at_rest}. Do not use these parameters in a simulation: measure in more "
-        "loading modes, choose another material, or restrict the fit to stable materials (stable_in)."
+        "loading modes, choose another material, or restrict the fit to stable materials ({stable_in}).",
+        "unstable",
+        stable_in="all",
     )
+
+
+def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning:
+    """Return the warning about residuals that are not independent, and what is likely to cure it."""
+    text = f"residuals are autocorrelated (lag-1 correlation {lag1:.2f}): "
+    if not model.energy_symbols:
+        return ResultWarning(
+            text + "the fitted curve departs systematically from the measured one, and the intervals do not include "
+            "that. Fit with {discrepancy}.",
+            "unmodelled-curve",
+            discrepancy="auto",
+        )
+    text += "the errors of consecutive measurements are not independent, and the intervals are too narrow. "
+    if model.noise.is_consecutive:
+        return ResultWarning(text + "Fit with fewer points.", "correlated-residuals")
+    return ResultWarning(
+        text + "Fit with {noise}, or with fewer points.", "correlated-residuals", noise="autoregressive"
+    )
+
+
+def _missed_measurements(model: StatisticalModel, counts: str) -> ResultWarning:
+    """Return the warning about bands that do not hold the measurements, and what is likely to cure it."""
+    text = f"only {counts} measurements are inside their 95 % bands, so that intervals are too narrow. "
+    if model.energy_symbols or not model.material.is_isotropic:
+        return ResultWarning(
+            text + "Give a larger noise, or leave it unknown ({noise_sd}).", "unmodelled-curve", noise_sd="unknown"
+        )
+    return ResultWarning(text + "Fit with {discrepancy}.", "unmodelled-curve", discrepancy="auto")
 
 
 def _is_sum_of_variances(model: StatisticalModel) -> bool:

@@ -16,6 +16,7 @@ from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.posterior.posterior import Posterior
+from tissuq.report.answer import ANSWER, answer_record, readable_estimates, shown_and_folded
 from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import (
     ASSESSMENT,
@@ -107,9 +108,11 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
         write_json(folder / HELD_OUT_TESTS, in_unit_of(study.held_out, columns, study.unit))
     write_posteriors(folder, study.posteriors)
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
+    record = answer_record(_title(study), study.main, study.posteriors[study.main].answer, study.unit, study.warnings)
+    write_json(folder / ANSWER, record)
     if figures:
         write_figures(folder, _figures(study))
-    write_page(folder, "specimen.html", **_context(study, summary), command=command)
+    write_page(folder, "specimen.html", **_context(study, summary, record), command=command)
 
 
 def write_inputs(
@@ -173,14 +176,23 @@ def _figures(study: SpecimenStudy) -> dict[str, Figure]:
     from tissuq.report.figures import marginal_figure, predictive_figure
 
     return {
+        "answer": predictive_figure({study.main: study.posteriors[study.main]}, discrepancy=True, unit=study.unit),
         "marginals": marginal_figure(study.posteriors, study.headline, study.unit),
         "with_discrepancy": predictive_figure(study.posteriors, discrepancy=True, unit=study.unit),
         "model_alone": predictive_figure(study.posteriors, discrepancy=False, unit=study.unit),
     }
 
 
-def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
+def _title(study: SpecimenStudy) -> str:
+    return f"{study.experiment.name}: {study.settings.material} with the discrepancy '{study.main}'"
+
+
+def _context(study: SpecimenStudy, summary: list[Row], record: dict[str, Any]) -> dict[str, Any]:
+    shown, folded = shown_and_folded(record)
     return {
+        "answer": record | {"estimates": readable_estimates(record), "next": record["next"].format(run="RUN")},
+        "shown_warnings": shown,
+        "folded_warnings": folded,
         "headline": study.headline,
         "settings": study.settings,
         "experiment": study.experiment,
@@ -188,10 +200,9 @@ def _context(study: SpecimenStudy, summary: list[Row]) -> dict[str, Any]:
         "tolerances": tolerances_in_words(study.tolerances, study.unit),
         "estimand": study.tolerances.meaning,
         "unit": study.unit.name,
-        "lead": _lead(summary, study),
+        "comparison": _comparison(summary, study) if len(summary) > 1 else "",
         "summary": readable_summary(summary, study.unit),
         "is_sampled": any(row["rhat"] is not None for row in summary),
-        "warnings": study.warnings,
         "discrepancy_warnings": {
             name: posterior.model.discrepancy.caution
             for name, posterior in study.posteriors.items()
@@ -229,31 +240,22 @@ def _test_line(test: Experiment) -> str:
     return f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}"
 
 
-def _lead(summary: list[Row], study: SpecimenStudy) -> str:
-    """Return the finding in a sentence or two."""
+def _comparison(summary: list[Row], study: SpecimenStudy) -> str:
+    """Return what several discrepancies say of the headline parameter, in a sentence or two."""
     scale, unit = study.unit.to_mpa, study.unit.name
-    if len(summary) > 1:
-        summary = [row for row in summary if not study.is_cut_by_prior(row["formulation"])] or summary
-    left_out = len(study.posteriors) - len(summary)
+    rows = [row for row in summary if not study.is_cut_by_prior(row["formulation"])] or summary
+    left_out = len(summary) - len(rows)
     name = study.headline
-    means = [row[f"{name}_mean"] / scale for row in summary]
-    if len(summary) == 1:
-        row = summary[0]
-        low, high = (significant(row[f"{name}_hdi_{end}"] / scale) for end in ("low", "high"))
-        return (
-            f"With the discrepancy '{row['formulation']}', {name} is {significant(means[0])} {unit}, "
-            f"95 % HPD {low} to {high} {unit}. The interval is of {study.tolerances.meaning}."
-        )
-    low, high = (min(means), max(means))
-    overlap = max(row[f"{name}_hdi_low"] for row in summary) <= min(row[f"{name}_hdi_high"] for row in summary)
+    means = [row[f"{name}_mean"] / scale for row in rows]
+    overlap = max(row[f"{name}_hdi_low"] for row in rows) <= min(row[f"{name}_hdi_high"] for row in rows)
     verdict = (
         "all 95 % intervals overlap"
         if overlap
         else "the 95 % intervals contradict each other: the choice of discrepancy matters more than the noise"
     )
     return (
-        f"With {len(summary)} ways to account for model uncertainty, the mean of {name} ranges from {significant(low)} "
-        f"to {significant(high)} {unit}; {verdict}."
+        f"With {len(rows)} ways to account for model uncertainty, the mean of {name} ranges from "
+        f"{significant(min(means))} to {significant(max(means))} {unit}; {verdict}."
         + (
             f" ({left_out} more left out here, because a prior bound determines part of the result.)"
             if left_out

@@ -176,10 +176,17 @@ def write_csv(path: Path, rows: list[Row]) -> None:
         writer.writerows(rows)
 
 
-def write_json(path: Path, rows: list[Row]) -> None:
-    """Write rows as JSON, which knows no nan: null stands for it."""
-    plain = [{name: None if value != value else value for name, value in row.items()} for row in rows]
-    path.write_text(json.dumps(plain, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+def write_json(path: Path, content: Sequence[Row] | Row) -> None:
+    """Write rows, or one record, as JSON, which knows no nan: null stands for it."""
+    path.write_text(json.dumps(_without_nan(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _without_nan(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(item) for item in value]
+    return None if value != value else value
 
 
 HELD_OUT_HEADLINE = ("median", "hdi_low", "hdi_high")

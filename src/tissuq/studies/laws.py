@@ -15,6 +15,7 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws, laws_named
+from tissuq.result_warning import ResultWarning, most_severe_first
 from tissuq.studies.specimen import (
     ALL,
     SpecimenSettings,
@@ -52,14 +53,14 @@ class LawStudy:
     settings : LawSettings
     experiment : Experiment
     comparison : LawComparison
-    data_warnings : tuple of str
+    data_warnings : tuple of ResultWarning
         What is implausible in the measurements.
     """
 
     settings: LawSettings
     experiment: Experiment
     comparison: LawComparison
-    data_warnings: tuple[str, ...] = ()
+    data_warnings: tuple[ResultWarning, ...] = ()
 
     @property
     def unit(self) -> StressUnit:
@@ -82,10 +83,10 @@ class LawStudy:
         return [name for name, posterior in self.comparison.fits.items() if posterior.solution.is_approximate]
 
     @property
-    def warnings(self) -> list[str]:
-        """Warnings about data and fits, each once with the laws that it concerns."""
+    def warnings(self) -> list[ResultWarning]:
+        """Warnings about data and fits, each once with the laws that it concerns, the severest first."""
         texts = warnings_of_fits(self.comparison.fits)
-        return [*self.data_warnings, *measurement_warnings(self.experiment), *texts]
+        return most_severe_first([*self.data_warnings, *measurement_warnings(self.experiment), *texts])
 
 
 def run_laws(

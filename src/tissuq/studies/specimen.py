@@ -14,6 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.units import StressUnit, stress_unit
@@ -31,7 +32,7 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
-from tissuq.posterior.warnings import PRIOR_BOUND_REACHED
+from tissuq.result_warning import ResultWarning, Severity, most_severe_first
 from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.studies.settings import looked_up
@@ -140,7 +141,7 @@ class SpecimenStudy:
     seconds: dict[str, float]
     skipped: dict[str, str]
     assessments: dict[str, Assessment]
-    data_warnings: tuple[str, ...] = ()
+    data_warnings: tuple[ResultWarning, ...] = ()
     """What is implausible in the measurements."""
     held_out: tuple[dict[str, Any], ...] = ()
     """How each test is predicted from the others, if requested."""
@@ -151,10 +152,15 @@ class SpecimenStudy:
         return stress_unit(self.experiment.stress_unit)
 
     @property
-    def warnings(self) -> list[str]:
-        """Warnings about data and fits, each once with the discrepancies that it concerns."""
+    def warnings(self) -> list[ResultWarning]:
+        """Warnings about data and fits, each once with the discrepancies that it concerns, the severest first."""
         texts = warnings_of_fits(self.posteriors)
-        return [*self.data_warnings, *texts, *measurement_warnings(self.experiment)]
+        return most_severe_first([*self.data_warnings, *texts, *measurement_warnings(self.experiment)])
+
+    @property
+    def main(self) -> str:
+        """The discrepancy whose posterior answers: the one that decides from the data, or the first."""
+        return Auto.name if Auto.name in self.posteriors else next(iter(self.posteriors))
 
     @property
     def tolerances(self) -> Tolerances:
@@ -168,7 +174,7 @@ class SpecimenStudy:
 
     def is_cut_by_prior(self, name: str) -> bool:
         """Whether a bound of a prior, not the data, determines part of a fit."""
-        return any(PRIOR_BOUND_REACHED in text for text in self.posteriors[name].warnings)
+        return any(warning.code == "prior-bound" for warning in self.posteriors[name].warnings)
 
     @property
     def not_converged(self) -> list[str]:
@@ -295,19 +301,31 @@ def _options(
     }
 
 
-def warnings_of_files(readings: Sequence[Reading]) -> tuple[str, ...]:
+def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:
     """Return the warnings about the files, each with the name of its test if there are several."""
-    messages = [(reading.experiment.name, text) for reading in readings for text in data_warnings(reading)]
-    return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in messages)
+    named = [(reading.experiment.name, _of_file(text)) for reading in readings for text in data_warnings(reading)]
+    return tuple(warning.of([name]) if len(readings) > 1 else warning for name, warning in named)
 
 
-def warnings_of_fits(posteriors: Mapping[str, Posterior]) -> list[str]:
-    """Return the warnings about fits, each once with the names of those that it concerns."""
-    concerned: dict[str, list[str]] = {}
+def _of_file(text: str) -> ResultWarning:
+    """Return a warning about a file; a unit that was assumed may make the answer wrong by a factor of 100 or 1000."""
+    is_doubtful = DOUBTFUL_UNIT in text
+    code, severity = ("doubtful-unit", Severity.PROBLEM) if is_doubtful else ("measurements", Severity.CAUTION)
+    return ResultWarning(text, code, severity)
+
+
+def warnings_of_fits(posteriors: Mapping[str, Posterior]) -> list[ResultWarning]:
+    """Return the warnings about fits, one of each kind, with the names of those that it concerns if there are several.
+
+    The numbers in it are those of the first.
+    """
+    if len(posteriors) == 1:
+        return list(next(iter(posteriors.values())).warnings)
+    concerned: dict[str, dict[str, ResultWarning]] = {}
     for name, posterior in posteriors.items():
-        for text in posterior.warnings:
-            concerned.setdefault(text, []).append(name)
-    return [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+        for warning in posterior.warnings:
+            concerned.setdefault(warning.code, {}).setdefault(name, warning)
+    return [next(iter(by_name.values())).of(by_name) for by_name in concerned.values()]
 
 
 def _every() -> list[str]:

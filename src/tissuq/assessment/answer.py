@@ -1,0 +1,300 @@
+"""The answer first: the modulus with its interval, for what the result can be used, and the one thing to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.assessment.extent import shares_of_discrepancy
+from tissuq.assessment.modulus import modulus, modulus_symbols
+from tissuq.assessment.stability import StableRange
+from tissuq.errors import TissuqError
+from tissuq.experiments.experiment import Curve
+from tissuq.inference.marginal import Marginal
+from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
+from tissuq.prediction.bands import Band, predict_band
+from tissuq.result_warning import ResultWarning, Severity
+
+__all__ = ["Answer", "Estimate", "Step", "Use", "Verdict", "answer_of"]
+
+PRECISE, USEFUL = 0.2, 0.5
+"""Half widths of 95 % intervals, over the median, up to which a number is precise, and of use."""
+MIN_INSIDE = 0.9
+"""Share of the measurements inside their 95 % bands below which these do not describe the test."""
+MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
+"""Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
+GRID_POINTS = 9
+"""Stretches at which the width of a band is looked at."""
+
+
+class Verdict(StrEnum):
+    """Whether a result can be used for something, from the best to the worst."""
+
+    YES = "yes"
+    CARE = "with care"
+    NO = "no"
+
+
+class Use(NamedTuple):
+    """For what a result can be used, or not, and why."""
+
+    purpose: str
+    verdict: Verdict
+    reason: str
+
+
+class Estimate(NamedTuple):
+    """A stress parameter: its name, mean and the ends of its 95 % highest-density interval, MPa."""
+
+    name: str
+    mean: float
+    low: float
+    high: float
+
+
+class Step(NamedTuple):
+    """What to do next, as typed in a shell (``{run}`` stands for the folder of the run) and in Python."""
+
+    shell: str
+    python: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a posterior says, before everything else.
+
+    Attributes
+    ----------
+    estimates : tuple of Estimate
+        The initial shear modulus first, then the headline parameter.
+    meaning : str
+        What the intervals are of.
+    uses : tuple of Use
+        Reporting the modulus; predicting the measured tests, and other loading modes; finite elements.
+    next_step : Step
+    """
+
+    estimates: tuple[Estimate, ...]
+    meaning: str
+    uses: tuple[Use, ...]
+    next_step: Step
+
+
+def answer_of(
+    solution: Solution,
+    ranges: Mapping[str, StableRange],
+    warnings: Sequence[ResultWarning],
+    inside: NDArray[np.bool_],
+) -> Answer:
+    """Return the answer that a posterior gives.
+
+    Parameters
+    ----------
+    solution : Solution
+    ranges : mapping of str to StableRange
+        Stable range by loading mode.
+    warnings : sequence of ResultWarning
+        Those that the posterior carries.
+    inside : (n,) array of bool
+        Which measurements are inside their 95 % predictive bands.
+    """
+    model, stiffness = solution.model, modulus(solution)
+    codes = {warning.code for warning in warnings}
+    uses = [
+        Use("report the modulus", *_reporting(solution, stiffness, codes, warnings)),
+        Use("predict these tests", *_own_tests(solution, inside)),
+    ]
+    other_modes = _other_modes(solution, ranges, codes, uses[-1])
+    uses += [
+        Use("predict other loading modes", *other_modes),
+        Use("simulate with finite elements", *_simulating(solution, ranges, other_modes)),
+    ]
+    headline = model.headline
+    estimates = [_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])]
+    return Answer(tuple(estimates), model.tolerances.meaning, tuple(uses), _next_step(solution, uses, warnings))
+
+
+def _estimate(name: str, marginal: Marginal) -> Estimate:
+    return Estimate(name, marginal.mean, *map(float, marginal.hdi()))
+
+
+def _reporting(
+    solution: Solution, stiffness: Marginal, codes: Collection[str], warnings: Sequence[ResultWarning]
+) -> tuple[Verdict, str]:
+    """Return whether the modulus can be reported."""
+    symbols = modulus_symbols(solution.model)
+    is_cut = any(w.code == "prior-bound" and any(f"{symbol} (" in w for symbol in symbols) for w in warnings)
+    reasons_against = {
+        "sampling has not converged": "not-converged" in codes,
+        "a bound of its prior, not the data, determines it": is_cut,
+        "the fitted curve departs from the measured one, and the interval does not include that": (
+            "unmodelled-curve" in codes
+        ),
+        "the discrepancy aims at the best fit, not at the modulus": "best-fit-target" in codes,
+    }
+    for reason, applies in reasons_against.items():
+        if applies:
+            return Verdict.NO, reason
+    carried = abs(shares_of_discrepancy(solution)[1][0])
+    low, high = stiffness.hdi()
+    verdict, width = _precision((high - low) / 2 / abs(float(stiffness.quantile(0.5))))
+    if carried > PRECISE:
+        return Verdict.NO, f"the discrepancy carries {carried:.0%} of the initial stiffness, by which it may be off"
+    if not solution.model.discrepancy.parameters:
+        return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
+    if "contradicting-tests" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
+    return verdict, width
+
+
+def _precision(half_width: float) -> tuple[Verdict, str]:
+    """Return a verdict on the half width of an interval over its median, and the width in words."""
+    verdict = Verdict.YES if half_width <= PRECISE else Verdict.CARE if half_width <= USEFUL else Verdict.NO
+    return verdict, f"known to {_percent(half_width)}"
+
+
+def _percent(half_width: float) -> str:
+    if not half_width < 10:
+        return "a factor of ten or worse"
+    return f"± {100 * half_width:.0f} %" if half_width >= 0.1 else f"± {max(100 * half_width, 0.1):.2g} %"
+
+
+def _worst(*verdicts: Verdict) -> Verdict:
+    return max(verdicts, key=list(Verdict).index)
+
+
+def _own_tests(solution: Solution, inside: NDArray[np.bool_]) -> tuple[Verdict, str]:
+    """Return whether the measured tests are described, over the range in which they were measured."""
+    if not solution.is_of_data:
+        return Verdict.NO, "no test was measured of what this posterior describes"
+    held, count = int(inside.sum()), len(inside)
+    counts = f"{held} of {count} measurements inside the band"
+    try:
+        widths = [_relative_half_width(_band_of(solution, curve)) for curve in solution.model.experiment.curves]
+    except TissuqError as error:
+        return Verdict.NO, str(error)
+    verdict, width = _precision(max(widths))
+    if held < MIN_INSIDE * count:
+        return Verdict.NO, f"only {counts}"
+    return verdict, f"stress {width} where it was measured, {counts}"
+
+
+def _band_of(solution: Solution, curve: Curve) -> Band:
+    """Return the band of the stress itself at measured points that span a curve."""
+    order = np.argsort(curve.abscissa, kind="stable")
+    rows = order[np.linspace(0, len(order) - 1, min(GRID_POINTS, len(order))).astype(int)]
+    return predict_band(solution, curve.points[rows], noise=False, mode=curve.mode, channel=curve.channel)
+
+
+def _relative_half_width(band: Band) -> float:
+    """Return the root mean square of half the width of a band over that of its median."""
+    size = float(np.sqrt(np.mean(band.median**2)))
+    return float(np.sqrt(np.mean((band.high - band.low) ** 2))) / 2 / size if size else np.inf
+
+
+def _other_modes(
+    solution: Solution, ranges: Mapping[str, StableRange], codes: Collection[str], own_tests: Use
+) -> tuple[Verdict, str]:
+    """Return whether loading modes that were not measured can be predicted, within the measured invariants."""
+    model = solution.model
+    measured = {mode.name for mode in model.experiment.modes}
+    if not model.discrepancy.is_energy and model.discrepancy.parameters:
+        return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' belongs to the stress of the measured test"
+    if "unmodelled-curve" in codes:
+        return Verdict.NO, "the material alone does not follow the measured curve"
+    others = {name: stable_range for name, stable_range in ranges.items() if name not in measured}
+    if not others:
+        if not ranges:
+            return Verdict.CARE, "not looked at for this material"
+        return own_tests.verdict, "uniaxial, equibiaxial and planar stress were measured"
+    try:
+        widths = {
+            name: _relative_half_width(predict_band(solution, _grid(stable_range), noise=False, mode=name))
+            for name, stable_range in others.items()
+        }
+    except TissuqError as error:
+        return Verdict.NO, str(error)
+    verdict = _worst(*(_precision(width)[0] for width in widths.values()))
+    of_modes = ", ".join(f"{name} stress {_percent(width)}" for name, width in widths.items())
+    sentence = f"within the strains that were measured: {of_modes}"
+    if len(measured) == 1:
+        return _worst(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
+    return verdict, sentence
+
+
+def _grid(stable_range: StableRange) -> NDArray[np.float64]:
+    return np.linspace(stable_range.low, stable_range.high, GRID_POINTS)
+
+
+def _simulating(
+    solution: Solution, ranges: Mapping[str, StableRange], other_modes: tuple[Verdict, str]
+) -> tuple[Verdict, str]:
+    """Return whether draws of material and discrepancy serve finite elements."""
+    model = solution.model
+    if not model.discrepancy.is_energy:
+        return Verdict.NO, f"the discrepancy '{model.discrepancy.name}' is an error of the stress and no material"
+    if not model.material.is_isotropic:
+        return Verdict.NO, "draws as materials are of isotropic ones only"
+    if (solution.direction_probability or 0.0) > PROBABLE_DIRECTION:
+        return Verdict.NO, "the tissue has a preferred direction, and draws as materials have none"
+    if not ranges:
+        return Verdict.CARE, "whether it is stable cannot be computed for this material"
+    worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
+    share = f"{worst.probability:.0%} of the draws are stable over the measured range"
+    if worst.probability < MIN_STABLE:
+        share += f", least in {worst.mode} loading"
+    if worst.probability < MIN_OFTEN_STABLE:
+        return Verdict.NO, share
+    verdict = _worst(Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE, other_modes[0])
+    if other_modes[0] is Verdict.NO:
+        return verdict, "the stress in other loading modes is not known well enough"
+    return verdict, f"{share}; what leaves the measured strains is extrapolated"
+
+
+STEPS: Mapping[str, Step] = {
+    "auto": Step(
+        "let the data decide how wrong the material is: fit again with --discrepancy auto.",
+        'let the data decide how wrong the material is: fit again with discrepancy="auto".',
+    ),
+    "design": Step(
+        "see which test would make it narrower: tissuq design {run}",
+        "see which test would make it narrower: posterior.design()",
+    ),
+    "second mode": Step(
+        "measure a second loading mode; tissuq design {run} says which helps most.",
+        "measure a second loading mode; posterior.design() says which helps most.",
+    ),
+    "stable": Step(
+        "restrict the fit to stable materials: fit again with --stable-in all.",
+        'restrict the fit to stable materials: fit again with stable_in="all".',
+    ),
+    "export": Step(
+        "take it into finite elements: tissuq export {run} --format abaqus",
+        "take it into finite elements: posterior.ensemble(20), tq.write_cards",
+    ),
+}
+"""What may be done next."""
+
+
+def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
+    """Return the one thing to do next."""
+    for warning in warnings:
+        if warning.severity is Severity.PROBLEM:
+            return Step(warning.shell, str(warning))
+    reporting, _, others, simulating = (use.verdict for use in uses)
+    codes = {warning.code for warning in warnings}
+    model = solution.model
+    if not model.energy_symbols and model.material.is_isotropic:
+        return STEPS["auto"]
+    if "unstable" in codes:
+        return STEPS["stable"]
+    if reporting is not Verdict.YES:
+        return STEPS["design"]
+    if others is not Verdict.YES and len(model.experiment.modes) == 1:
+        return STEPS["second mode"]
+    return STEPS["export" if simulating is not Verdict.NO else "design"]

@@ -1,0 +1,86 @@
+"""The answer of a posterior: its numbers are those of the posterior, and its verdicts follow from known cases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gallery
+import tissuq as tq
+from tissuq.assessment.answer import PRECISE, Verdict
+
+STRETCH = np.r_[np.linspace(0.7, 0.98, 8), np.linspace(1.02, 1.6, 12)]
+YEOH = {"C10": 0.5, "C20": 0.1, "C30": 0.0}
+PURPOSES = ["report the modulus", "predict these tests", "predict other loading modes", "simulate with finite elements"]
+
+
+def verdicts(posterior):
+    assert [use.purpose for use in posterior.answer.uses] == PURPOSES
+    return [use.verdict for use in posterior.answer.uses]
+
+
+def yeoh(**options):
+    return gallery.fit(tq.simulate("yeoh", YEOH, STRETCH, noise_sd=0.01, seed=1), noise_sd=0.01, **options)
+
+
+def test_the_numbers_are_the_modulus_and_the_headline_parameter_of_the_posterior():
+    posterior = yeoh(discrepancy="auto")
+    modulus, c10 = posterior.answer.estimates
+    assert (modulus.name, c10.name) == ("initial shear modulus", "C10")
+    row = posterior.summary(unit="MPa").loc["C10"]
+    assert [c10.mean, c10.low, c10.high] == pytest.approx(row[["mean", "hdi_low", "hdi_high"]].to_list(), rel=1e-6)
+    assert [modulus.mean, modulus.low, modulus.high] == pytest.approx(
+        [2 * c10.mean, 2 * c10.low, 2 * c10.high], rel=1e-6
+    )
+    assert modulus.low < 1.0 < modulus.high  # of the truth
+    assert posterior.answer.meaning == "this specimen as tested, errors of the test not included"
+
+
+def test_a_material_that_is_allowed_to_be_wrong_serves_where_one_mode_was_measured():
+    posterior = yeoh(discrepancy="auto")
+    modulus = posterior.answer.estimates[0]
+    assert (modulus.high - modulus.low) / 2 / modulus.mean < PRECISE
+    assert verdicts(posterior)[:3] == [Verdict.YES, Verdict.YES, Verdict.CARE]
+    assert "only one mode was measured" in posterior.answer.uses[2].reason
+    assert posterior.answer.next_step.shell.endswith("tissuq design {run} says which helps most.")
+
+
+def test_a_wrong_material_without_discrepancy_serves_for_nothing_but_its_own_test_and_auto_is_next():
+    posterior = yeoh(discrepancy="none")
+    assert "unmodelled-curve" in {warning.code for warning in posterior.warnings}
+    reporting, _, others, simulating = verdicts(posterior)
+    assert (reporting, others, simulating) == (Verdict.NO, Verdict.NO, Verdict.NO)
+    low, high = posterior.answer.estimates[0][2:]
+    assert not low < 2 * YEOH["C10"] < high  # so that the verdict is right
+    assert "--discrepancy auto" in posterior.answer.next_step.shell
+    assert 'discrepancy="auto"' in posterior.answer.next_step.python
+
+
+def test_a_right_material_without_discrepancy_is_to_be_reported_with_care():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, STRETCH, noise_sd=0.01, seed=1)
+    posterior = gallery.fit(data, discrepancy="none", noise_sd=0.01)
+    assert verdicts(posterior) == [Verdict.CARE, Verdict.YES, Verdict.CARE, Verdict.CARE]
+    assert "if the material is right" in posterior.answer.uses[0].reason
+
+
+def test_a_process_in_stress_says_nothing_of_other_modes_and_is_no_material():
+    posterior = yeoh(discrepancy="gp")
+    reporting, _, others, simulating = verdicts(posterior)
+    assert (others, simulating) == (Verdict.NO, Verdict.NO)
+    share = abs(posterior.assess().initial_share[0])
+    assert (reporting is Verdict.NO) == (share > PRECISE)
+
+
+def test_a_negative_modulus_is_never_fit_for_simulation():
+    posterior = gallery.fit(tq.datasets.load("rubber-treloar-uniaxial"), material="mooney-rivlin", discrepancy="none")
+    assert posterior.stable_ranges["uniaxial"].probability < 0.05
+    assert verdicts(posterior)[3] is Verdict.NO
+    assert "unstable" in {warning.code for warning in posterior.warnings}
+
+
+def test_fibres_are_not_taken_into_finite_elements():
+    material, stretch = "neo-hookean+standard-fibres:one@0", np.linspace(1.02, 1.3, 12)
+    data = tq.simulate(material, {"C10": 0.01, "k": 0.02}, stretch, noise_sd=1e-4, seed=2)
+    posterior = tq.fit(data, material=material, discrepancy="none", noise_sd=1e-4)
+    assert verdicts(posterior)[3] is Verdict.NO
+    assert "isotropic" in posterior.answer.uses[3].reason

@@ -1,0 +1,59 @@
+"""Warnings say in which form they are typed, and every code is explained."""
+
+from __future__ import annotations
+
+import pickle
+import re
+from pathlib import Path
+
+import pytest
+
+from tissuq.result_warning import WARNING_CODES, ResultWarning, Severity, in_shell, most_severe_first
+
+PAGE = Path(__file__).parents[1] / "docs" / "warnings.md"
+
+
+def test_an_option_is_named_as_python_and_as_the_shell_type_it():
+    warning = ResultWarning("restrict the fit ({stable_in}).", "unstable", stable_in="all")
+    assert warning == 'restrict the fit (stable_in="all").'
+    assert warning.shell == in_shell(warning) == "restrict the fit (--stable-in all)."
+    assert in_shell("plain {text}") == "plain {text}"
+
+
+def test_braces_without_options_stay_as_they_are():
+    assert ResultWarning("column '{x}'").shell == "column '{x}'"
+
+
+def test_names_stand_before_both_forms():
+    warning = ResultWarning("fit with {noise}.", "correlated-residuals", Severity.NOTE, noise="repeats").of(["a", "b"])
+    assert (str(warning), warning.shell) == ('a, b: fit with noise="repeats".', "a, b: fit with --noise repeats.")
+    assert (warning.code, warning.severity) == ("correlated-residuals", Severity.NOTE)
+
+
+def test_a_copy_through_pickle_keeps_what_it_says():
+    warning = ResultWarning("fit with {noise}.", "correlated-residuals", Severity.NOTE, noise="repeats")
+    copy = pickle.loads(pickle.dumps(warning))
+    assert (copy, copy.code, copy.severity, copy.shell) == (warning, warning.code, warning.severity, warning.shell)
+
+
+def test_problems_come_first_and_the_order_stays_within_a_severity():
+    texts = [ResultWarning(name, severity=severity) for name, severity in
+             (("a", Severity.NOTE), ("b", Severity.CAUTION), ("c", Severity.PROBLEM))]  # fmt: skip
+    assert most_severe_first([*texts, "d"]) == ["c", "b", "d", "a"]
+
+
+def test_a_code_that_is_not_explained_is_refused():
+    with pytest.raises(ValueError, match="no-such-code"):
+        ResultWarning("text", "no-such-code")
+
+
+def test_the_page_explains_every_code_in_the_words_of_the_table():
+    rows = re.findall(r"^\| `([a-z-]+)` \| ([^|]+) \|", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert dict(rows) == dict(WARNING_CODES)
+    assert [code for code, _ in rows] == sorted(WARNING_CODES)
+
+
+def test_every_code_is_used_by_the_package():
+    source = "".join(path.read_text(encoding="utf-8") for path in (PAGE.parents[1] / "src").rglob("*.py"))
+    for code in WARNING_CODES:
+        assert source.count(f'"{code}"') >= 2, code
