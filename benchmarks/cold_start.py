@@ -15,7 +15,7 @@ from time import perf_counter
 RUNS = 7
 COMMANDS = {
     "tissuq --help": ["--help"],
-    "tissuq paper --sampler exact --no-figures": ["paper", "--sampler", "exact", "--no-figures", "--force"],
+    "tissuq paper --method exact --no-figures": ["paper", "--method", "exact", "--no-figures", "--force"],
 }
 
 

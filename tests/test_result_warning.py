@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tissuq.result_warning import WARNING_CODES, ResultWarning, Severity, in_shell, most_severe_first
+from tissuq.result_warning import WARNING_CODES, ResultWarning, Severity, in_shell, merged, most_severe_first
 
 PAGE = Path(__file__).parents[1] / "docs" / "warnings.md"
 
@@ -40,6 +40,13 @@ def test_problems_come_first_and_the_order_stays_within_a_severity():
     texts = [ResultWarning(name, severity=severity) for name, severity in
              (("a", Severity.NOTE), ("b", Severity.CAUTION), ("c", Severity.PROBLEM))]  # fmt: skip
     assert most_severe_first([*texts, "d"]) == ["c", "b", "d", "a"]
+
+
+def test_of_several_results_a_warning_stands_once_with_their_names():
+    first, second = (ResultWarning(f"lag {lag}: {{noise}}.", "correlated-residuals", noise="repeats") for lag in (1, 2))
+    other = ResultWarning("few.", "few-measurements")
+    assert merged({"a": [first, other], "b": [], "c": [second]}) == ['a, c: lag 1: noise="repeats".', "a: few."]
+    assert merged({"a": [first, other]}) == [first, other]
 
 
 def test_a_code_that_is_not_explained_is_refused():

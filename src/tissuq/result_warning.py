@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from types import MappingProxyType
 
-__all__ = ["WARNING_CODES", "ResultWarning", "Severity", "in_shell", "most_severe_first"]
+__all__ = ["WARNING_CODES", "ResultWarning", "Severity", "in_shell", "merged", "most_severe_first"]
 
 
 class Severity(StrEnum):
@@ -103,6 +103,20 @@ class ResultWarning(str):
 def in_shell(warning: str) -> str:
     """Return a warning in the form of the shell."""
     return warning.shell if isinstance(warning, ResultWarning) else warning
+
+
+def merged(warnings: Mapping[str, Iterable[ResultWarning]]) -> list[ResultWarning]:
+    """Return the warnings about several results, one of each kind with the names of those that it concerns.
+
+    The numbers in it are those of the first. Of a single result they are as they are.
+    """
+    if len(warnings) == 1:
+        return list(next(iter(warnings.values())))
+    concerned: dict[str, dict[str, ResultWarning]] = {}
+    for name, of_result in warnings.items():
+        for warning in of_result:
+            concerned.setdefault(warning.code, {}).setdefault(name, warning)
+    return [next(iter(by_name.values())).of(by_name) for by_name in concerned.values()]
 
 
 def most_severe_first(warnings: Iterable[str]) -> list[ResultWarning]:

@@ -85,7 +85,7 @@ CONFIGS = {
 
 PAPER = [
     (["--points", "5"], ["points", "6", "5"]),
-    (["--points", "12.5"], ["--points", "integer"]),
+    (["--measurements", "12.5"], ["--measurements", "integer"]),
     (["--stretch-range", "0.5"], ["--stretch-range", "LOW:HIGH", "'0.5'"]),
     (["--stretch-range", "low:high"], ["--stretch-range", "LOW:HIGH"]),
     (["--stretch-range", "2:1"], ["stretch_low 2", "stretch_high 1"]),

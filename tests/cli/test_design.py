@@ -54,7 +54,7 @@ def test_a_config_of_ones_own_may_list_stretches(cli, run, here):
         (["run", "--candidate", "planer 1:1.2 5"], "planer"),
         (["run", "--target", "C30"], "no target 'C30'"),
         (["run", "--points", "0"], "one measurement or more"),
-        (["run", "--specimen", "twin"], "specimen"),
+        (["run", "--next-specimen", "twin"], "specimen"),
         (["run", "--discrepancy", "auto"], "no discrepancy 'auto'"),
         (["run", "--out", "run", "--force"], "is the run itself or contains it"),
         (["run", "--out", "run/inside"], "lies inside the run"),

@@ -6,6 +6,10 @@ import sys
 from importlib.metadata import version
 
 import pytest
+import typer
+
+from tissuq.cli.app import app
+from tissuq.cli.former_names import FORMER_NAMES
 
 HEAVY = ["numpy", "jax", "pandas", "xarray", "matplotlib", "scipy", "pint", "openpyxl"]
 
@@ -62,8 +66,8 @@ def test_the_former_name_of_structure_still_runs_it_and_is_not_listed(cli):
     [
         (["papr"], ["No such command", "papr"]),
         (["paper", "--pionts", "12"], ["No such option", "--pionts"]),
-        (["paper", "--points", "many"], ["--points", "integer"]),
-        (["paper", "--points"], ["--points", "requires an argument"]),
+        (["paper", "--measurements", "many"], ["--measurements", "integer"]),
+        (["paper", "--measurements"], ["--measurements", "requires an argument"]),
         (["paper", "stray.csv"], ["stray.csv"]),
         (["show"], ["Missing argument"]),
     ],
@@ -129,3 +133,31 @@ def test_ctrl_c_while_modules_are_loaded_is_no_traceback():
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (said.returncode, said.stdout, said.stderr) == (130, "", "")
+
+
+def commands(command=None, path=()):
+    """Yield every command with its words."""
+    command = command or typer.main.get_command(app)
+    for name, part in getattr(command, "commands", {}).items():
+        yield from commands(part, (*path, name))
+    if not hasattr(command, "commands"):
+        yield path, command
+
+
+def options_of(command):
+    return {option for parameter in command.params for option in parameter.opts if option.startswith("--")}
+
+
+def test_every_former_name_stands_for_an_option_of_today_and_is_none_itself():
+    by_name = {path[-1]: options_of(command) for path, command in commands()}
+    for name, renamed in FORMER_NAMES.items():
+        assert set(renamed.values()) <= by_name[name], name
+        assert not set(renamed) & by_name[name], name
+
+
+def test_an_option_under_its_former_name_is_the_same(cli):
+    today = cli("design", "no-run", "--measurements", "no-number")
+    former = cli("design", "no-run", "--points=no-number")
+    assert today.status == former.status == 2
+    assert former.err == today.err
+    assert "--measurements" in today.err

@@ -183,7 +183,7 @@ def test_warnings_about_files_are_shown_with_their_specimens(cli, here):
         ([], "give the FILES"),
         (["nowhere.csv"], "there is no such file"),
         (["specimens/S0.csv", "specimens/S1.csv"], "needs 3 specimens or more; there are 2 (S0, S1)"),
-        (["specimens", "--specimen", "who"], "--specimen names a column of a single file"),
+        (["specimens", "--specimen", "who"], "--specimen-column names a column of a single file"),
         (["specimens", "--parameter", "C99"], "found: C99"),
         (["specimens", "--spread", "-1"], "spread"),
         (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),

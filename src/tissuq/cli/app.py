@@ -19,6 +19,7 @@ from tissuq.cli import (
     structure,
     study,
 )
+from tissuq.cli.former_names import Renamed
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -53,17 +54,17 @@ def _tissuq(
     """Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
 
-app.command("paper")(study.paper)
+app.command("paper", cls=Renamed)(study.paper)
 app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
-app.command("predict")(runs.predict)
-app.command("population")(fit.population)
+app.command("predict", cls=Renamed)(runs.predict)
+app.command("population", cls=Renamed)(fit.population)
 app.command("calibrate")(calibrate.calibrate)
 app.command("compare")(runs.compare)
-app.command("design")(runs.design)
-app.command("export")(runs.export)
-app.command("structure")(structure.structure)
-app.command("simulate", hidden=True, deprecated=True)(structure.structure)
+app.command("design", cls=Renamed)(runs.design)
+app.command("export", cls=Renamed)(runs.export)
+app.command("structure", cls=Renamed)(structure.structure)
+app.command("simulate", cls=Renamed, hidden=True, deprecated=True)(structure.structure)
 app.command("show")(runs.show)
 app.command("materials")(catalogue.materials)
 app.command("modes")(catalogue.modes)

@@ -226,7 +226,9 @@ def population(
             help="Files, a specimen each; or folders of them, in which a folder is a specimen with a file a test."
         ),
     ] = None,
-    specimen: Annotated[str | None, typer.Option(help="Column of a single file that names the specimens.")] = None,
+    specimen: Annotated[
+        str | None, typer.Option("--specimen-column", help="Column of a single file that names the specimens.")
+    ] = None,
     material: Annotated[
         str | None, typer.Option(help="Material, as for tissuq fit [neo-hookean]; see tissuq materials.")
     ] = None,

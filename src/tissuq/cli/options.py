@@ -44,7 +44,9 @@ RunDiscrepancy = Annotated[
 ]
 RunMaterial = Annotated[
     str | None,
-    typer.Option(help="law.py:Name of the run, if its material is your own law; its code runs only if named here."),
+    typer.Option(
+        "--user-law", help="law.py:Name of the run, if its material is your own law; its code runs only if named here."
+    ),
 ]
 Config = Annotated[Path | None, typer.Option(help="run.toml of an earlier run to repeat.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of the random numbers [0].")]
@@ -87,12 +89,12 @@ def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def own_law(material: str | None) -> Material | None:
-    """Return the law in a file that ``--material`` names for a run whose material is one."""
+    """Return the law in a file that ``--user-law`` names for a run whose material is one."""
     from tissuq.mechanics import material_named
 
     if material is not None and ".py:" not in material:
         raise InputError(
-            f"'{material}' is not of the form law.py:Name. --material is only needed for a run whose material is a "
+            f"'{material}' is not of the form law.py:Name. --user-law is only needed for a run whose material is a "
             "law in your own file."
         )
     return material_named(material, laws=True) if material else None

@@ -48,7 +48,7 @@ def predict(
         str | None,
         typer.Option(help="Of the second control of a mode with two, such as biaxial; one number where it is held."),
     ] = None,
-    points: Annotated[int | None, typer.Option(help="Stretches in a range [101].")] = None,
+    points: Annotated[int | None, typer.Option("--grid-points", help="Stretches in a range [101].")] = None,
     discrepancy: RunDiscrepancy = None,
     prob: Annotated[float | None, typer.Option(help="Probability of the bands [0.95].")] = None,
     stress_type: Annotated[str | None, typer.Option(help="Predict engineering or cauchy stress [engineering].")] = None,
@@ -132,11 +132,17 @@ def design(
     ] = None,
     points: Annotated[
         list[int] | None,
-        typer.Option(help="Measurements of every default test; repeat for more [as many as the data, 10 to 40]."),
+        typer.Option(
+            "--measurements",
+            help="Measurements of every default test; repeat for more [as many as the data, 10 to 40].",
+        ),
     ] = None,
     specimen: Annotated[
         str | None,
-        typer.Option(help="The next test is of the same specimen or of another one [same, unless there are several]."),
+        typer.Option(
+            "--next-specimen",
+            help="The next test is of the same specimen or of the other ones [same, unless there are several].",
+        ),
     ] = None,
     discrepancy: RunDiscrepancy = None,
     material: RunMaterial = None,

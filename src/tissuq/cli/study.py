@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from tissuq.cli.former_names import Renamed
 from tissuq.cli.options import (
     Config,
     Figures,
@@ -30,7 +31,7 @@ __all__ = ["paper", "study"]
 def paper(
     out: Annotated[Path, typer.Option(help="Folder for the run.")] = Path("runs/paper"),
     config: Config = None,
-    points: Annotated[int | None, typer.Option(help="Number of measurements [30].")] = None,
+    points: Annotated[int | None, typer.Option("--measurements", help="Number of measurements [30].")] = None,
     stretch_range: Annotated[str | None, typer.Option(help="Stretches LOW:HIGH [0.5:4.25].")] = None,
     noise_sd: Annotated[
         float | None,
@@ -40,7 +41,7 @@ def paper(
         list[str] | None, typer.Option(help="A prior in MPa, such as c=uniform(0,10); repeat for more.")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of noise and draws [2021].")] = None,
-    sampler: Annotated[str | None, typer.Option(help="exact, nuts or both [exact].")] = None,
+    sampler: Annotated[str | None, typer.Option("--method", help="exact, nuts or both [exact].")] = None,
     replicates: Annotated[int | None, typer.Option(help="Data sets over which every claim is checked [1].")] = None,
     figures: Figures = True,
     force: Force = False,
@@ -87,7 +88,7 @@ study = typer.Typer(name="study", no_args_is_help=True, rich_markup_mode=None, h
 
 CampaignConfig = Annotated[Path | None, typer.Option(help="TOML file of the campaign.")]
 Out = Annotated[Path | None, typer.Option(help="Folder of the campaign [runs/NAME].")]
-Noise = Annotated[str | None, typer.Option(help="known or unknown.")]
+Noise = Annotated[str | None, typer.Option("--noise-sd", help="known or unknown to the fits.")]
 Workers = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
 
 
@@ -96,7 +97,7 @@ def _study() -> None:
     """Campaigns over many data sets."""
 
 
-@study.command("coverage")
+@study.command("coverage", cls=Renamed)
 def coverage(
     config: CampaignConfig = None,
     preset: Annotated[
@@ -133,7 +134,7 @@ def coverage(
     print(f"± are Monte Carlo standard errors. Report: {folder / 'report.html'}")
 
 
-@study.command("sbc")
+@study.command("sbc", cls=Renamed)
 def sbc(
     config: CampaignConfig = None,
     out: Out = None,
@@ -144,7 +145,7 @@ def sbc(
     scheduler: Scheduler = None,
     material: Annotated[str | None, typer.Option(help="The material that is calibrated [neo-hookean].")] = None,
     formulation: Annotated[
-        list[str] | None, typer.Option(help="A discrepancy that is; repeat for more [all of them].")
+        list[str] | None, typer.Option("--discrepancy", help="Discrepancy; repeat for more [all of them].")
     ] = None,
 ) -> None:
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
@@ -161,7 +162,7 @@ def sbc(
     print(f"Report: {folder / 'report.html'}")
 
 
-@study.command("tissues")
+@study.command("tissues", cls=Renamed)
 def tissues(
     folder: Annotated[
         Path | None, typer.Argument(help="Folder with a CSV file for each set of tests [the sets of tissuq].")
@@ -175,7 +176,9 @@ def tissues(
             help="What is predicted: tests, modes, specimens, ends, halves; repeat for more [tests, specimens, ends]."
         ),
     ] = None,
-    formulation: Annotated[list[str] | None, typer.Option(help="A discrepancy; repeat for more [auto, none].")] = None,
+    formulation: Annotated[
+        list[str] | None, typer.Option("--discrepancy", help="Discrepancy; repeat for more [auto, none].")
+    ] = None,
     material: Annotated[str | None, typer.Option(help="The material that is fitted [neo-hookean].")] = None,
     tolerance: Annotated[
         list[str] | None,

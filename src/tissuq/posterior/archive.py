@@ -159,7 +159,7 @@ def _named(kind: str, name: str, find: Callable[[str], T] | None, supplied: T | 
     if registered is None and supplied is None:
         raise InputError(
             f"the {kind} '{name}' of this posterior is your own, and its file is run only where you name it yourself: "
-            f"give it as {kind}= in Python, or with --material law.py:Name on the command line."
+            f"give it as {kind}= in Python, or with --user-law law.py:Name on the command line."
         )
     if supplied is not None and (supplied.name != name if registered is None else supplied != registered):
         raise InputError(f"this posterior is of the {kind} '{name}', not '{supplied.name}': leave it out, or fit anew.")

@@ -189,7 +189,8 @@ def drawn_ensemble(
         if tried >= MOST_TRIES * count:
             raise ModelError(
                 f"only {len(draws)} of {tried} draws are stable over the measured range of every loading mode, and "
-                f"{count} are wanted: fit with stable_in='all', choose another material, or take all draws."
+                f"{count} are wanted: require stability in the fit (--stable-in all, in Python stable_in='all'), "
+                "choose another material, or take all draws (--all-draws, in Python admissible=False)."
             )
         batch = _materials(solution, count, [seed, tried // count], sampling)
         stable = all_isotropic

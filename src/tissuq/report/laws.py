@@ -22,6 +22,7 @@ from tissuq.report.tables import (
     write_csv,
     write_json,
 )
+from tissuq.result_warning import in_shell
 from tissuq.studies.laws import LawStudy
 
 if TYPE_CHECKING:
@@ -153,7 +154,7 @@ def _context(study: LawStudy) -> dict[str, Any]:
         "lead": law_lead(study),
         "headers": [HEADERS[0], f"modulus [{study.unit.name}]", *HEADERS[2:]],
         "rows": readable_laws(study),
-        "warnings": study.warnings,
+        "warnings": list(map(in_shell, study.warnings)),
         "estimand": study.tolerances.meaning,
         "tolerances": tolerances_in_words(study.tolerances, study.unit),
         "discrepancy": study.settings.discrepancies[0],

@@ -16,6 +16,7 @@ from tissuq.prediction.bands import Band
 from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
 from tissuq.report.tables import interval, significant, write_csv, write_json
+from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction
 
 if TYPE_CHECKING:
@@ -203,7 +204,7 @@ def write_prediction_run(
     figures : bool
         Draw them, too.
     """
-    command = f"predict{'' if figures else ' --no-figures'}{f' --material {law}' if law else ''}"
+    command = f"predict{'' if figures else ' --no-figures'}{f' --user-law {law}' if law else ''}"
     relocated: dict[str, Any] = {"run": os.path.relpath(beside / settings.run, target), "mode": prediction.mode.name}
     if settings.data is not None:
         (folder / INPUT).mkdir()
@@ -329,7 +330,7 @@ def _context(prediction: Prediction, settings: PredictionSettings) -> dict[str, 
         "data": data,
         "score_headers": score_headers(prediction),
         "scores": [] if prediction.scores is None else readable_scores(prediction),
-        "fit_warnings": prediction.posterior.warnings,
+        "fit_warnings": list(map(in_shell, prediction.posterior.warnings)),
     }
 
 

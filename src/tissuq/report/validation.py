@@ -21,6 +21,7 @@ from tissuq.report.run_folder import (
     write_tables,
 )
 from tissuq.report.tables import Row, readable_parameters, readable_summary, significant, summary_row, write_csv
+from tissuq.result_warning import in_shell
 from tissuq.validation.coverage import CoverageSettings, summarise, summarise_unseen
 from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, FORMULATIONS, Fitted, PaperStudy
 from tissuq.validation.sbc import SbcSettings, ecdf_band, probabilities_of, summarise_ranks
@@ -136,7 +137,7 @@ def _context(study: PaperStudy, summary: list[Row]) -> dict[str, Any]:
         "held": [row["formulation"] for row in summary if row["contains_truth"]],
         "passed": [name for name, fit in study.main.items() if fit.finding.passes],
         "is_sampled": study.settings.sampler == "nuts",
-        "warnings": study.warnings,
+        "warnings": list(map(in_shell, study.warnings)),
         "verdicts": study.verdicts,
         "cells": _cells(study),
         "agreement": [_readable_agreement(row) for row in _agreement(study)],

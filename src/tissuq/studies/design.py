@@ -93,7 +93,7 @@ class DesignStudy:
         whose = (
             f"another specimen, whose stresses differ by about {self.error:.0%} as a whole"
             if self.specimen == "other"
-            else "the same specimen, without additional test errors; for another specimen use --specimen other"
+            else "the same specimen, without additional test errors; for another specimen use --next-specimen other"
         )
         return [
             "Expected sd: square root of the expected posterior variance, averaged over the possible outcomes of the "
@@ -125,7 +125,7 @@ def run_design(
     tests = settings.tests
     if tests and settings.points:
         raise InputError(
-            "--points is for the default tests and a candidate states its own points: give only one of them."
+            "--measurements is for the default tests and a candidate states its own points: give only one of them."
         )
     step("loading the run")
     posterior = load(folder / settings.run, settings.discrepancy, law)

@@ -15,14 +15,13 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws, laws_named
-from tissuq.result_warning import ResultWarning, most_severe_first
+from tissuq.result_warning import ResultWarning, merged, most_severe_first
 from tissuq.studies.specimen import (
     ALL,
     SpecimenSettings,
     parameters_of,
     priors_in_mpa,
     warnings_of_files,
-    warnings_of_fits,
 )
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
@@ -85,7 +84,7 @@ class LawStudy:
     @property
     def warnings(self) -> list[ResultWarning]:
         """Warnings about data and fits, each once with the laws that it concerns, the severest first."""
-        texts = warnings_of_fits(self.comparison.fits)
+        texts = merged({name: posterior.warnings for name, posterior in self.comparison.fits.items()})
         return most_severe_first([*self.data_warnings, *measurement_warnings(self.experiment), *texts])
 
 

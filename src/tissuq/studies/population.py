@@ -46,7 +46,9 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         if self.specimen is None:
             return find_tests([folder / file for file in self.files])
         if len(self.files) > 1 or (folder / self.files[0]).is_dir():
-            raise InputError("--specimen names a column of a single file: give one FILE, or leave --specimen out.")
+            raise InputError(
+                "--specimen-column names a column of a single file: give one FILE, or leave --specimen-column out."
+            )
         return {Path(self.files[0]).stem: [folder / self.files[0]]}
 
     def readings(self, folder: Path = Path()) -> dict[str, list[Reading]]:

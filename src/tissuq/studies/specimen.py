@@ -32,7 +32,7 @@ from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
-from tissuq.result_warning import ResultWarning, Severity, most_severe_first
+from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
 from tissuq.studies.held_out import held_out_tests
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.studies.settings import looked_up
@@ -46,7 +46,6 @@ __all__ = [
     "priors_in_mpa",
     "run_specimen",
     "warnings_of_files",
-    "warnings_of_fits",
 ]
 
 ALL = "all"
@@ -154,7 +153,7 @@ class SpecimenStudy:
     @property
     def warnings(self) -> list[ResultWarning]:
         """Warnings about data and fits, each once with the discrepancies that it concerns, the severest first."""
-        texts = warnings_of_fits(self.posteriors)
+        texts = merged({name: posterior.warnings for name, posterior in self.posteriors.items()})
         return most_severe_first([*self.data_warnings, *texts, *measurement_warnings(self.experiment)])
 
     @property
@@ -312,20 +311,6 @@ def _of_file(text: str) -> ResultWarning:
     is_doubtful = DOUBTFUL_UNIT in text
     code, severity = ("doubtful-unit", Severity.PROBLEM) if is_doubtful else ("measurements", Severity.CAUTION)
     return ResultWarning(text, code, severity)
-
-
-def warnings_of_fits(posteriors: Mapping[str, Posterior]) -> list[ResultWarning]:
-    """Return the warnings about fits, one of each kind, with the names of those that it concerns if there are several.
-
-    The numbers in it are those of the first.
-    """
-    if len(posteriors) == 1:
-        return list(next(iter(posteriors.values())).warnings)
-    concerned: dict[str, dict[str, ResultWarning]] = {}
-    for name, posterior in posteriors.items():
-        for warning in posterior.warnings:
-            concerned.setdefault(warning.code, {}).setdefault(name, warning)
-    return [next(iter(by_name.values())).of(by_name) for by_name in concerned.values()]
 
 
 def _every() -> list[str]:

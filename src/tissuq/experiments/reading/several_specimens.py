@@ -111,7 +111,9 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
         if not (is_of_specimens(quantity) or _are_words(labels) or is_numbered):
             continue
         name, distinct = table.key(column), list(dict.fromkeys(labels))
-        fit_all = f"; to fit each and the population that they are from: tissuq population FILE --specimen '{name}'"
+        fit_all = (
+            f"; to fit each and the population that they are from: tissuq population FILE --specimen-column '{name}'"
+        )
         raise SeveralSpecimens(
             f"{table.place(column)} names several tests: {_listed(labels)}. To read one of them give --only "
             f"'{name}={labels[0]}' (in Python only={{'{name}': '{labels[0]}'}})"

@@ -21,6 +21,7 @@ from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.fitting import fit, fit_many
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
+from tissuq.result_warning import ResultWarning, merged
 from tissuq.validation.paper.claims import Finding, Findings, Verdict, find, judge
 
 __all__ = [
@@ -187,10 +188,10 @@ class PaperStudy:
     cells: list[Cell]
 
     @property
-    def warnings(self) -> list[str]:
-        """Warnings about the fits."""
-        fits = [*self.main.values(), *self.sampled.values()]
-        return list(dict.fromkeys(f"{fit.formulation}: {text}" for fit in fits for text in fit.posterior.warnings))
+    def warnings(self) -> list[ResultWarning]:
+        """Warnings about the fits, one of each kind with the formulations that it concerns."""
+        sampled = {f"{name} (nuts)": fit for name, fit in self.sampled.items()}
+        return merged({name: fit.posterior.warnings for name, fit in {**self.main, **sampled}.items()})
 
     @property
     def not_converged(self) -> list[str]:
