@@ -8,7 +8,7 @@ PROCESSES ?= 2
 PYTEST := $(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist worksteal
 LONG := slow or statistical or finite_elements
 BENCH := .venv-bench
-APT := { apt-get install -qq -y calculix-ccx || { apt-get update -qq && apt-get install -qq -y calculix-ccx; }; }
+APT := { apt-get install -qq -y calculix-ccx chromium || { apt-get update -qq && apt-get install -qq -y calculix-ccx chromium; }; }
 JAX_CACHE ?= .jax_cache
 
 .PHONY: demo test test-rest test-all mutants fuzz frozen architecture lint types check system lock bench clean help
@@ -55,16 +55,17 @@ types: $(VENV)/.installed-dev  ## Check types
 
 check: lint types test test-rest  ## Everything that CI checks
 
-# CalculiX is no Python package. Where it cannot be installed the tests that need it skip, so that this never fails.
-system:  ## Install CalculiX, which judges the material cards in the tests (Debian, Ubuntu; as root or with sudo)
-	@if command -v ccx >/dev/null; then echo "CalculiX is here: $$(command -v ccx)"; \
+# These are no Python packages. Where they cannot be installed the tests that need them skip, so that this never fails.
+system:  ## Install CalculiX, which judges material cards in the tests, and Chromium, which opens pages (Debian, Ubuntu)
+	@if command -v ccx >/dev/null && command -v chromium >/dev/null; then \
+	  echo "CalculiX is here: $$(command -v ccx), and Chromium: $$(command -v chromium)"; \
 	elif ! command -v apt-get >/dev/null; then \
 	  echo "CalculiX (ccx) is not here, and nor is apt-get: install it from https://www.calculix.de or with conda"; \
-	  echo "(conda install -c conda-forge calculix) and put ccx on the PATH. Without it some tests skip."; \
+	  echo "(conda install -c conda-forge calculix) and put ccx and Chromium on the PATH. Without them some tests skip."; \
 	elif [ "$$(id -u)" -eq 0 ]; then $(APT); \
 	elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then sudo sh -c '$(APT)'; \
-	else echo "CalculiX (ccx) is not here; to install it: sudo apt-get install calculix-ccx. Without it some tests skip."; fi \
-	|| echo "CalculiX could not be installed; the tests that need it skip."
+	else echo "To install CalculiX and Chromium: sudo apt-get install calculix-ccx chromium. Without them some tests skip."; fi \
+	|| echo "CalculiX or Chromium could not be installed; the tests that need them skip."
 
 bench: $(BENCH)/.installed  ## Time tissuq by itself and beside other libraries; writes benchmarks/RESULTS.md (half an hour)
 	$(BENCH)/bin/python benchmarks/cold_start.py

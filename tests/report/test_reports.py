@@ -25,7 +25,7 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__(convert_charrefs=True)
         self.open, self.references, self.images, self.styles, self.words = [], [], [], [], []
-        self.counts = {}
+        self.counts, self.metas, self.scripts = {}, [], ""
         self.feed(text)
         self.close()
         assert self.open == [], f"never closed: {self.open}"
@@ -35,6 +35,8 @@ class Page(HTMLParser):
         given = dict(attributes)
         assert len(given) == len(attributes), f"an attribute of {tag} is given twice"
         self.references += [value for name, value in attributes if name in ("src", "href", "srcset", "data", "action")]
+        if tag == "meta":
+            self.metas.append(given)
         if tag == "img":
             self.images.append(given)
         if tag not in VOID:
@@ -45,6 +47,9 @@ class Page(HTMLParser):
         assert self.open.pop() == tag, f"</{tag}> closes another element"
 
     def handle_data(self, data):
+        if self.open and self.open[-1] == "script":
+            self.scripts += data
+            return
         (self.styles if self.open and self.open[-1] == "style" else self.words).append(data)
 
 
@@ -118,7 +123,10 @@ def test_the_page_asks_no_host_for_anything(text):
     page = Page(text)
     assert all(reference.startswith("data:") for reference in page.references)
     assert not any(word in "".join(page.styles) for word in ("url(", "@import", "//"))
-    assert page.counts.keys().isdisjoint({"script", "link", "iframe", "object", "embed", "base"})
+    assert page.counts.keys().isdisjoint({"link", "iframe", "object", "embed", "base"})
+    (policy,) = (meta["content"] for meta in page.metas if meta.get("http-equiv") == "Content-Security-Policy")
+    assert policy == "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+    assert not re.search(r"fetch\(|XMLHttpRequest|WebSocket|EventSource|sendBeacon|\.src\b|location", page.scripts)
 
 
 def test_every_figure_is_inside_the_page_as_the_svg_of_the_folder(folder, text):

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
+from importlib.resources import files
 from itertools import repeat
 from pathlib import Path
 from tempfile import mkdtemp
@@ -203,7 +204,7 @@ def write_page(folder: Path, template: str, **context: Any) -> None:
     recipe = folder / RECIPE
     context["recipe"] = recipe.read_text(encoding="utf-8") if recipe.exists() else ""
     context["figures"] = {path.stem: _as_address(path) for path in sorted((folder / "figures").glob("*.svg"))}
-    page = _templates().get_template(template).render(versions=versions(), **context)
+    page = _templates().get_template(template).render(versions=versions(), asset=_asset, **context)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -216,6 +217,12 @@ def _templates() -> Environment:
         loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
+
+
+@cache
+def _asset(name: str) -> str:
+    """Return a script or a style that goes into pages."""
+    return (files("tissuq.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _as_address(figure: Path) -> str:

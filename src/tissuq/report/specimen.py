@@ -17,6 +17,7 @@ from tissuq.experiments.reading.inspection import Inspection
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.posterior.posterior import Posterior
 from tissuq.report.answer import ANSWER, answer_record, readable_estimates, shown_and_folded
+from tissuq.report.chart import chart_data
 from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import (
     ASSESSMENT,
@@ -190,6 +191,7 @@ def _title(study: SpecimenStudy) -> str:
 def _context(study: SpecimenStudy, summary: list[Row], record: dict[str, Any]) -> dict[str, Any]:
     shown, folded = shown_and_folded(record)
     return {
+        "chart_data": chart_data(study.posteriors, study.main, study.unit),
         "answer": record | {"estimates": readable_estimates(record), "next": record["next"].format(run="RUN")},
         "shown_warnings": shown,
         "folded_warnings": folded,
