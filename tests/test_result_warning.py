@@ -47,6 +47,13 @@ def test_of_several_results_a_warning_stands_once_with_their_names():
     other = ResultWarning("few.", "few-measurements")
     assert merged({"a": [first, other], "b": [], "c": [second]}) == ['a, c: lag 1: noise="repeats".', "a: few."]
     assert merged({"a": [first, other]}) == [first, other]
+    assert merged({"a": [other]}, named=True) == ["a: few."]
+
+
+def test_a_note_says_what_the_warning_said():
+    warning = ResultWarning("fit with {noise}.", "correlated-residuals", noise="repeats")
+    note = warning.as_note()
+    assert (note, note.shell, note.code, note.severity) == (warning, warning.shell, warning.code, Severity.NOTE)
 
 
 def test_a_code_that_is_not_explained_is_refused():

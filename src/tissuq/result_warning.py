@@ -95,9 +95,16 @@ class ResultWarning(str):
     def of(self, names: Iterable[str]) -> ResultWarning:
         """Return the same warning with the names of what it concerns at its start."""
         start = f"{', '.join(names)}: "
-        named = ResultWarning(start + self, self.code, self.severity)
-        named.shell = start + self.shell
-        return named
+        return self._written(start + self, start + self.shell, self.severity)
+
+    def as_note(self) -> ResultWarning:
+        """Return the same warning as a note."""
+        return self._written(str(self), self.shell, Severity.NOTE)
+
+    def _written(self, python: str, shell: str, severity: Severity) -> ResultWarning:
+        warning = ResultWarning(python, self.code, severity)
+        warning.shell = shell
+        return warning
 
 
 def in_shell(warning: str) -> str:
@@ -105,12 +112,12 @@ def in_shell(warning: str) -> str:
     return warning.shell if isinstance(warning, ResultWarning) else warning
 
 
-def merged(warnings: Mapping[str, Iterable[ResultWarning]]) -> list[ResultWarning]:
+def merged(warnings: Mapping[str, Iterable[ResultWarning]], *, named: bool = False) -> list[ResultWarning]:
     """Return the warnings about several results, one of each kind with the names of those that it concerns.
 
-    The numbers in it are those of the first. Of a single result they are as they are.
+    The numbers in it are those of the first. Of a single result they are as they are, unless it is to be ``named``.
     """
-    if len(warnings) == 1:
+    if len(warnings) == 1 and not named:
         return list(next(iter(warnings.values())))
     concerned: dict[str, dict[str, ResultWarning]] = {}
     for name, of_result in warnings.items():

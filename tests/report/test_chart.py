@@ -81,7 +81,19 @@ def test_a_browser_draws_the_chart_and_reads_the_last_measurement_out(posterior,
     experiment = posterior.model.experiment
     rows = "".join(f"{x},{1000 * y}\n" for x, y in zip(experiment.stretch, experiment.stress, strict=True))
     file.write_text(f"stretch,stress_kPa\n{rows}", encoding="utf-8")
-    fit = [sys.executable, "-m", "tissuq", "fit", file, "--material", "mooney-rivlin", "--discrepancy", "none", "--noise-sd", "10"]
+    fit = [
+        sys.executable,
+        "-m",
+        "tissuq",
+        "fit",
+        file,
+        "--material",
+        "mooney-rivlin",
+        "--discrepancy",
+        "none",
+        "--noise-sd",
+        "10",
+    ]
     subprocess.run([*fit, "--out", tmp_path / "run"], check=True, capture_output=True)
     command = [*CHROMIUM.split(), f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", tmp_path / "run/report.html"]
     page = html.unescape(subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout)

@@ -95,7 +95,7 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
         _print_assessment(folder / ASSESSMENT)
     _print_held_out(folder / HELD_OUT_TESTS, headline_of(rows[0]), unit)
     if answer is not None and not details:
-        count = f" and {len(folded)} more warnings" if folded else ""
+        count = f", {len(folded)} more warnings or notes" if folded else ""
         print(f"Stability, shares, weights{count}: tissuq show {shlex.quote(str(folder))} --details")
     print(f"Report: {folder / 'report.html'}")
 

@@ -15,7 +15,7 @@ __all__ = ["ANSWER", "answer_record", "readable_estimates", "shown_and_folded"]
 ANSWER = "answer.json"
 """The file with the answer of a fit."""
 MAX_SHOWN = 3
-"""Warnings that are shown at once; the others are counted and folded."""
+"""Warnings that are shown at once; notes and the others are counted and folded."""
 
 
 def answer_record(
@@ -67,8 +67,9 @@ def readable_estimates(record: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def shown_and_folded(record: dict[str, Any]) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
-    """Return the warnings to show at once, problems in any case, and the others."""
+    """Return the warnings to show at once, problems in any case, and the others; they are in order of severity."""
     warnings: list[dict[str, str]] = record["warnings"]
-    problems = sum(warning["severity"] == Severity.PROBLEM for warning in warnings)
-    count = max(MAX_SHOWN, problems)
+    severities = [warning["severity"] for warning in warnings]
+    problems, notes = severities.count(Severity.PROBLEM), severities.count(Severity.NOTE)
+    count = min(max(MAX_SHOWN, problems), len(warnings) - notes)
     return warnings[:count], warnings[count:]

@@ -152,9 +152,14 @@ class SpecimenStudy:
 
     @property
     def warnings(self) -> list[ResultWarning]:
-        """Warnings about data and fits, each once with the discrepancies that it concerns, the severest first."""
-        texts = merged({name: posterior.warnings for name, posterior in self.posteriors.items()})
-        return most_severe_first([*self.data_warnings, *texts, *measurement_warnings(self.experiment)])
+        """Warnings about data and fits, the severest first.
+
+        Those of fits beside the one that answers stand once with their names, and are notes: they concern a comparison.
+        """
+        own = self.posteriors[self.main].warnings
+        others = merged({name: fit.warnings for name, fit in self.posteriors.items() if name != self.main}, named=True)
+        beside = [warning if warning.severity is Severity.PROBLEM else warning.as_note() for warning in others]
+        return most_severe_first([*self.data_warnings, *own, *measurement_warnings(self.experiment), *beside])
 
     @property
     def main(self) -> str:
