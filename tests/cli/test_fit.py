@@ -1,4 +1,5 @@
 import csv
+import json
 import re
 import shutil
 import tomllib
@@ -234,6 +235,15 @@ def test_show_prints_what_fit_printed(cli, here, specimen):
     assert fitted.out == shown.out
     assert "Warning: " in shown.out  # of the test's design
     assert tomllib.loads((here / "runs" / "specimen" / "run.toml").read_text())["file"] == "input/specimen.csv"
+
+
+def test_show_gives_programs_what_the_files_hold(cli, here, specimen):
+    assert cli("fit", specimen, "--noise-sd", 1, *ALONE).status == 0
+    shown = json.loads(cli("show", "runs/specimen", "--json").out)
+    files = {name: json.loads((here / "runs" / "specimen" / f"{name}.json").read_text()) for name in shown}
+    assert shown == files
+    assert {"answer", "summary", "assessment"} == set(shown)
+    assert cli("show", "nowhere", "--json").status == 2
 
 
 @pytest.mark.parametrize(

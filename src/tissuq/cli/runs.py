@@ -318,8 +318,12 @@ def show(
     details: Annotated[
         bool, typer.Option("--details", help="Also stability, what the discrepancy does, and all warnings.")
     ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Everything as one JSON object, for programs.")] = False,
 ) -> None:
     """Print the answer of a run and where its report lies."""
-    from tissuq.cli.tables import print_summary
+    from tissuq.cli.tables import print_json, print_summary
 
-    print_summary(run_folder, details=details)
+    if as_json:
+        print_json(run_folder)
+    else:
+        print_summary(run_folder, details=details)

@@ -19,7 +19,7 @@ from tissuq.studies.settings import DAMAGE, damage_reported, load_settings
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
 
-__all__ = ["print_explanations", "print_rows", "print_summary", "print_warnings"]
+__all__ = ["print_explanations", "print_json", "print_rows", "print_summary", "print_warnings"]
 
 TEXT_WIDTH = 96
 """Letters in a line of prose."""
@@ -95,9 +95,28 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
         _print_assessment(folder / ASSESSMENT)
     _print_held_out(folder / HELD_OUT_TESTS, headline_of(rows[0]), unit)
     if answer is not None and not details:
-        count = f", {len(folded)} more warnings or notes" if folded else ""
+        count = f", {len(folded)} further warnings or notes" if folded else ""
         print(f"Stability, shares, weights{count}: tissuq show {shlex.quote(str(folder))} --details")
     print(f"Report: {folder / 'report.html'}")
+
+
+def print_json(folder: Path) -> None:
+    """Print everything that a run says as one JSON object: answer, summary, assessment and predictions of held-out tests.
+
+    Raises
+    ------
+    InputError
+        When the folder is not that of a complete run.
+    """
+    files = {"answer": ANSWER, "summary": SUMMARY, "assessment": ASSESSMENT, "held_out": HELD_OUT_TESTS}
+    if not (folder / SUMMARY).exists():
+        raise InputError(f"'{folder}' is not the folder of a complete run: {SUMMARY} is missing.")
+    contents = {}
+    for name, file in files.items():
+        with damage_reported(folder / file):
+            if (folder / file).exists():
+                contents[name] = json.loads((folder / file).read_text(encoding="utf-8"))
+    print(json.dumps(contents, indent=2))
 
 
 def _answer(folder: Path) -> dict[str, Any] | None:
