@@ -101,7 +101,7 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
 
 
 def print_json(folder: Path) -> None:
-    """Print everything that a run says as one JSON object: answer, summary, assessment and predictions of held-out tests.
+    """Print all that a run says as one JSON object: answer, summary, assessment, predictions of held-out tests.
 
     Raises
     ------
