@@ -17,13 +17,13 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import predict_band
+from tissuq.prediction.bands import predict_band, predict_bands
 
 __all__ = ["chart_data"]
 
 FloatArray = NDArray[np.float64]
 
-GRID_POINTS = 61
+GRID_POINTS = 41
 """Stretches at which bands are drawn, besides those of the measurements."""
 MAX_MEASUREMENTS = 1000
 """Measurements of a curve that are drawn, spread over it."""
@@ -110,8 +110,7 @@ def _drawn(formulation: str, posterior: Posterior, view: _View, unit: StressUnit
     options: dict[str, Any] = {"mode": view.mode, "channel": view.channel}
     unique, rows = np.unique(view.points, axis=0, return_inverse=True)
     try:
-        of_measurements = predict_band(posterior.solution, unique, **options)
-        of_stress = predict_band(posterior.solution, unique, noise=False, **options)
+        of_measurements, of_stress = predict_bands([(1.0, posterior.solution)], unique, [True, False], **options)
         alone = predict_band(posterior.solution, unique, noise=False, discrepancy=False, **options)
     except TissuqError:
         return {}
