@@ -98,10 +98,11 @@ def warnings_about(
             "noise is far smaller than the scatter of the data: give a larger noise, or leave it unknown.",
             "inaccurate-integral",
         )
+    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     lag1, held = _lag1_correlation(solution), int(inside.sum())
     if lag1 is not None:
         yield _correlated_residuals(solution.model, lag1)
-    elif bdtr(held, len(inside), 0.95) < MAX_PROBABILITY_OF_MISSES:
+    elif not cut and bdtr(held, len(inside), 0.95) < MAX_PROBABILITY_OF_MISSES:
         yield _missed_measurements(solution.model, f"{held} of {len(inside)}")
     headline = solution.model.headline
     low, high = solution.marginals[headline].hdi()
@@ -111,7 +112,6 @@ def warnings_about(
             "nearer to stretch 1, or with less noise.",
             "poorly-determined",
         )
-    cut = [f"{symbol} ({end})" for symbol, end in _cut_by_prior(solution)]
     if cut:
         yield ResultWarning(
             f"{PRIOR_BOUND_REACHED} of {', '.join(cut)}: there the bound, not the data, determines the result. Give a "
