@@ -186,8 +186,8 @@ def panels(
 def small_panels(count: int) -> Iterator[tuple[Figure, Panels]]:
     """Give panels side by side on a small figure for a table in a notebook, which no layout engine spends time on."""
     width, height = SMALL[0] * (1 + 0.7 * (count - 1)), SMALL[1]
-    with new_figure(width, height, STYLE | {"font.size": 9, "axes.titlesize": 9}) as figure:
-        figure.set_layout_engine("none")
+    style = STYLE | {"font.size": 9, "axes.titlesize": 9, "figure.constrained_layout.use": False}
+    with new_figure(width, height, style) as figure:
         figure.subplots_adjust(0.62 / width, 0.46 / height, 1 - 0.1 / width, 1 - 0.26 / height, wspace=0.28)
         yield figure, Panels(list(figure.subplots(1, count, squeeze=False)[0]))
 

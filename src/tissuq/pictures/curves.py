@@ -24,6 +24,8 @@ POINTS, SHARE_POINTS, SHARE_DRAWS = 101, 41, 800
 """Points of a band and of a share along a curve, and draws of the latter."""
 RETURN, MOST_WAYS = 0.3, 7
 """Decrease of the deformation at which a new path begins, over its largest change; and the most paths of a picture."""
+NEARLY = 0.02
+"""Changes of a control that do not count, over its range."""
 NO_STRESS = 0.02
 """Stress over the largest one of a curve, below which there is no share of it."""
 
@@ -77,13 +79,16 @@ def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list
     size = np.linalg.norm(points - mode.reference, axis=1)
     starts = 1 + np.flatnonzero(np.diff(size) < -RETURN * np.ptp(size))
     parts = np.split(np.arange(len(points)), starts)
-    if len(parts) > MOST_WAYS:
-        return [Way(np.argsort(abscissa, kind="stable"), False)]
+    nearly, least = NEARLY * np.ptp(points, axis=0), NEARLY * np.ptp(abscissa)
     ways = []
     for part in parts:
         order = part[np.argsort(abscissa[part], kind="stable")]
-        steps = np.diff(abscissa[order])
-        ways.append(Way(order, len(part) > 1 and bool((steps > 0).all()) and steps.sum() > 0.02 * np.ptp(abscissa)))
+        others, along = np.diff(points[order], axis=0), np.diff(abscissa[order])
+        is_one = ((others >= -nearly).all(axis=0) | (others <= nearly).all(axis=0)).all() and (along > 0).all()
+        is_held = along.sum() <= least
+        if len(parts) > MOST_WAYS or not (is_one or is_held):
+            return [Way(np.argsort(abscissa, kind="stable"), False)]
+        ways.append(Way(order, not is_held))
     return ways
 
 

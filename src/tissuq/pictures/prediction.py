@@ -151,8 +151,10 @@ def predicted_limits(found: Sequence[Predicted]) -> tuple[float, float]:
         core += [of.measured.stress] if of.measured is not None else []
         beyond += [of.measurements.low, of.measurements.high]
     low, high = limits_of(core, [])
-    medians = [np.clip(of.stress.median, low - 2 * (high - low), high + 2 * (high - low)) for of in found]
-    return limits_of([*core, *medians], beyond)
+    extent = high - low
+    medians = [np.clip(of.stress.median, low - extent, high + extent) for of in found]
+    near = [np.clip(ends, low - 0.5 * extent, high + 0.5 * extent) for ends in beyond]
+    return limits_of([*core, *medians, *near], [])
 
 
 def draw_predicted(

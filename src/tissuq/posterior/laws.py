@@ -296,7 +296,7 @@ def fit_laws(
 
 
 def _percent(share: float) -> str:
-    return "< 0.1 %" if 0 < share < 0.001 else f"{100 * share:.3g} %"
+    return "< 0.1 %" if share < 0.001 else f"{100 * share:.{int(share < 0.1)}f} %"
 
 
 def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:
