@@ -42,7 +42,7 @@ def test_very_many_measurements_are_summed_up_in_bins(axis):
     (means,) = axis.lines
     assert len(means.get_xdata()) == 120
     np.testing.assert_allclose(means.get_ydata(), 2 * means.get_xdata(), atol=1e-9)
-    assert means.get_label().startswith("measured (12000)")
+    assert means.get_label().startswith("measured (12000, in bins)")
 
 
 def test_intervals_have_a_mark_in_their_middle_and_one_label(axis):

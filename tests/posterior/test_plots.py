@@ -87,6 +87,17 @@ def test_without_a_discrepancy_there_is_neither_a_strip_nor_a_material_alone(pla
         plain.plot_discrepancy()
 
 
+@pytest.mark.parametrize("material", ["neo-hookean", "generalised-mooney-rivlin-with-a-long-name"])
+def test_no_legend_is_wider_than_its_figure(posterior, material, monkeypatch):
+    monkeypatch.setattr(type(posterior.model.material), "name", material)
+    for axis in (posterior.plot(), posterior.plot_prediction(), posterior.plot_parameters()[0]):
+        figure = axis.figure
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        box = legend.get_window_extent()
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
+
+
 def test_several_tests_are_panels_and_come_as_an_array(two_tests):
     axes = two_tests.plot()
     assert axes.shape == (2,)

@@ -38,6 +38,8 @@ LABEL_WIDTH, LETTER_WIDTH = 0.085, 0.56
 """Inches of a panel beside its axes for a point of the size of letters, and width of a letter over its size."""
 SMALL = (3.8, 2.3)
 """Inches of a small figure of one panel."""
+SMALLER, LEGEND_MARK = 0.833, 7
+"""Size of small letters over the usual one, and letters that stand for a mark of the legend and the gap beside it."""
 STRIP_SHARE = 0.3
 """Height of a strip over that of its panel."""
 MARGIN = 0.5
@@ -79,6 +81,13 @@ class Panels:
         return int(points / (LETTER_WIDTH * rcParams["font.size"]))
 
     @property
+    def _letters_across(self) -> float:
+        """How many letters fit across a new figure."""
+        from matplotlib import rcParams
+
+        return float(72 * self.axes[0].figure.get_figwidth() / (LETTER_WIDTH * rcParams["font.size"]))  # type: ignore[union-attr]
+
+    @property
     def columns(self) -> int:
         """How many panels of a new figure stand side by side."""
         grid = self.axes[0].get_gridspec() if self.is_new else None
@@ -91,10 +100,12 @@ class Panels:
 
     def explain(self, columns: int | None = None) -> None:
         """Say what the panels show: above a new figure, and where there is room within a user's first axes."""
-        if not any(axis.get_legend_handles_labels()[1] for axis in self.axes):
+        labels = [label for axis in self.axes for label in axis.get_legend_handles_labels()[1]]
+        if not labels:
             return
         if self.is_new:
-            across = columns or (2 if self.columns == 1 else 4)
+            fitting = int(self._letters_across / (SMALLER * (max(map(len, labels)) + LEGEND_MARK)))
+            across = max(1, min(columns or (2 if self.columns == 1 else 4), fitting))
             legend_above(self.axes[0].figure, self.axes, across, font_size="small")
         else:
             self.axes[0].legend(loc="best", fontsize="small")

@@ -79,7 +79,7 @@ def points(
         centre, mean = (np.array([values[places].mean() for places in bins]) for values in (x, y))
         low, high = np.array([np.quantile(y[places], [0.025, 0.975]) for places in bins]).T
         axis.vlines(centre, low, high, color=INK, lw=0.8 * size)
-        label = f"{label} ({len(y)}): mean and central 95 % of bins" if label else ""
+        label = f"{label} ({len(y)}, in bins)" if label else ""
         axis.plot(centre, mean, "o", color=INK, ms=2.5 * size, label=label)
     elif error is not None and error.any():
         label = f"{label} ± standard error" if label else ""
