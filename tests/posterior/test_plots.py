@@ -172,6 +172,17 @@ def test_a_prediction_shows_the_bands_of_the_mode(posterior):
     assert "measured" not in by_label(axis)
 
 
+def test_a_prediction_stops_before_a_material_locks_unless_it_is_asked_for():
+    data = tq.simulate("gent", {"mu": 0.3, "Jm": 1.5}, np.linspace(0.7, 1.5, 20), 0.01, seed=1)
+    found = tq.fit(data, material="gent", discrepancy="none", noise_sd=0.01)
+    median = by_label(found.plot_prediction())["predicted median"]
+    assert np.isfinite(median.get_ydata()).all()
+    assert median.get_xdata().max() >= 1.5
+    with pytest.raises(tq.ModelError, match="no stress at a stretch of 4"):
+        found.plot_prediction(stretch=[1.0, 4.0])
+    assert len(plt.get_fignums()) == 1  # that of the first
+
+
 def test_a_mode_of_several_controls_that_was_not_measured_needs_points(posterior):
     with pytest.raises(tq.InputError, match="stretch="):
         posterior.plot_prediction("biaxial")
@@ -183,7 +194,8 @@ def test_a_mode_of_several_controls_that_was_not_measured_needs_points(posterior
 
 def test_an_error_of_the_stress_is_left_out_of_other_modes_and_the_title_says_so(data):
     found = gallery.fit(data, discrepancy="constant", noise_sd=0.02)
-    assert "alone: the discrepancy says nothing" in found.plot_prediction("planar").get_title(loc="left")
+    title = found.plot_prediction("planar").get_title(loc="left")
+    assert title == "planar\nneo-hookean alone, discrepancy unknown"
     assert found.plot_prediction().get_title(loc="left") == "uniaxial"
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_curves", "small_svg"]
 
-MOST_SMALL = 3
+MOST_SMALL = 2
 """Curves of a notebook's figure at the most."""
 
 

@@ -29,8 +29,8 @@ NARROW, NARROW_ROW = (400, 480), 300
 """The same on a small screen, where panels stand above one another."""
 WIDE_LETTERS, NARROW_LETTERS = 11, 10.5
 """Points; a pixel of a page is three quarters of one."""
-SMALL_POINTS, FEW, MOST_SMALL = 31, 100, 2
-"""Points of its band, components of the posterior, and measured curves at the most."""
+SMALL_POINTS, FEW = 31, 100
+"""Points of the band of a small figure, and components of the posterior that it takes."""
 LONG, SHORT = "engineering stress of", "stress of"
 """Words of the name of one of several stresses, which are long for an axis, and others."""
 SHARE_TICKS, MOST_SHARE = 3, 500
@@ -90,23 +90,25 @@ def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) ->
 
 
 def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
-    """Return data and band of measurements as a small SVG, from few components of the posterior: at little cost."""
-    curves, few = solution.model.experiment.curves[:MOST_SMALL], solution.mixture.thinned(FEW)
-    solution = replace(solution, represent=lambda: few)
-    with small_panels(len(curves)) as (figure, drawn):
-        for axis, curve in zip(drawn.axes, curves, strict=True):
-            across = points_along(curve, SMALL_POINTS)
-            of_curve = predict_band(solution, across, mode=curve.mode, channel=curve.channel)
-            low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
-            measured = curve.stress / unit.to_mpa
-            limits = limits_of([measured, median], [low, high])
-            for places, is_curve in ways_of(curve.mode, across, of_curve.stretch):
-                ends = within(low[places], limits), within(high[places], limits)
-                band(axis, of_curve.stretch[places], *ends, is_path=is_curve)
-                line(axis, of_curve.stretch[places], median[places], is_path=is_curve)
-            points(axis, curve.abscissa, measured)
-            axis.set_ylim(limits)
-            axis.set_title(f"{shortened(curve.name, drawn.letters - 6)} [{unit.name}]")
+    """Return the first measured curve and its band as a small SVG, at little cost: few components make the band."""
+    curves, few = solution.model.experiment.curves, solution.mixture.thinned(FEW)
+    curve, count = curves[0], f", 1 of {len(curves)}" if len(curves) > 1 else ""
+    across = points_along(curve, SMALL_POINTS)
+    rough = replace(solution, represent=lambda: few)
+    of_curve = predict_band(rough, across, mode=curve.mode, channel=curve.channel)
+    low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
+    measured = curve.stress / unit.to_mpa
+    limits = limits_of([measured, median], [low, high])
+    with small_panels(1) as (figure, drawn):
+        (axis,) = drawn.axes
+        for places, is_curve in ways_of(curve.mode, across, of_curve.stretch):
+            band(axis, of_curve.stretch[places], within(low[places], limits), within(high[places], limits),
+                 is_path=is_curve)  # fmt: skip
+            line(axis, of_curve.stretch[places], median[places], is_path=is_curve)
+        points(axis, curve.abscissa, measured)
+        axis.set_ylim(limits)
+        end = f" [{unit.name}]{count}"
+        axis.set_title(f"{shortened(curve.name, drawn.letters - len(end))}{end}")
     return inline_svg(figure, words)
 
 

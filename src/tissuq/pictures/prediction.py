@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.drawing.panels import Panels, limits_of, within
 from tissuq.drawing.pieces import band, line, outside, points
 from tissuq.drawing.style import BASE, INK, relative_size
-from tissuq.errors import InputError
+from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
@@ -38,6 +39,8 @@ POINTS = 121
 """Of a band, unless they are given."""
 REACH = 0.35
 """How far a prediction goes beyond what was measured on either side, over the measured range."""
+LESSER_REACHES = (REACH, REACH / 3, REACH / 10)
+"""The same where a material locks before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,7 @@ class Predicted:
     quantity: str
 
 
-def stretches_to_show(solution: Solution, mode: LoadingMode) -> FloatArray:
+def stretches_to_show(solution: Solution, mode: LoadingMode, reach: float = REACH) -> FloatArray:
     """Return points of a mode to predict at: over the measured range and beyond; or those that were measured.
 
     Raises
@@ -100,34 +103,54 @@ def stretches_to_show(solution: Solution, mode: LoadingMode) -> FloatArray:
             )
         return measured
     low, high = calibrated_range(data, mode)
-    reach = REACH * (high - low)
+    wider = reach * (high - low)
     lowest, reference = mode.controls[0].above, float(mode.reference)
-    start = low if np.isclose(low, reference) else max(low - reach, low - 0.5 * (low - lowest))
-    end = high if np.isclose(high, reference) else high + reach
+    start = low if np.isclose(low, reference) else max(low - wider, low - 0.5 * (low - lowest))
+    end = high if np.isclose(high, reference) else high + wider
     return np.linspace(start, end, POINTS)
 
 
 def predictions(
     solution: Solution, mode: LoadingMode, stretch: ArrayLike | None = None, prob: float = 0.95
 ) -> list[Predicted]:
-    """Return every stress of a mode, with the discrepancy where it says something about the mode."""
-    data, asked = solution.model.experiment, np.atleast_1d(np.asarray(stretch, dtype=np.float64))
-    at = stretches_to_show(solution, mode) if stretch is None else asked
-    is_joint = speaks_of(solution.model, mode)
-    several = len(mode.controls) > 1
+    """Return every stress of a mode, with the discrepancy where it says something about the mode.
+
+    Unless stretches are given, as far beyond the measured range as the material has a stress.
+
+    Raises
+    ------
+    InputError, ModelError
+        When the points are none of the mode, must be given, or the material has no stress there.
+    """
+    if stretch is not None:
+        return _predictions(solution, mode, np.atleast_1d(np.asarray(stretch, dtype=np.float64)), prob)
+    for reach in LESSER_REACHES:
+        with suppress(ModelError):
+            return _predictions(solution, mode, stretches_to_show(solution, mode, reach), prob)
+    return _predictions(solution, mode, stretches_to_show(solution, mode, 0.0), prob)
+
+
+def _predictions(solution: Solution, mode: LoadingMode, at: FloatArray, prob: float) -> list[Predicted]:
+    data, model = solution.model.experiment, solution.model
+    is_joint, several = speaks_of(model, mode), len(mode.controls) > 1
     found = []
     for channel, quantity in enumerate(mode.stresses):
         options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
         noisy, stress = predict_bands([(1.0, solution)], at, (True, False), **options)
-        alone = f"{solution.model.material.name} alone: the discrepancy says nothing of this mode"
         found.append(
             Predicted(
-                stress.stretch, stress, noisy, is_calibrated(data, mode, at),
-                None if several else calibrated_range(data, mode), ways_of(mode, at, stress.stretch),
-                _measured(solution, mode, channel), "stretch" if several else mode.controls[0].name,
-                mode.name if is_joint else f"{mode.name}, {alone}", quantity,
+                abscissa=stress.stretch,
+                stress=stress,
+                measurements=noisy,
+                is_calibrated=is_calibrated(data, mode, at),
+                calibrated=None if several else calibrated_range(data, mode),
+                ways=ways_of(mode, at, stress.stretch),
+                measured=_measured(solution, mode, channel),
+                label="stretch" if several else mode.controls[0].name,
+                title=mode.name if is_joint else f"{mode.name}\n{model.material.name} alone, discrepancy unknown",
+                quantity=quantity,
             )
-        )  # fmt: skip
+        )
     return found
 
 
