@@ -71,6 +71,12 @@ class Curve:
         return np.asarray(self.path.abscissa(self.points))
 
     @property
+    def abscissa_name(self) -> str:
+        """What `abscissa` is called on an axis."""
+        controls = self.mode.controls
+        return controls[0].name if len(controls) == 1 else "stretch"
+
+    @property
     def quantity(self) -> str:
         """What the mode calls the stress."""
         return self.mode.stresses[self.channel]

@@ -27,7 +27,7 @@ def draw_curves(drawn: Panels, curves: Sequence[Curve], unit_name: str) -> None:
         axis.axvline(float(curve.path.abscissa(curve.mode.reference)), color=BASE, lw=0.6 * size, zorder=0.5)
         error = curve.standard_error / unit.to_mpa
         points(axis, curve.abscissa, curve.stress / unit.to_mpa, error=error, label="measured")
-        axis.set_xlabel(curve.mode.controls[0].name if len(curve.mode.controls) == 1 else "stretch")
+        axis.set_xlabel(curve.abscissa_name)
         if number % columns_of(len(curves)) == 0 or not drawn.is_new or len(curve.mode.stresses) > 1:
             axis.set_ylabel(f"{curve.quantity} [{unit.name}]")
         if drawn.is_new:

@@ -54,7 +54,7 @@ def answer(solution: Solution, drawn: Panels, unit: StressUnit, prob: float = 0.
     if drawn.strips:
         _draw_strips(drawn, solution, prob)
     for axis, curve in zip(drawn.lowest, curves, strict=True):
-        axis.set_xlabel(curve.mode.controls[0].name if len(curve.mode.controls) == 1 else "stretch")
+        axis.set_xlabel(curve.abscissa_name)
     drawn.explain()
 
 
@@ -82,7 +82,7 @@ def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) ->
         _draw_share(axis, solution, curve, prob)
         if len(curves) > 1:
             axis.set_title(shortened(curve.name, drawn.letters))
-        axis.set_xlabel(curve.mode.controls[0].name if len(curve.mode.controls) == 1 else "stretch")
+        axis.set_xlabel(curve.abscissa_name)
     for number, axis in enumerate(drawn.axes):
         if number % columns_of(len(curves)) == 0 or not drawn.is_new:
             axis.set_ylabel("share of the discrepancy [%]")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.extent import has_energy
-from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure
+from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BAND, BASE, INK, STYLE, TRUTH, new_figure, save_figure
 from tissuq.experiments.experiment import Curve
@@ -22,7 +22,6 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = [
@@ -89,33 +88,34 @@ def predictive_figure(
         found = [_band_over(posteriors[name], curve, discrepancy) for name, curve in panels]
         base = found[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
         for index, (axis, (name, curve)) in enumerate(zip(drawn.axes, panels, strict=True)):
-            posterior, (_, of_panel) = posteriors[name], found[index]
+            posterior, (ways, of_panel) = posteriors[name], found[index]
             inside = posterior.inside_bands(discrepancy=discrepancy)[index % len(curves)].sum()
-            of_curve = f"{curve.name}, {curve.quantity}" if len(curve.mode.stresses) > 1 else curve.name
-            labels = [name] * (len(posteriors) > 1) + [of_curve] * (len(curves) > 1) or [name]
-            axis.set_title(f"{', '.join(labels)}:  {inside} of {len(curve)} inside")
-            _draw_band(axis, *found[index], unit)
-            if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
-                low, high = float(of_panel.stretch[0]), float(of_panel.stretch[-1])
-                shade_instability(axis, posterior.stable_ranges.get(curve.mode.name), low, high)
-            if name != "none" and base:
-                for (places, is_curve), none in [(way, base[index % len(curves)][1]) for way in found[index][0]]:
+            axis.set_title(f"{_label(posteriors, name, curve, drawn.letters)}{inside} of {len(curve)} inside")
+            for places, is_curve in ways:
+                low, high, median = (of[places] / unit.to_mpa for of in (of_panel.low, of_panel.high, of_panel.median))
+                band(axis, of_panel.stretch[places], low, high, is_path=is_curve, label="95 % predictive band")
+                line(axis, of_panel.stretch[places], median, is_path=is_curve, label="predicted median")
+                if name != "none" and base:
+                    none = base[index % len(curves)][1]
                     line(axis, none.stretch[places], none.median[places] / unit.to_mpa, color=BASE, style=":",
                          width=1.4, is_path=is_curve, label="median of the fit 'none'")  # fmt: skip
+            if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
+                ends = float(of_panel.stretch[0]), float(of_panel.stretch[-1])
+                shade_instability(axis, posterior.stable_ranges.get(curve.mode.name), *ends)
             if true_curve is not None:
                 axis.plot(true_curve[0], true_curve[1] / unit.to_mpa, "--", color=TRUTH, lw=1.3, label="true curve")
             points(axis, curve.abscissa, curve.stress / unit.to_mpa)
+            axis.locator_params(axis="x", nbins=6)
             if len(curves) > 1:
-                axis.locator_params(axis="x", nbins=6)
-                axis.set_xlabel(curve.mode.controls[0].name, fontsize=9)
+                axis.set_xlabel(curve.abscissa_name, fontsize=9)
         if len(curves) == 1:
-            ends = [end / unit.to_mpa for _, of_panel in found for end in (of_panel.low, of_panel.high)]
-            _share_axes(drawn, columns, limits_of([curves[0].stress / unit.to_mpa, *ends], []))
-            figure.supxlabel(curves[0].mode.controls[0].name, fontsize=10.5)
+            shown = [end / unit.to_mpa for _, of_panel in found for end in (of_panel.low, of_panel.high)]
+            _share_axes(drawn, columns, limits_of([curves[0].stress / unit.to_mpa, *shown], []))
+            figure.supxlabel(curves[0].abscissa_name, fontsize=10.5)
         measured = {stress for curve in curves for stress in curve.mode.stresses}
         quantity = measured.pop() if len(measured) == 1 else "engineering stress"
         figure.supylabel(f"{quantity} [{unit.name}]", fontsize=10.5)
-        legend_above(figure, drawn.axes, 2 if len(panels) == 1 else None, font_size=9.5)
+        drawn.explain(2 if len(panels) == 1 else len(panels) + 3)
     return figure
 
 
@@ -136,11 +136,14 @@ def _band_over(posterior: Posterior, curve: Curve, discrepancy: bool) -> tuple[l
     return ways_of(curve.mode, at, found.stretch), found
 
 
-def _draw_band(axis: Axes, ways: list[Way], found: Band, unit: StressUnit) -> None:
-    for places, is_curve in ways:
-        low, high, median = (values[places] / unit.to_mpa for values in (found.low, found.high, found.median))
-        band(axis, found.stretch[places], low, high, is_path=is_curve, label="95 % predictive band")
-        line(axis, found.stretch[places], median, is_path=is_curve, label="predicted median")
+def _label(posteriors: Mapping[str, Posterior], name: str, curve: Curve, letters: int) -> str:
+    """Return what tells a panel from the others: its fit, and its curve, which then has a line of its own."""
+    several = len(posteriors[name].model.experiment.curves) > 1
+    if not several:
+        return f"{name}:  "
+    stress = f", {curve.quantity.replace('engineering stress of ', '')}" if len(curve.mode.stresses) > 1 else ""
+    words = [name] * (len(posteriors) > 1) + [f"{curve.name}{stress}"]
+    return f"{shortened(', '.join(words), letters)}\n"
 
 
 def _share_axes(drawn: Panels, columns: int, limits: tuple[float, float]) -> None:
