@@ -140,3 +140,5 @@ def test_the_answer_to_several_tests_grows_by_rows():
     assert 96 * wide.get_figheight() == pytest.approx(480)
     assert 96 * narrow.get_figheight() == pytest.approx(480 + 2 * 300)
     assert len({axis.get_subplotspec().colspan.start for axis in narrow.axes}) == 1
+    assert [axis.get_ylabel() for axis in narrow.axes] == ["engineering stress [kPa]"] * 3
+    assert [axis.get_ylabel() for axis in wide.axes] == ["engineering stress [kPa]", "", ""]

@@ -34,8 +34,8 @@ MAX_COLUMNS = 3
 """Panels side by side."""
 PANEL_HEIGHT, STRIP_HEIGHT, LEGEND_HEIGHT = 2.1, 0.75, 0.5
 """Inches of a figure, as users draw them."""
-LABEL_WIDTH, LETTER_WIDTH = 0.085, 0.56
-"""Inches of a panel beside its axes for a point of the size of letters, and width of a letter over its size."""
+LABEL_LETTERS, LETTER_WIDTH = 11, 0.56
+"""Letters that would fit beside the axes of a panel, and width of a letter over its size."""
 SMALL = (3.8, 2.3)
 """Inches of a small figure of one panel."""
 SMALLER, LEGEND_MARK = 0.833, 7
@@ -75,21 +75,19 @@ class Panels:
     @property
     def letters(self) -> int:
         """How many letters of a title fit above a panel of a new figure."""
-        from matplotlib import rcParams
-
-        points = 72 * (self.axes[0].figure.get_figwidth() / self.columns - LABEL_WIDTH * rcParams["font.size"])  # type: ignore[union-attr]
-        return int(points / (LETTER_WIDTH * rcParams["font.size"]))
+        return int(self._letters_across / self.columns - LABEL_LETTERS)
 
     @property
     def _letters_across(self) -> float:
         """How many letters fit across a new figure."""
         from matplotlib import rcParams
 
-        return float(72 * self.axes[0].figure.get_figwidth() / (LETTER_WIDTH * rcParams["font.size"]))  # type: ignore[union-attr]
+        inches = self.axes[0].figure.get_figwidth()  # type: ignore[union-attr]
+        return float(72 * inches / (LETTER_WIDTH * rcParams["font.size"]))
 
     @property
     def columns(self) -> int:
-        """How many panels of a new figure stand side by side."""
+        """How many panels of a new figure stand side by side; one of axes that are a user's."""
         grid = self.axes[0].get_gridspec() if self.is_new else None
         return grid.ncols if grid else 1
 

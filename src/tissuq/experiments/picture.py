@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tissuq.drawing.panels import Panels, columns_of, shortened, small_panels
+from tissuq.drawing.panels import Panels, shortened, small_panels
 from tissuq.drawing.pieces import points
 from tissuq.drawing.style import BASE, inline_svg, relative_size
 from tissuq.experiments.units import stress_unit
@@ -28,7 +28,7 @@ def draw_curves(drawn: Panels, curves: Sequence[Curve], unit_name: str) -> None:
         error = curve.standard_error / unit.to_mpa
         points(axis, curve.abscissa, curve.stress / unit.to_mpa, error=error, label="measured")
         axis.set_xlabel(curve.abscissa_name)
-        if number % columns_of(len(curves)) == 0 or not drawn.is_new or len(curve.mode.stresses) > 1:
+        if number % drawn.columns == 0 or len(curve.mode.stresses) > 1:
             axis.set_ylabel(f"{curve.quantity} [{unit.name}]")
         if drawn.is_new:
             axis.set_title(shortened(curve.name, drawn.letters))

@@ -49,7 +49,7 @@ def answer(solution: Solution, drawn: Panels, unit: StressUnit, prob: float = 0.
         _draw(axis, solution, described(solution, curve, prob), unit, prob)
         if drawn.is_new:
             axis.set_title(_title(solution, number, prob, drawn.letters))
-        if number % columns_of(len(curves)) == 0 or not drawn.is_new or not _is_one_stress(solution):
+        if number % drawn.columns == 0 or not _is_one_stress(solution):
             axis.set_ylabel(f"{curve.quantity.replace(LONG, SHORT)} [{unit.name}]")
     if drawn.strips:
         _draw_strips(drawn, solution, prob)
@@ -84,7 +84,7 @@ def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) ->
             axis.set_title(shortened(curve.name, drawn.letters))
         axis.set_xlabel(curve.abscissa_name)
     for number, axis in enumerate(drawn.axes):
-        if number % columns_of(len(curves)) == 0 or not drawn.is_new:
+        if number % drawn.columns == 0:
             axis.set_ylabel("share of the discrepancy [%]")
     drawn.explain()
 

@@ -50,7 +50,7 @@ def draw_specimens(drawn: Panels, population: Population, unit: StressUnit) -> N
         panel.set_xlim(*_limits([*new, *estimates["hdi_low"], *estimates["hdi_high"]], estimates))
         panel.locator_params(axis="x", nbins=6)
         panel.set_xlabel(f"{symbol} [{name_of_unit}]" if name_of_unit else symbol)
-        names = order if number % drawn.columns == 0 or not drawn.is_new else [""] * len(order)
+        names = order if number % drawn.columns == 0 else [""] * len(order)
         panel.set_yticks(range(len(order)), names, fontsize=(6.5 if small else 9) * size)
         panel.tick_params(axis="y", length=0)
         panel.set_ylim(-0.8, len(order) - 0.2)
