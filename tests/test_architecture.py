@@ -17,9 +17,9 @@ from tissuq.registry import variants
 
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
-    "errors", "registry", "result_warning", "parameters", "experiments", "mechanics", "model", "inference",
-    "prediction", "assessment", "next_test", "posterior", "population", "export", "finite_elements", "emulation",
-    "studies", "validation", "report", "cli", "__main__",
+    "errors", "registry", "result_warning", "parameters", "drawing", "experiments", "mechanics", "model", "inference",
+    "prediction", "assessment", "next_test", "pictures", "posterior", "population", "export", "finite_elements",
+    "emulation", "studies", "validation", "report", "cli", "__main__",
 ]  # fmt: skip
 
 
@@ -68,7 +68,7 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
         *["CONTRIBUTING.md", "docs/prediction.md", "docs/reading.md"],
         *(
             pytest.param(name, marks=pytest.mark.slow)
-            for name in ("README.md", "docs/several-tests.md", "docs/expensive-models.md")
+            for name in ("README.md", "docs/several-tests.md", "docs/expensive-models.md", "docs/plots.md")
         ),
     ],
 )

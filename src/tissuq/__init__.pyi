@@ -53,6 +53,7 @@ from tissuq.posterior.ensemble import EnergyDraw as EnergyDraw, Ensemble as Ense
 from tissuq.posterior.fitting import fit as fit, fit_many as fit_many
 from tissuq.posterior.laws import LawComparison as LawComparison, fit_laws as fit_laws
 from tissuq.posterior.posterior import Posterior as Posterior
+from tissuq.posterior.plots import plot_compare as plot_compare
 from tissuq.report.cards import write_cards as write_cards
 from tissuq.studies.calibrate import calibrate as calibrate
 from tissuq.studies.earlier_run import load as load, load_run as load_run

@@ -5,7 +5,7 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import StressUnit
-from tissuq.report.figures import marginal_figure, predictive_figure, save_figure
+from tissuq.report.figures import answer_figure, marginal_figure, predictive_figure, save_figure
 
 KPA = StressUnit("kPa", 1e-3)
 
@@ -107,3 +107,38 @@ def test_dollar_signs_in_a_name_are_shown_as_they_are(specimen_study, tmp_path):
     figure = predictive_figure({name: next(iter(specimen_study.posteriors.values()))}, discrepancy=True, unit=KPA)
     save_figure(figure, tmp_path, "named")
     assert figure.axes[0].get_title(loc="left").startswith(name)
+
+
+@pytest.mark.parametrize(("is_narrow", "width"), [(False, 1000), (True, 400)])
+def test_the_answer_has_the_width_of_a_page_and_letters_that_are_read_there(specimen_study, tmp_path, is_narrow, width):
+    figure = answer_figure(specimen_study.posteriors["auto"], KPA, is_narrow=is_narrow)
+    assert (96 * figure.get_size_inches()).tolist() == pytest.approx([width, 480])
+    figure.draw_without_rendering()
+    least = min(text.get_fontsize() for text in figure.findobj(lambda drawn: hasattr(drawn, "get_fontsize")))
+    assert least * 96 / 72 >= 11  # pixels of the page
+    page = figure.bbox
+    (legend,) = figure.legends
+    for shown in (legend, *figure.axes):
+        box = shown.get_tightbbox()
+        assert page.x0 - 1 <= box.x0 <= box.x1 <= page.x1 + 1
+        assert page.y0 - 1 <= box.y0 <= box.y1 <= page.y1 + 1
+    axis = figure.axes[0]
+    assert axis.get_ylabel() == "engineering stress [kPa]"
+    (measured,) = [line for line in axis.lines if line.get_label() == "measured"]
+    np.testing.assert_allclose(measured.get_ydata(), 1000 * specimen_study.experiment.stress)
+    save_figure(figure, tmp_path, "answer")
+    head = (tmp_path / "answer.svg").read_text()[:2000]
+    assert f'width="{0.75 * width:g}pt"' in head
+
+
+def test_the_answer_to_several_tests_grows_by_rows():
+    stretch = np.linspace(0.8, 1.3, 8)
+    modes = ("uniaxial", "planar", "equibiaxial")
+    tests = [tq.simulate("neo-hookean", {"C10": 0.5}, stretch, 0.02, seed=1, mode=mode) for mode in modes]
+    posterior = tq.fit(tests, discrepancy="none", noise_sd=0.02)
+    wide, narrow = (answer_figure(posterior, KPA, is_narrow=is_narrow) for is_narrow in (False, True))
+    assert 96 * wide.get_figheight() == pytest.approx(480)
+    assert 96 * narrow.get_figheight() == pytest.approx(480 + 2 * 300)
+    assert len({axis.get_subplotspec().colspan.start for axis in narrow.axes}) == 1
+    assert [axis.get_ylabel() for axis in narrow.axes] == ["engineering stress [kPa]"] * 3
+    assert [axis.get_ylabel() for axis in wide.axes] == ["engineering stress [kPa]", "", ""]

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -93,6 +94,10 @@ class Average:
         options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
         table = pd.DataFrame(vars(predict_average(self._weighted_fits, stretch, **options)))
         return in_unit(table, ["median", "low", "high"], self._unit.name)
+
+    def _repr_html_(self) -> str:
+        """Return weights and summary, which notebooks show."""
+        return f"<p>{escape(repr(self))}</p>{self.summary().to_html(float_format='{:.4g}'.format)}"
 
     def __repr__(self) -> str:
         return f"<Average of {', '.join(f'{name} {weight:.0%}' for name, weight in self.weights.items())}>"

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
+from tissuq.experiments.picture import draw_curves, small_svg
 from tissuq.experiments.units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
@@ -67,6 +69,12 @@ class Curve:
     def abscissa(self) -> FloatArray:
         """What the stress is drawn against, (n,)."""
         return np.asarray(self.path.abscissa(self.points))
+
+    @property
+    def abscissa_name(self) -> str:
+        """What `abscissa` is called on an axis."""
+        controls = self.mode.controls
+        return controls[0].name if len(controls) == 1 else "stretch"
 
     @property
     def quantity(self) -> str:
@@ -203,8 +211,35 @@ class Experiment:
         modes = ", ".join(mode.name for mode in self.modes)
         return f"<Experiment '{self.name}': {modes}, {self.size} measured stresses in {self.stress_unit}>"
 
+    def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:
+        """Draw every measured stress on a panel of its own, before any fit.
+
+        Parameters
+        ----------
+        ax : Axes, or array of Axes, optional
+            As many as there are `curves`; unless given, a new figure is made in `matplotlib.pyplot`.
+        unit : str, optional
+            Of the stress, such as ``"kPa"``; ``stress_unit`` unless given.
+
+        Returns
+        -------
+        Axes, or (n,) array of Axes
+
+        Examples
+        --------
+        >>> import tissuq as tq
+        >>> axis = tq.datasets.load("brain-cortex-uniaxial").plot()
+        >>> axis.get_xlabel(), axis.get_ylabel()
+        ('stretch', 'engineering stress [kPa]')
+        >>> import matplotlib.pyplot as plt
+        >>> plt.close(axis.figure)
+        """
+        with panels(ax, len(self.curves)) as drawn:
+            draw_curves(drawn, self.curves, unit or self.stress_unit)
+        return drawn.result
+
     def _repr_html_(self) -> str:
-        """Return a table of the curves, which notebooks show."""
+        """Return a table of the curves above a small figure of them, which notebooks show."""
         import pandas as pd
 
         rows = []
@@ -214,7 +249,8 @@ class Experiment:
             span = {"from": ends[0], "to": ends[1], f"stress from [{self.stress_unit}]": stress.min()}
             labels = {"test": curve.name, "specimen": curve.specimen, "mode": curve.mode.name, "rows": len(curve)}
             rows.append(labels | span | {f"stress to [{self.stress_unit}]": stress.max()})
-        return str(pd.DataFrame(rows).to_html(index=False, float_format="{:.5g}".format))
+        table = pd.DataFrame(rows).to_html(index=False, float_format="{:.5g}".format)
+        return f"{table}{small_svg(self.curves, self.stress_unit)}"
 
     @property
     def size(self) -> int:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import headed, stress_unit
 from tissuq.population.likelihoods import Coordinates
 from tissuq.population.patient import matching_draws, patient_curves, patient_posterior
+from tissuq.population.picture import draw_specimens, height_of, unit_factor
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
 
@@ -276,6 +280,43 @@ class Population:
             )
         low, median, high = np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
         return pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
+
+    def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:
+        """Draw the parameters of every specimen, by itself and within the population: a panel for each of `symbols`.
+
+        Behind them the median of the population, where a new patient may be, and what complete pooling would say.
+
+        Parameters
+        ----------
+        ax : Axes, or array of Axes, optional
+            As many as there are parameters; unless given, a new figure is made in `matplotlib.pyplot`.
+        unit : str, optional
+            Of stresses; that of the measurements, unless given.
+
+        Returns
+        -------
+        Axes, or (d,) array of Axes
+        """
+        with panels(ax, len(self.symbols), height=height_of(self, 0.8)) as drawn:
+            draw_specimens(drawn, self, stress_unit(unit or self._stress_unit))
+        return drawn.result
+
+    def _repr_html_(self) -> str:
+        """Return the population's parameters in the unit of the measurements as a table, which notebooks show."""
+        unit = stress_unit(self._stress_unit)
+        is_log = dict(zip(self.symbols, self.coordinates.is_log, strict=True))
+        table = self.summary()
+        factors = [
+            1.0 if quantity == "spread" and is_log[symbol] else unit_factor(self, symbol, unit)[0]
+            for symbol, quantity in table.index
+        ]
+        shown = headed(table.div(factors, axis=0), unit).to_html(float_format="{:.4g}".format)
+        return f"<p>{escape(repr(self))}; the spread of a positive parameter is the sd of its logarithm</p>{shown}"
+
+    @property
+    def _stress_unit(self) -> str:
+        """The unit of the measurements."""
+        return self.complete.model.experiment.stress_unit
 
     @cached_property
     def data(self) -> xr.DataTree:

@@ -8,14 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from html import escape
 from typing import Any, Literal, get_args, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.stability import calibrated_range, stable_draws
+from tissuq.drawing.panels import panels
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.modes import LoadingMode, Path, States, curve_modes
+from tissuq.experiments.modes import LoadingMode, Path, States, curve_modes, loading_mode
+from tissuq.experiments.units import headed, stress_unit
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution, are_isotropic
 from tissuq.mechanics import Material, StretchMaterial, stress_basis
@@ -27,6 +30,7 @@ from tissuq.mechanics.stress import MAX_COMPLEX_STEP_VALUES
 from tissuq.model.discrepancy.blocks import Coordinates
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.seeds import check_seed
+from tissuq.pictures.draws import curves
 from tissuq.prediction.moments import values_of
 
 __all__ = ["EnergyDraw", "Ensemble", "Sampling", "drawn_ensemble"]
@@ -37,6 +41,8 @@ Sampling = Literal["sobol", "latin", "random"]
 """How draws spread: a scrambled Sobol sequence, Latin hypercubes, or independently."""
 KNOTS = 1001
 """Of a discrepancy's functions: 25 or more in the shortest length scale."""
+PLOT_POINTS = 81
+"""Stretches of a picture."""
 MOST_TRIES = 64
 """Draws tried for each admissible one that is wanted."""
 
@@ -150,6 +156,60 @@ class Ensemble(Sequence[EnergyDraw]):
     def stresses_at(self, states: States) -> FloatArray:
         """Return the engineering stresses (N, n), MPa, of all draws at states (n,)."""
         return _stress(self.draws, states)
+
+    def plot(
+        self,
+        mode: str | LoadingMode | None = None,
+        stretch: ArrayLike | None = None,
+        ax: Any = None,
+        *,
+        unit: str | None = None,
+    ) -> Any:
+        """Draw the stress of every draw in a loading mode of one stress.
+
+        Parameters
+        ----------
+        mode : str or LoadingMode, optional
+            That of the first test, unless given.
+        stretch : (g,) array, optional
+            Over the range in which both invariants were measured, unless given.
+        ax : Axes, optional
+            Unless given, a new figure is made in `matplotlib.pyplot`.
+        unit : str, optional
+            Of the stress; that of the measurements, unless given.
+
+        Returns
+        -------
+        Axes
+        """
+        loading = self.model.experiment.modes[0] if mode is None else loading_mode(mode)
+        if len(loading.controls) > 1 or len(loading.stresses) > 1:
+            raise InputError(
+                f"draws are drawn in modes of one control and one stress, and '{loading.name}' has more: choose of "
+                f"{', '.join(self.ranges)}."
+            )
+        if stretch is None:
+            at = np.linspace(*calibrated_range(self.model.experiment, loading), PLOT_POINTS)
+        else:
+            at = np.atleast_1d(np.asarray(stretch, dtype=np.float64))
+        with panels(ax, 1) as drawn:
+            curves(drawn, at, self.stress(loading, at), loading, stress_unit(unit or self.model.experiment.stress_unit))
+        return drawn.result
+
+    def _repr_html_(self) -> str:
+        """Return how the draws' parameters spread as a table, which notebooks show."""
+        import pandas as pd
+
+        is_stress = {parameter.symbol: bool(parameter.unit) for parameter in self.model.material.parameters}
+        unit = stress_unit(self.model.experiment.stress_unit)
+        table = pd.DataFrame([draw.values for draw in self.draws])
+        table = table.div([unit.to_mpa if is_stress[str(name)] else 1.0 for name in table])
+        spread = headed(table.describe().loc[["min", "50%", "max"]].rename(index={"50%": "median"}).T, unit)
+        return f"<p>{escape(repr(self))}</p>{spread.to_html(float_format='{:.4g}'.format)}"
+
+    def __repr__(self) -> str:
+        stable = "" if self.admissible_in else ", stable or not"
+        return f"<Ensemble of {len(self)} draws of {self.model.material.name}{stable}>"
 
     @cached_property
     def most(self) -> tuple[float, float]:

@@ -15,15 +15,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
+from tissuq.drawing.panels import panels
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements
-from tissuq.experiments.units import in_unit
+from tissuq.experiments.units import in_unit, stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
+from tissuq.pictures.rows import intervals
 from tissuq.posterior.fitting import OPTIONS, fit
+from tissuq.posterior.plots import ROW
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predict_average, predict_band
 from tissuq.prediction.densities import leave_one_out
@@ -139,6 +142,51 @@ class LawComparison:
         unit = weighted[0][1].model.experiment.stress_unit
         return in_unit(table, ["median", "low", "high"], unit)
 
+    def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:
+        """Draw the initial shear modulus of every law, the most probable on top, and their average.
+
+        Bars are 95 % highest-density intervals, and the law's probability stands beside its name.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Unless given, a new figure is made in `matplotlib.pyplot`.
+        unit : str, optional
+            Of the modulus; that of the measurements, unless given.
+
+        Returns
+        -------
+        Axes
+        """
+        shown = stress_unit(unit or self._stress_unit)
+        named = {f"{name} ({_percent(self.probabilities[name])})": self._moduli[name] for name in self._in_order}
+        with panels(ax, 1, height=ROW * (len(named) + 1) + 0.3) as drawn:
+            intervals(drawn.axes[0], named, self.modulus, f"initial shear modulus [{shown.name}]", shown.to_mpa)
+        return drawn.result
+
+    def _repr_html_(self) -> str:
+        """Return probability and modulus of every law as a table, which notebooks show; `table` has all else."""
+        import pandas as pd
+
+        rows = []
+        for name in self._in_order:
+            modulus = self._moduli[name]
+            low, high = modulus.hdi()
+            rows.append((self.probabilities[name], float(modulus.quantile(0.5)), low, high))
+        columns = ["probability", "modulus", "modulus_low", "modulus_high"]
+        table = in_unit(pd.DataFrame(rows, self._in_order, columns), columns[1:], self._stress_unit)
+        return str(table.to_html(float_format="{:.4g}".format))
+
+    @property
+    def _in_order(self) -> list[str]:
+        """The laws, the most probable first."""
+        return sorted(self.fits, key=lambda name: -self.probabilities[name])
+
+    @property
+    def _stress_unit(self) -> str:
+        """The unit of the measurements."""
+        return next(iter(self.fits.values())).model.experiment.stress_unit
+
     @cached_property
     def _moduli(self) -> Mapping[str, Marginal]:
         """The initial shear modulus of each law, MPa."""
@@ -245,6 +293,10 @@ def fit_laws(
         name, reason = next(iter(skipped.items()))
         raise ModelError(f"no law can be fitted, not even '{name}': {reason}")
     return LawComparison(fits, alone, seconds, skipped)
+
+
+def _percent(share: float) -> str:
+    return "< 0.1 %" if share < 0.001 else f"{100 * share:.{int(share < 0.1)}f} %"
 
 
 def laws_named(laws: str | Sequence[str | Material]) -> dict[str, Material]:

@@ -17,6 +17,7 @@ from tissuq.assessment.answer import Answer, answer_of
 from tissuq.assessment.comparison import scores_of
 from tissuq.assessment.modulus import modulus
 from tissuq.assessment.stability import StableRange, stability_over, stable_ranges
+from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, headed, in_unit, stress_unit
@@ -26,10 +27,12 @@ from tissuq.mechanics import Material
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
+from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
 from tissuq.posterior.labelled import labelled_arrays, labels_of, summaries, summaries_in
 from tissuq.posterior.netcdf import LabelledGroup, save_groups
+from tissuq.posterior.plots import PosteriorPlots
 from tissuq.posterior.solver import Solver
 from tissuq.posterior.warnings import warnings_about
 from tissuq.prediction.bands import inside_band, predict_band, stress_ratio
@@ -43,7 +46,7 @@ __all__ = ["Posterior"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Posterior:
+class Posterior(PosteriorPlots):
     """What `tissuq.fit` returns.
 
     Attributes
@@ -530,5 +533,10 @@ class Posterior:
         )
 
     def _repr_html_(self) -> str:
-        """Return the posterior in a line above its summary, which notebooks show."""
-        return f"<p>{escape(repr(self))}</p>{self.summary().to_html(float_format='{:.4g}'.format)}"
+        """Return the posterior in a line above its summary and a small figure of its fit, which notebooks show."""
+        table = self.summary().to_html(float_format="{:.4g}".format)
+        try:
+            figure = small_svg(self.solution, self.unit(), "Measurements and their 95 % band")
+        except ModelError:  # some of its materials lock within the range
+            figure = ""
+        return f"<p>{escape(repr(self))}</p>{table}{figure}"

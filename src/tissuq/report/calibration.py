@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.drawing import pieces
+from tissuq.drawing.panels import legend_above
+from tissuq.drawing.style import BAND, BASE, INK, new_figure
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
-from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, interval, significant, write_csv, write_json
 from tissuq.studies.calibration import CalibrationStudy, Measured
@@ -191,10 +193,9 @@ def band_figure(calibration: Calibration, data: Measured) -> Figure:
         order = np.argsort(data.control, kind="stable")
         for axis, (with_discrepancy, title) in zip(panels, titles.items(), strict=True):
             band = calibration.predict(discrepancy=with_discrepancy).iloc[order]
-            axis.fill_between(band["control"], band["low"], band["high"], color=BAND, alpha=0.22, lw=0,
-                              label="95 % predictive band")  # fmt: skip
-            axis.plot(band["control"], band["mean"], color=BAND, lw=1.6, label="predicted mean")
-            axis.plot(data.control, data.measured, "o", color=INK, ms=3.2, label="measured")
+            pieces.band(axis, band["control"], band["low"], band["high"], label="95 % predictive band")
+            pieces.line(axis, band["control"], band["mean"], label="predicted mean")
+            pieces.points(axis, data.control, data.measured)
             axis.set_title(f"{title}:  {calibration.predictive_coverage(discrepancy=with_discrepancy):.0%} inside")
             axis.set_xlabel(data.control_label)
         panels[0].set_ylabel(data.measured_label)
@@ -245,7 +246,7 @@ def _draw_marginal(axis: Axes, calibration: Calibration, symbol: str) -> None:
     posterior, exact = calibration.marginals[symbol], calibration.without_emulator_error.marginals[symbol]
     ends = np.array([marginal.quantile([0.001, 0.999]) for marginal in (posterior, exact)])
     values = np.linspace(ends[:, 0].min(), ends[:, 1].max(), 500)
-    axis.fill_between(values, posterior.pdf(values), color=BAND, alpha=0.3, lw=0, label="posterior")
+    pieces.density(axis, values, posterior.pdf(values), label="posterior")
     axis.plot(values, exact.pdf(values), color=EXACT, lw=1.2, ls="--", label="as if the emulator were exact")
     low, high = calibration.problem.priors[symbol].support
     inside = (values > low) & (values < high)

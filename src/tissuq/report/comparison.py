@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.drawing.pieces import forest
+from tissuq.drawing.style import BAND, BASE, INK, new_figure
 from tissuq.experiments.units import StressUnit
-from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import write_figures, write_page
 from tissuq.report.tables import interval, with_named_units, write_csv
 
@@ -187,8 +188,7 @@ def _intervals(axis: Axes, levels: Any, table: pd.DataFrame, unit: StressUnit) -
     axis.set_xlabel(f"{' or '.join(names)} [{unit.name}]\n(95 % HPD and median)")
     for level, (_, row) in zip(levels, table.iterrows(), strict=True):
         low, median, high = (float(row[name]) / unit.to_mpa for name in ("hdi_low", "median", "hdi_high"))
-        axis.plot([low, high], [level, level], color=BAND, lw=4, alpha=0.55, solid_capstyle="butt")
-        axis.plot(median, level, "o", color="white", mec=INK, ms=5)
+        forest(axis, [level], [low], [median], [high], width=4, strength=0.55, mark_color=INK)
         if len(names) > 1:
             axis.annotate(
                 str(row["parameter"]), (high, level), (5, 0), textcoords="offset points", va="center", fontsize=9

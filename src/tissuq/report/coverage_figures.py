@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.report.figures import BAND, BASE, STYLE, TRUTH, legend_above
+from tissuq.drawing.panels import legend_above
+from tissuq.drawing.pieces import heat
+from tissuq.drawing.style import BAND, BASE, MARKERS, SERIES, STYLE, TRUTH
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,8 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COLORS", "MARKERS", "campaign_figures", "panel_grid"]
 
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-MARKERS = "osD^vP*"
+COLORS = SERIES
 CELL = ["design", "strength", "noise"]
 BAR_HALF_WIDTH = 1.96
 """Half width of an error bar in Monte Carlo standard errors (95 %)."""
@@ -114,15 +115,8 @@ def _by_family(families: pd.DataFrame, prob: float) -> Figure:
     for axis, (title, rows) in zip(axes, panels, strict=False):
         table = rows.pivot_table("coverage", "family", "cell", sort=False, aggfunc="first")
         values = table.reindex(index=names, columns=columns).to_numpy()
-        axis.imshow(_shade(values, prob), cmap=colors, vmin=0, vmax=1, aspect="auto")
-        for (row, column), value in np.ndenumerate(values):
-            if np.isfinite(value):
-                axis.text(column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=8.5)
+        heat(axis, _shade(values, prob), 100 * values, columns, names, colors)
         axis.set_title(str(title))
-        axis.tick_params(length=0)
-        axis.spines[:].set_visible(False)
-        axis.set_yticks(range(len(names)), names)
-        axis.set_xticks(range(len(columns)), columns, rotation=90)
     return figure
 
 

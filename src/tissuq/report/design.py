@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.drawing.style import BAND, BASE, INK, UNSTABLE, new_figure
 from tissuq.next_test.candidates import Target
-from tissuq.report.figures import BAND, BASE, INK, new_figure
 from tissuq.report.run_folder import write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, significant, write_csv, write_json
 from tissuq.studies.design import DesignSettings, DesignStudy
@@ -25,7 +25,7 @@ HEADERS = ["test", "expected sd", "reduction", "note"]
 """Of `readable_design`."""
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
-BEYOND = "#E69F00"
+BEYOND = UNSTABLE
 
 
 def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from tissuq.drawing import pieces
+from tissuq.drawing.panels import columns_of, legend_above, on_figure
+from tissuq.drawing.style import BASE, SERIES, new_figure
+from tissuq.pictures.curves import points_along, ways_of
 from tissuq.prediction.bands import predict_band
-from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import write_figures, write_page, write_posteriors
 from tissuq.report.specimen import lines_of_tests, noise_in_words, write_inputs
 from tissuq.report.tables import (
@@ -107,19 +108,8 @@ def law_lead(study: LawStudy) -> str:
 
 def modulus_figure(study: LawStudy) -> Figure:
     """Return the moduli of all laws with 95 % HPD, and their average."""
-    table, scale = study.comparison.table, study.unit.to_mpa
-    average = study.comparison.modulus
-    rows = [(str(name), row.modulus, row.modulus_low, row.modulus_high) for name, row in table.iterrows()]
-    rows += [("all, by probability", float(average.quantile(0.5)), *average.hdi())]
-    with new_figure(8.2, 0.34 * len(rows) + 1.0) as figure:
-        axis = figure.subplots()
-        for place, (name, median, low, high) in enumerate(reversed(rows)):
-            color = INK if name == rows[-1][0] else BAND
-            axis.plot([low / scale, high / scale], [place, place], color=color, lw=2.2, solid_capstyle="butt")
-            axis.plot(median / scale, place, "o", color=color, ms=5)
-        axis.set_yticks(range(len(rows)), [name for name, *_ in reversed(rows)])
-        axis.tick_params(axis="y", length=0)
-        axis.set_xlabel(f"initial shear modulus [{study.unit.name}]")
+    with new_figure(8.2, 0.34 * (len(study.comparison.fits) + 1) + 1.0) as figure:
+        study.comparison.plot(figure.subplots(), unit=study.unit.name)
     return figure
 
 
@@ -127,22 +117,22 @@ def curve_figure(study: LawStudy) -> Figure:
     """Return the stress of the laws alone that come nearest, over the measurements, a panel for each curve."""
     curves, scale = study.experiment.curves, study.unit.to_mpa
     names = [str(name) for name in study.comparison.table.nrmse.dropna().nsmallest(MAX_DRAWN).index]
-    with new_figure(8.2, (4.2 if len(curves) == 1 else 3.4) * -(-len(curves) // 2) + 0.7) as figure:
-        axes = figure.subplots(-(-len(curves) // 2), min(len(curves), 2), squeeze=False).ravel()
-        for axis, curve in zip(axes, curves, strict=False):
-            axis.plot(curve.abscissa, curve.stress / scale, ".", color=BASE, ms=4, label="measured")
-            points = np.linspace(curve.points.min(), curve.points.max(), LINE_POINTS)
-            points = points if curve.points.ndim == 1 else curve.points[curve.abscissa.argsort(kind="stable")]
+    columns = columns_of(len(curves))
+    with new_figure(8.2, (4.2 if len(curves) == 1 else 3.4) * -(-len(curves) // columns) + 0.7) as figure:
+        axes = on_figure(figure, len(curves), columns).axes
+        for axis, curve in zip(axes, curves, strict=True):
+            pieces.points(axis, curve.abscissa, curve.stress / scale, color=BASE)
+            at = points_along(curve, LINE_POINTS)
+            options: dict[str, Any] = {"noise": False, "mode": curve.mode, "channel": curve.channel}
             for number, name in enumerate(names):
-                options: dict[str, Any] = {"mode": curve.mode, "channel": curve.channel}
-                band = predict_band(study.comparison.alone[name].solution, points, noise=False, **options)
-                axis.plot(band.stretch, band.median / scale, color=f"C{number}", lw=1.2, label=name)
+                found = predict_band(study.comparison.alone[name].solution, at, **options)
+                for places, is_curve in ways_of(curve.mode, at, found.stretch):
+                    pieces.line(axis, found.stretch[places], found.median[places] / scale, color=SERIES[number],
+                                width=1.2, is_path=is_curve, label=name)  # fmt: skip
             axis.set_title(curve.name)
             axis.set_xlabel(curve.mode.controls[0].name)
             axis.set_ylabel(f"engineering stress [{study.unit.name}]")
-        for axis in axes[len(curves) :]:
-            axis.set_visible(False)
-        legend_above(figure, axes[: len(curves)], 4)
+        legend_above(figure, axes, 4)
     return figure
 
 

@@ -10,10 +10,11 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.drawing import pieces
+from tissuq.drawing.style import BAND, BASE, INK, STYLE, TRUTH
 from tissuq.finite_elements.case import AXIAL, RADIAL, Mesh
 from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.figures import BAND, BASE, INK, STYLE, TRUTH
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,8 +72,8 @@ def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
         bands.append(("without_", "fitted without discrepancy", TRUTH, "--", 0.15))
     for prefix, label, color, line, alpha in bands:
         low, mean, high = (_from_zero(table[f"{prefix}{name}"]) * factor for name in ("low", "mean", "high"))
-        axis.fill_between(travel, low, high, color=color, alpha=alpha, lw=0, label=f"{label}, {percent}")
-        axis.plot(travel, mean, line, color=color, lw=1.7, label="mean")
+        pieces.band(axis, travel, low, high, color=color, strength=alpha, label=f"{label}, {percent}")
+        pieces.line(axis, travel, mean, style=line, color=color, label="mean")
     axis.set_xlabel(f"{simulation.case.travel_name} [mm]")
     axis.set_ylabel(f"force [{unit}]")
     axis.set_xlim(0, simulation.case.travel)

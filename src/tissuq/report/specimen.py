@@ -174,10 +174,10 @@ def specimen_summary(study: SpecimenStudy) -> list[Row]:
 
 
 def _figures(study: SpecimenStudy) -> dict[str, Figure]:
-    from tissuq.report.figures import marginal_figure, predictive_figure
+    from tissuq.report.figures import answer_figure, marginal_figure, predictive_figure
 
     return {
-        "answer": predictive_figure({study.main: study.posteriors[study.main]}, discrepancy=True, unit=study.unit),
+        "answer": answer_figure(study.posteriors[study.main], study.unit, is_narrow=True),
         "marginals": marginal_figure(study.posteriors, study.headline, study.unit),
         "with_discrepancy": predictive_figure(study.posteriors, discrepancy=True, unit=study.unit),
         "model_alone": predictive_figure(study.posteriors, discrepancy=False, unit=study.unit),

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tissuq.drawing.panels import legend_above
+from tissuq.drawing.style import BASE, STYLE
 from tissuq.report.coverage_figures import COLORS, MARKERS, panel_grid
-from tissuq.report.figures import BASE, STYLE, legend_above
 from tissuq.report.run_folder import write_figures, write_page
 from tissuq.report.tables import significant
 from tissuq.validation.tissues import TissueSettings, summarise_tissues

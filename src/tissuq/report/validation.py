@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.drawing.style import new_figure
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Yeoh, engineering_stress
 from tissuq.report.coverage_figures import COLORS, campaign_figures
-from tissuq.report.figures import new_figure
 from tissuq.report.run_folder import (
     write_data,
     write_figures,

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.stability import calibrated_range, is_calibrated
+from tissuq.drawing.panels import panels
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.experiment import Experiment, checked_points
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.units import StressUnit, in_unit, stress_unit
+from tissuq.experiments.units import StressUnit, headed, in_unit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN
@@ -24,6 +25,7 @@ from tissuq.posterior.netcdf import LabelledGroup, save_groups
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
+from tissuq.studies.prediction_picture import draw_prediction
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,8 +35,8 @@ __all__ = ["POINTS", "Prediction", "predict_run", "predicted"]
 
 FloatArray = NDArray[np.float64]
 
-POINTS = 101
-"""Number of stretches of a band by default."""
+POINTS, ROWS_SHOWN = 101, 9
+"""Number of stretches of a band by default, and of rows of a notebook's table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +127,44 @@ class Prediction:
         assert self.data is not None  # noqa: S101 (requested only if there are measurements)
         ratio = self.mode.paths[channel].cauchy_ratio(self.data.stretch) if self.stress_type == "cauchy" else 1.0
         return np.asarray(self.data.curves[channel].stress * ratio)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw every stress with the discrepancy, where it is known, and of the material alone: a panel each.
+
+        Stretches at which an invariant is larger than in the fitted measurements are hatched.
+
+        Parameters
+        ----------
+        ax : Axes, or array of Axes, optional
+            As many as there are stresses times `kinds`; unless given, a new figure is made in `matplotlib.pyplot`.
+
+        Returns
+        -------
+        Axes, or (n,) array of Axes
+            Row by row: the kinds of the first stress, those of the next.
+        """
+        with panels(ax, len(self.stresses) * len(self.kinds)) as drawn:
+            draw_prediction(drawn.axes, self)
+            drawn.explain()
+        return drawn.result
+
+    def _repr_html_(self) -> str:
+        """Return some rows of the stress as a table, which notebooks show; `table` has all."""
+        import pandas as pd
+
+        unit, places = self.unit, np.unique(np.linspace(0, len(self.points) - 1, ROWS_SHOWN).round().astype(int))
+        kind = self.kinds[0]
+        tables = []
+        for channel, name in enumerate(self.stresses):
+            bands = [self.curves[channel, kind, noise] for noise in (False, True)]
+            ends = {end: getattr(bands[0], end) for end in ("median", "low", "high")}
+            ends |= {f"predictive_{end}": getattr(bands[1], end) for end in ("low", "high")}
+            columns = self.controls | {key: values / unit.to_mpa for key, values in ends.items()}
+            table = pd.DataFrame({key: values[places] for key, values in columns.items()})
+            table["is_calibrated"] = self.is_calibrated[places]
+            shown = headed(table, unit).to_html(index=False, float_format="{:.4g}".format)
+            tables.append(f"<p>{self.mode.name}, {name} [{unit.name}]</p>{shown}")
+        return "".join(tables)
 
     @property
     def table(self) -> pd.DataFrame:

@@ -1,0 +1,193 @@
+"""The one picture, of whether the model describes the test and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.drawing.panels import Panels, columns_of, limits_of, on_figure, shortened, small_panels, within
+from tissuq.drawing.pieces import band, line, points
+from tissuq.drawing.style import BAND, BASE, INK, MARKERS, STYLE, TRUTH, inline_svg, new_figure, relative_size
+from tissuq.experiments.units import StressUnit
+from tissuq.inference.solution import Solution
+from tissuq.pictures.curves import Described, described, points_along, share_along, ways_of
+from tissuq.prediction.bands import inside_band, predict_band
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["answer", "answer_on_new_figure", "discrepancy_shares", "has_shares", "small_svg"]
+
+PIXELS = 96
+"""Of a page, in an inch."""
+WIDE, WIDE_ROW = (1000, 480), 330
+"""Width and height of the figure of a page in pixels, and what a further row of panels adds to the height."""
+NARROW, NARROW_ROW = (400, 480), 300
+"""The same on a small screen, where panels stand above one another."""
+WIDE_LETTERS, NARROW_LETTERS = 11, 10.5
+"""Points; a pixel of a page is three quarters of one."""
+SMALL_POINTS, FEW = 31, 100
+"""Points of the band of a small figure, and components of the posterior that it takes."""
+LONG, SHORT = "engineering stress of", "stress of"
+"""Words of the name of one of several stresses, which are long for an axis, and others."""
+SHARE_TICKS, MOST_SHARE = 3, 500
+"""Ticks of a strip, and percent to which shares are cut: no renderer takes any number."""
+
+
+def has_shares(solution: Solution) -> bool:
+    """Return whether there is a discrepancy that may carry a share of the stress."""
+    return bool(solution.model.discrepancy.parameters)
+
+
+def answer(solution: Solution, drawn: Panels, unit: StressUnit, prob: float = 0.95) -> None:
+    """Draw every measured curve with its bands on a panel of its own, and the discrepancy's share on the strips."""
+    curves = solution.model.experiment.curves
+    for number, (axis, curve) in enumerate(zip(drawn.axes, curves, strict=True)):
+        _draw(axis, solution, described(solution, curve, prob), unit, prob)
+        if drawn.is_new:
+            axis.set_title(_title(solution, number, prob, drawn.letters))
+        if number % drawn.columns == 0 or not _is_one_stress(solution):
+            axis.set_ylabel(f"{curve.quantity.replace(LONG, SHORT)} [{unit.name}]")
+    if drawn.strips:
+        _draw_strips(drawn, solution, prob)
+    for axis, curve in zip(drawn.lowest, curves, strict=True):
+        axis.set_xlabel(curve.abscissa_name)
+    drawn.explain()
+
+
+def answer_on_new_figure(solution: Solution, unit: StressUnit, *, is_narrow: bool = False) -> Figure:
+    """Return the picture as a figure of a page: 1000 pixels wide, or 400 with panels above one another.
+
+    A pixel of a page is a 96th of an inch, so that the SVG has these sizes. One row of panels is 480 pixels tall.
+    """
+    count = len(solution.model.experiment.curves)
+    columns = 1 if is_narrow else columns_of(count)
+    (width, height), further = (NARROW, NARROW_ROW) if is_narrow else (WIDE, WIDE_ROW)
+    tall = height + further * (-(-count // columns) - 1)
+    letters = NARROW_LETTERS if is_narrow else WIDE_LETTERS
+    style = STYLE | {"font.size": letters, "axes.titlesize": letters, "figure.dpi": PIXELS}
+    with new_figure(width / PIXELS, tall / PIXELS, style) as figure:
+        drawn = on_figure(figure, count, columns, has_strips=has_shares(solution))
+        answer(solution, Panels(drawn.axes, drawn.strips), unit)
+    return figure
+
+
+def discrepancy_shares(solution: Solution, drawn: Panels, prob: float = 0.95) -> None:
+    """Draw the share of the stress that the discrepancy carries along every measured curve."""
+    curves = solution.model.experiment.curves
+    for axis, curve in zip(drawn.axes, curves, strict=True):
+        _draw_share(axis, solution, curve, prob)
+        if len(curves) > 1:
+            axis.set_title(shortened(curve.name, drawn.letters))
+        axis.set_xlabel(curve.abscissa_name)
+    for number, axis in enumerate(drawn.axes):
+        if number % drawn.columns == 0:
+            axis.set_ylabel("share of the discrepancy [%]")
+    drawn.explain()
+
+
+def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
+    """Return the first measured curve and its band as a small SVG, at little cost: few components make the band."""
+    curves, few = solution.model.experiment.curves, solution.mixture.thinned(FEW)
+    curve, count = curves[0], f", 1 of {len(curves)}" if len(curves) > 1 else ""
+    across = points_along(curve, SMALL_POINTS)
+    rough = replace(solution, represent=lambda: few)
+    of_curve = predict_band(rough, across, mode=curve.mode, channel=curve.channel)
+    low, high, median = (values / unit.to_mpa for values in (of_curve.low, of_curve.high, of_curve.median))
+    measured = curve.stress / unit.to_mpa
+    limits = limits_of([measured, median], [low, high])
+    with small_panels(1) as (figure, drawn):
+        (axis,) = drawn.axes
+        for places, is_curve in ways_of(curve.mode, across, of_curve.stretch):
+            band(axis, of_curve.stretch[places], within(low[places], limits), within(high[places], limits),
+                 is_path=is_curve)  # fmt: skip
+            line(axis, of_curve.stretch[places], median[places], is_path=is_curve)
+        points(axis, curve.abscissa, measured)
+        axis.set_ylim(limits)
+        end = f" [{unit.name}]{count}"
+        axis.set_title(f"{shortened(curve.name, drawn.letters - len(end))}{end}")
+    return inline_svg(figure, words)
+
+
+def _draw(axis: Axes, solution: Solution, found: Described, unit: StressUnit, prob: float) -> None:
+    """Draw the bands of a curve, the material alone and the measurements; of several paths lines for the latter two."""
+    curve, percent, is_one = found.curve, f"{100 * prob:.4g} %", len(found.ways) == 1
+    measured, error = curve.stress / unit.to_mpa, curve.standard_error / unit.to_mpa
+    core = [measured - error, measured + error, found.stress.median / unit.to_mpa]
+    beyond = [end / unit.to_mpa for of in (found.measurements, found.stress) for end in (of.low, of.high)]
+    limits = limits_of(core, [*beyond, *([found.alone.median / unit.to_mpa] if found.alone else [])])
+    bands = [(found.measurements, 0.18 if is_one else 0.12, BAND, f"{percent} of measurements")]
+    bands += [(found.stress, 0.38, BAND, f"{percent} of the stress")] if is_one else []
+    bands += [(found.alone, 0.13, TRUTH, "")] if found.alone and is_one else []
+    lines = [(found.stress, BAND, "-", "" if is_one else "stress, median")]
+    material = solution.model.material.name
+    lines += [(found.alone, TRUTH, "--", f"{material} alone{f', {percent}' * is_one}")] if found.alone else []
+    for number, (places, is_curve) in enumerate(found.ways):
+        for of, strength, color, label in bands:
+            low, high = (within(end[places] / unit.to_mpa, limits) for end in (of.low, of.high))
+            band(axis, of.stretch[places], low, high, color=color, strength=strength, is_path=is_curve,
+                 label="" if number else label)  # fmt: skip
+        for of, color, style, label in lines:
+            median = within(of.median[places] / unit.to_mpa, limits)
+            line(axis, of.stretch[places], median, color=color, style=style, width=1.3, is_path=is_curve,
+                 label="" if number else label)  # fmt: skip
+        rows = slice(None) if is_one else places
+        points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
+               marker=MARKERS[number % len(MARKERS)])  # fmt: skip
+    axis.set_ylim(limits)
+    axis.locator_params(axis="x", nbins=6)
+
+
+def _title(solution: Solution, number: int, prob: float, letters: int) -> str:
+    """Return how many measurements of a curve are inside its band, beneath its name where there are several."""
+    curves = solution.model.experiment.curves
+    curve, percent = curves[number], f"{100 * prob:.4g} %"
+    name = f"{shortened(curve.name, letters)}\n" if len(curves) > 1 else ""
+    if not solution.is_of_data:
+        return f"{name}predicted, not fitted to these"
+    inside = int(inside_band(solution, curve, discrepancy=True, prob=prob).sum())
+    forms = f"measurements inside their {percent} band", f"inside their {percent} band", f"inside {percent} band"
+    texts = [f"{inside} of {len(curve)} {form}" for form in forms]
+    return name + next((text for text in texts if len(text) <= letters), texts[-1])
+
+
+def _is_one_stress(solution: Solution) -> bool:
+    return len({curve.quantity for curve in solution.model.experiment.curves}) == 1
+
+
+def _draw_strips(drawn: Panels, solution: Solution, prob: float) -> None:
+    """Draw the shares of the discrepancy on strips of the same scale."""
+    for axis, curve in zip(drawn.strips, solution.model.experiment.curves, strict=True):
+        _draw_share(axis, solution, curve, prob)
+        axis.locator_params(axis="y", nbins=SHARE_TICKS)
+        axis.set_title("discrepancy, % of the stress", fontsize="small", pad=2)
+    ends = np.array([axis.get_ylim() for axis in drawn.strips])
+    for axis in drawn.strips:
+        axis.set_ylim(ends[:, 0].min(), ends[:, 1].max())
+
+
+def _draw_share(axis: Axes, solution: Solution, curve: Any, prob: float) -> None:
+    """Draw the share of a curve's stress that the discrepancy carries, in percent, within -100 and 100."""
+    ways, at, shares = share_along(solution, curve, prob)
+    low, median, high = 100 * shares
+    axis.axhline(0, color=BASE, lw=0.8 * relative_size(), zorder=0.5)
+    axis.set_ylim(_share_limits(low, high))
+    for number, (places, is_curve) in enumerate(ways):
+        low_end, middle, high_end = (np.clip(values[places], -MOST_SHARE, MOST_SHARE) for values in (low, median, high))
+        band(axis, at[places], low_end, high_end, color=INK, strength=0.2, is_path=is_curve,
+             label="" if number else f"{100 * prob:.4g} % of the share")  # fmt: skip
+        line(axis, at[places], middle, color=INK, width=1.2, is_path=is_curve, label="" if number else "median")
+
+
+def _share_limits(low: Any, high: Any) -> tuple[float, float]:
+    """Return limits in percent that show zero and the band, as far as a hundred percent."""
+    known = np.isfinite(low) & np.isfinite(high)
+    if not known.any():
+        return -10.0, 10.0
+    ends = np.clip([low[known].min(), high[known].max()], -100, 100)
+    low_end, high_end = min(ends[0], 0.0), max(ends[1], 0.0)
+    air = 0.08 * max(high_end - low_end, 4.0)
+    return low_end - air, high_end + air

@@ -1,0 +1,120 @@
+"""What a posterior says of a measured curve: bands of measurements, of the stress and of the material alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.experiments.experiment import Curve
+from tissuq.experiments.modes import LoadingMode
+from tissuq.inference.quasi_monte_carlo import systematic
+from tissuq.inference.solution import Solution
+from tissuq.inference.threads import one_thread
+from tissuq.prediction.bands import Band, predict_band, predict_bands
+from tissuq.prediction.moments import drawn_curves
+
+__all__ = ["Described", "Way", "described", "points_along", "share_along", "ways_of"]
+
+FloatArray = NDArray[np.float64]
+
+POINTS, SHARE_POINTS, SHARE_DRAWS = 101, 41, 800
+"""Points of a band and of a share along a curve, and draws of the latter."""
+RETURN, MOST_WAYS = 0.3, 7
+"""Decrease of the deformation at which a new path begins, over its largest change; and the most paths of a picture."""
+NEARLY = 0.02
+"""Changes of a control that do not count, over its range."""
+NO_STRESS = 0.02
+"""Stress over the largest one of a curve, below which there is no share of it."""
+
+
+class Way(NamedTuple):
+    """Places of points in the order of what they are drawn against, and whether as a curve or by themselves."""
+
+    places: NDArray[np.intp]
+    is_curve: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """A measured curve and what a posterior says of it, MPa.
+
+    Attributes
+    ----------
+    curve : Curve
+    measurements, stress : Band
+        Of new measurements and of the stress itself, with the discrepancy.
+    alone : Band or None
+        Of the stress of the material alone; None where there is no discrepancy.
+    ways : list of Way
+        The paths that the points of the bands follow.
+    """
+
+    curve: Curve
+    measurements: Band
+    stress: Band
+    alone: Band | None
+    ways: list[Way]
+
+
+def described(solution: Solution, curve: Curve, prob: float = 0.95) -> Described:
+    """Return the bands of a measured curve, over its range or at its points where the test has several controls."""
+    points = points_along(curve, POINTS)
+    options: dict[str, Any] = {"prob": prob, "mode": curve.mode, "channel": curve.channel}
+    measurements, stress = predict_bands([(1.0, solution)], points, (True, False), **options)
+    has_discrepancy = bool(solution.model.discrepancy.parameters)
+    alone = predict_band(solution, points, discrepancy=False, noise=False, **options) if has_discrepancy else None
+    return Described(curve, measurements, stress, alone, ways_of(curve.mode, points, stress.stretch))
+
+
+def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:
+    """Return the paths that points (g,) or (g, c) of a mode follow: a new one begins where a test goes back to rest.
+
+    Each in the order of what it is drawn against. Where nothing changes along that, or there are many, it is no curve.
+    """
+    if points.ndim == 1:
+        return [Way(np.argsort(abscissa, kind="stable"), True)]
+    size = np.linalg.norm(points - mode.reference, axis=1)
+    starts = 1 + np.flatnonzero(np.diff(size) < -RETURN * np.ptp(size))
+    parts = np.split(np.arange(len(points)), starts)
+    nearly, least = NEARLY * np.ptp(points, axis=0), NEARLY * np.ptp(abscissa)
+    ways = []
+    for part in parts:
+        order = part[np.argsort(abscissa[part], kind="stable")]
+        others, along = np.diff(points[order], axis=0), np.diff(abscissa[order])
+        is_one = ((others >= -nearly).all(axis=0) | (others <= nearly).all(axis=0)).all() and (along > 0).all()
+        is_held = along.sum() <= least
+        if len(parts) > MOST_WAYS or not (is_one or is_held):
+            return [Way(np.argsort(abscissa, kind="stable"), False)]
+        ways.append(Way(order, not is_held))
+    return ways
+
+
+def points_along(curve: Curve, count: int) -> FloatArray:
+    """Return points over the range of a curve, or its own where the test has several controls."""
+    points = curve.points
+    return points if points.ndim > 1 else np.linspace(points.min(), points.max(), count)
+
+
+def share_along(solution: Solution, curve: Curve, prob: float = 0.95) -> tuple[list[Way], FloatArray, FloatArray]:
+    """Return the share of a curve's stress that the discrepancy carries: low, median and high (3, g).
+
+    After the paths of the points and what they are drawn against (g,).
+
+    Of the stress itself: scatter from point to point is left out. Not known (nan) where there is next to no stress.
+    """
+    model = solution.model
+    points = points_along(curve, SHARE_POINTS)
+    states = model.experiment.states_at(points, curve.mode, curve.channel)
+    components = solution.mixture[systematic(solution.mixture.weights[None], SHARE_DRAWS)[0]]
+    with one_thread():
+        material, discrepancy = drawn_curves(model, components, states)
+    total = material + discrepancy
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.quantile(discrepancy / total, [0.5 * (1 - prob), 0.5, 0.5 * (1 + prob)], axis=0)
+    size = np.abs(np.median(total, axis=0))
+    share[:, size <= NO_STRESS * size.max()] = np.nan
+    abscissa = np.asarray(curve.path.abscissa(points))
+    return ways_of(curve.mode, points, abscissa), abscissa, share

@@ -1,0 +1,229 @@
+"""Pictures of predictions: bands over any stretches, and where they go beyond what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.assessment.stability import calibrated_range, is_calibrated
+from tissuq.drawing.panels import Panels, limits_of, within
+from tissuq.drawing.pieces import band, line, outside, points
+from tissuq.drawing.style import BASE, INK, relative_size
+from tissuq.errors import InputError, ModelError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import StressUnit
+from tissuq.inference.solution import Solution
+from tissuq.pictures.curves import Way, ways_of
+from tissuq.prediction.bands import Band, predict_bands, speaks_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "Measured",
+    "Predicted",
+    "draw_predicted",
+    "predicted_limits",
+    "prediction",
+    "predictions",
+]
+
+FloatArray = NDArray[np.float64]
+
+POINTS = 121
+"""Of a band, unless they are given."""
+REACH = 0.35
+"""How far a prediction goes beyond what was measured on either side, over the measured range."""
+LESSER_REACHES = (REACH, REACH / 3, REACH / 10)
+"""The same where a material locks before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Measurements that a prediction is compared with: (n,) arrays, stress in MPa."""
+
+    abscissa: FloatArray
+    stress: FloatArray
+    is_calibrated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """The bands of one stress, MPa.
+
+    Attributes
+    ----------
+    abscissa : (g,) array
+        What it is drawn against.
+    stress, measurements : Band
+        Of the stress itself, and of new measurements of it.
+    is_calibrated : (g,) array of bool
+        Where both invariants were measured.
+    calibrated : (float, float) or None
+        The ends of that range; None where several controls make it no interval.
+    ways : list of Way
+        The paths that the points follow.
+    measured : Measured or None
+    label, title, quantity : str
+        Of the horizontal axis, of the panel, and of the stress.
+    """
+
+    abscissa: FloatArray
+    stress: Band
+    measurements: Band
+    is_calibrated: NDArray[np.bool_]
+    calibrated: tuple[float, float] | None
+    ways: list[Way]
+    measured: Measured | None
+    label: str
+    title: str
+    quantity: str
+
+
+def stretches_to_show(solution: Solution, mode: LoadingMode, reach: float = REACH) -> FloatArray:
+    """Return points of a mode to predict at: over the measured range and beyond; or those that were measured.
+
+    Raises
+    ------
+    InputError
+        When the mode has several controls and was not measured.
+    """
+    data = solution.model.experiment
+    if len(mode.controls) > 1:
+        measured = next((curve.points for curve in data.curves if curve.mode == mode), None)
+        if measured is None:
+            names = " and ".join(control.name for control in mode.controls)
+            raise InputError(
+                f"'{mode.name}' has several controls ({names}): say where to predict by stretch=, a row for each point."
+            )
+        return measured
+    low, high = calibrated_range(data, mode)
+    wider = reach * (high - low)
+    lowest, reference = mode.controls[0].above, float(mode.reference)
+    start = low if np.isclose(low, reference) else max(low - wider, low - 0.5 * (low - lowest))
+    end = high if np.isclose(high, reference) else high + wider
+    return np.linspace(start, end, POINTS)
+
+
+def predictions(
+    solution: Solution, mode: LoadingMode, stretch: ArrayLike | None = None, prob: float = 0.95
+) -> list[Predicted]:
+    """Return every stress of a mode, with the discrepancy where it says something about the mode.
+
+    Unless stretches are given, as far beyond the measured range as the material has a stress.
+
+    Raises
+    ------
+    InputError, ModelError
+        When the points are none of the mode, must be given, or the material has no stress there.
+    """
+    if stretch is not None:
+        return _predictions(solution, mode, np.atleast_1d(np.asarray(stretch, dtype=np.float64)), prob)
+    for reach in LESSER_REACHES:
+        with suppress(ModelError):
+            return _predictions(solution, mode, stretches_to_show(solution, mode, reach), prob)
+    return _predictions(solution, mode, stretches_to_show(solution, mode, 0.0), prob)
+
+
+def _predictions(solution: Solution, mode: LoadingMode, at: FloatArray, prob: float) -> list[Predicted]:
+    data, model = solution.model.experiment, solution.model
+    is_joint, several = speaks_of(model, mode), len(mode.controls) > 1
+    found = []
+    for channel, quantity in enumerate(mode.stresses):
+        options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
+        noisy, stress = predict_bands([(1.0, solution)], at, (True, False), **options)
+        found.append(
+            Predicted(
+                abscissa=stress.stretch,
+                stress=stress,
+                measurements=noisy,
+                is_calibrated=is_calibrated(data, mode, at),
+                calibrated=None if several else calibrated_range(data, mode),
+                ways=ways_of(mode, at, stress.stretch),
+                measured=_measured(solution, mode, channel),
+                label="stretch" if several else mode.controls[0].name,
+                title=mode.name if is_joint else f"{mode.name}\n{model.material.name} alone, discrepancy unknown",
+                quantity=quantity,
+            )
+        )
+    return found
+
+
+def prediction(drawn: Panels, found: Sequence[Predicted], unit: StressUnit, prob: float = 0.95) -> None:
+    """Draw every stress on a panel of its own."""
+    for axis, of in zip(drawn.axes, found, strict=True):
+        draw_predicted(axis, of, unit, predicted_limits([of]), prob)
+        axis.set_ylabel(f"{of.quantity} [{unit.name}]")
+        axis.set_xlabel(of.label)
+        if drawn.is_new:
+            axis.set_title(of.title)
+    drawn.explain()
+
+
+def predicted_limits(found: Sequence[Predicted]) -> tuple[float, float]:
+    """Return the ends of an axis, MPa: what is calibrated or measured, the medians, and some of the bands beyond."""
+    core, beyond = list[FloatArray](), list[FloatArray]()
+    for of in found:
+        known = of.is_calibrated if of.is_calibrated.any() else np.ones_like(of.is_calibrated)
+        core += [values[known] for values in (of.measurements.low, of.measurements.high)]
+        core += [of.measured.stress] if of.measured is not None else []
+        beyond += [of.measurements.low, of.measurements.high]
+    low, high = limits_of(core, [])
+    extent = high - low
+    medians = [np.clip(of.stress.median, low - extent, high + extent) for of in found]
+    near = [np.clip(ends, low - 0.5 * extent, high + 0.5 * extent) for ends in beyond]
+    return limits_of([*core, *medians, *near], [])
+
+
+def draw_predicted(
+    axis: Axes, found: Predicted, unit: StressUnit, limits: tuple[float, float], prob: float = 0.95
+) -> None:
+    """Draw bands, measurements and where nothing was measured; ``limits`` of the stress are in MPa."""
+    scale, percent, at = unit.to_mpa, f"{100 * prob:.4g} %", found.abscissa
+    ends = limits[0] / scale, limits[1] / scale
+    for number, (places, is_curve) in enumerate(found.ways):
+        for of, strength, label in (
+            (found.measurements, 0.18, f"{percent} of measurements"),
+            (found.stress, 0.38, f"{percent} of the stress"),
+        ):
+            low, high = within(of.low[places] / scale, ends), within(of.high[places] / scale, ends)
+            label = "" if number else label
+            band(axis, at[places], low, high, strength=strength, label=label, is_path=is_curve)
+        median = within(found.stress.median[places] / scale, ends)
+        line(axis, at[places], median, label="" if number else "predicted median", is_path=is_curve)
+    margin = 0.02 * max(float(np.ptp(at)), 0.1 * abs(float(at.max())))
+    axis.set_xlim(at.min() - margin, at.max() + margin)
+    axis.set_ylim(ends)
+    axis.locator_params(axis="x", nbins=6)
+    size = relative_size()
+    if found.calibrated is not None:
+        outside(axis, *found.calibrated, "extrapolated")
+    elif not found.is_calibrated.all():
+        beyond = at[~found.is_calibrated]
+        axis.plot(beyond, np.zeros_like(beyond), "|", color=BASE, ms=8 * size, transform=axis.get_xaxis_transform(),
+                  label="extrapolated", clip_on=False)  # fmt: skip
+    if found.measured is None:
+        return
+    shown = found.measured
+    for is_shown, face, label in (
+        (shown.is_calibrated, INK, "measured"),
+        (~shown.is_calibrated, "white", "measured beyond"),
+    ):
+        if is_shown.any():
+            points(axis, shown.abscissa[is_shown], shown.stress[is_shown] / scale, label=label,
+                   mec=INK, mfc=face, ms=3.6 * size, mew=0.9 * size)  # fmt: skip
+
+
+def _measured(solution: Solution, mode: LoadingMode, channel: int) -> Measured | None:
+    """Return what the fitted tests measured of a stress of a mode, where they did."""
+    data = solution.model.experiment
+    curves = [curve for curve in data.curves if (curve.mode, curve.channel) == (mode, channel)]
+    if not curves or not solution.is_of_data:
+        return None
+    abscissa, stress = (np.concatenate([getattr(curve, name) for curve in curves]) for name in ("abscissa", "stress"))
+    return Measured(abscissa, stress, np.ones(len(stress), dtype=bool))

@@ -1,0 +1,94 @@
+"""The picture of a population: every specimen by itself and within the population, and where a new patient may be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.drawing.panels import Panels
+from tissuq.drawing.pieces import forest
+from tissuq.drawing.style import BAND, BASE, INK, TRUTH, relative_size
+from tissuq.experiments.units import StressUnit
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from tissuq.population.population import Population
+
+__all__ = ["draw_specimens", "height_of", "numbers_of", "unit_factor"]
+
+FloatArray = NDArray[np.float64]
+
+ALONE = "#b8b8b8"
+ENDS = ("hdi_low", "hdi_high")
+COLUMNS = [f"{prefix}{name}" for prefix in ("", "alone_") for name in ("median", *ENDS)]
+SMALL_MARKS_ABOVE = 25
+"""Number of specimens above which names and marks are smaller."""
+
+
+def draw_specimens(drawn: Panels, population: Population, unit: StressUnit) -> None:
+    """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order."""
+    symbols, summary = population.symbols, numbers_of(population.summary())
+    table = numbers_of(population.specimen_summary())
+    order = sorted(population.names, key=lambda name: table[name, symbols[0]]["median"])
+    small, size = len(order) > SMALL_MARKS_ABOVE, relative_size()
+    for number, (panel, symbol) in enumerate(zip(drawn.axes, symbols, strict=True)):
+        factor, name_of_unit = unit_factor(population, symbol, unit)
+        estimates = {key: np.array([table[name, symbol][key] for name in order]) / factor for key in COLUMNS}
+        new, median, complete = (
+            [summary[symbol, name][end] / factor for end in ENDS]
+            for name in ("new patient", "median", "complete pooling")
+        )
+        panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new patient, 95 %")
+        panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population")
+        panel.hlines(-0.55, complete[0], complete[1], color=TRUTH, lw=4 * size, label="complete pooling")
+        _draw_specimens(panel, estimates, small)
+        panel.set_xlim(*_limits([*new, *estimates["hdi_low"], *estimates["hdi_high"]], estimates))
+        panel.locator_params(axis="x", nbins=6)
+        panel.set_xlabel(f"{symbol} [{name_of_unit}]" if name_of_unit else symbol)
+        names = order if number % drawn.columns == 0 else [""] * len(order)
+        panel.set_yticks(range(len(order)), names, fontsize=(6.5 if small else 9) * size)
+        panel.tick_params(axis="y", length=0)
+        panel.set_ylim(-0.8, len(order) - 0.2)
+    drawn.explain(2)
+
+
+def height_of(population: Population, letters: float = 1.0) -> float:
+    """Return the height of a panel, inches, for letters of a size over the usual one."""
+    count = len(population.names)
+    return letters * (1.2 + (0.15 if count > SMALL_MARKS_ABOVE else 0.27) * count)
+
+
+def unit_factor(population: Population, symbol: str, unit: StressUnit) -> tuple[float, str]:
+    """Return what one unit of a parameter is in MPa, and the unit's name."""
+    parameter = next(p for p in population.complete.model.parameters if p.symbol == symbol)
+    return (unit.to_mpa, unit.name) if parameter.unit else (1.0, "")
+
+
+def numbers_of(table: pd.DataFrame) -> dict[Any, dict[str, float]]:
+    """Return the rows of a table by what they are indexed by."""
+    return {index: {str(name): float(value) for name, value in row.items()} for index, row in table.T.to_dict().items()}
+
+
+def _limits(shown: list[float], estimates: Mapping[str, FloatArray]) -> tuple[float, float]:
+    """Return the ends of an axis on which new patients and specimens within the population fit; others may run out."""
+    low, high = min(shown), max(shown)
+    width = high - low
+    ends = float(estimates["alone_hdi_low"].min()), float(estimates["alone_hdi_high"].max())
+    return max(min(low, ends[0]), low - width) - 0.04 * width, min(max(high, ends[1]), high + width) + 0.04 * width
+
+
+def _draw_specimens(axis: Axes, estimates: Mapping[str, FloatArray], small: bool) -> None:
+    heights = np.arange(len(estimates["median"]))
+    gap, width, size = (0.18, 1.6, 2.5) if small else (0.16, 2.6, 3.5)
+    for prefix, side, color, dot, label in (
+        ("alone_", gap, ALONE, BASE, "specimen by itself, 95 % HPD"),
+        ("", -gap, BAND, INK, "within the population, 95 % HPD"),
+    ):
+        low, middle, high = (estimates[f"{prefix}{name}"] for name in ("hdi_low", "median", "hdi_high"))
+        forest(axis, heights + side, low, middle, high, color=color, width=width, size=size, mark_color=dot,
+               label=label)  # fmt: skip

@@ -1,0 +1,44 @@
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+
+@pytest.fixture(scope="module")
+def population():
+    stretch, moduli = np.linspace(0.8, 1.3, 8), {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45}
+    specimens = {
+        name: tq.simulate("neo-hookean", {"C10": modulus}, stretch, 0.01, seed=seed).labelled(stress_unit="kPa")
+        for seed, (name, modulus) in enumerate(moduli.items())
+    }
+    return tq.fit_population(specimens, discrepancy="none", noise_sd=0.01)
+
+
+def test_every_specimen_is_a_row_with_its_intervals_in_the_unit_of_the_measurements(population):
+    figure, given = plt.subplots()
+    axis = population.plot(given)
+    assert axis is given
+    assert plt.get_fignums() == [figure.number]
+    table = population.specimen_summary().xs("C10", level="parameter").sort_values("median")
+    assert [label.get_text() for label in axis.get_yticklabels()] == list(table.index)
+    bars = [line.get_xdata() for line in axis.lines if line.get_marker() == "None"]
+    ends = [table[[f"{prefix}hdi_low", f"{prefix}hdi_high"]].to_numpy() for prefix in ("alone_", "")]
+    np.testing.assert_allclose(bars, 1000 * np.concatenate(ends))
+    assert axis.get_xlabel() == "C10 [kPa]"
+    plt.close(figure)
+
+
+def test_a_notebook_shows_the_population_in_the_unit_of_the_measurements(population):
+    page = population._repr_html_()
+    summary = population.summary()["median"]
+    assert "stresses in kPa" in page
+    assert f"<td>{1000 * summary['C10', 'median']:.4g}</td>" in page
+    assert f"<td>{summary['C10', 'spread']:.4g}</td>" in page  # sd of a logarithm
+    assert not plt.get_fignums()
+
+
+def test_a_new_patient_is_drawn_as_predicted_for_measurements_that_were_not_fitted(population):
+    axis = population.patient.plot()
+    assert axis.get_title(loc="left") == "predicted, not fitted to these"
+    plt.close(axis.figure)
