@@ -11,7 +11,7 @@ BENCH := .venv-bench
 APT := { apt-get install -qq -y calculix-ccx || { apt-get update -qq && apt-get install -qq -y calculix-ccx; }; }
 JAX_CACHE ?= .jax_cache
 
-.PHONY: demo test test-rest test-all mutants fuzz frozen architecture lint types check system lock bench clean help
+.PHONY: demo test test-rest test-all mutants fuzz frozen architecture docs lint types check system lock bench clean help
 
 help:  ## List the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -45,6 +45,11 @@ frozen: $(VENV)/.installed-dev  ## Hold reference posteriors against their store
 
 architecture:  ## Write the table of files in docs/architecture.md
 	$(PYTHON) docs/architecture_table.py
+
+docs: $(VENV)/.installed-docs  ## Build the documentation site in build/site, its examples run (a minute and a half on two cores, at first two)
+	JAX_COMPILATION_CACHE_DIR=$(abspath $(JAX_CACHE)) JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \
+	  $(BIN)/python -m mkdocs build --quiet
+	@echo "The site, to open in a browser: $(abspath build/site/index.html)"
 
 lint: $(VENV)/.installed-dev  ## Check style and format
 	$(BIN)/ruff check src tests benchmarks
@@ -93,6 +98,10 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
 	touch $@
 
 clean:  ## Remove the environment and caches
