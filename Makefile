@@ -47,13 +47,13 @@ architecture:  ## Write the table of files in docs/architecture.md
 	$(PYTHON) docs/architecture_table.py
 
 docs: $(VENV)/.installed-docs  ## Build the documentation site in build/site, its examples run (a minute and a half on two cores, at first two)
-	JAX_COMPILATION_CACHE_DIR=$(abspath $(JAX_CACHE)) JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0.3 \
-	  $(BIN)/python -m mkdocs build --quiet
+	JAX_COMPILATION_CACHE_DIR=$(abspath $(VENV))/jax-cache JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 \
+	  NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "The site, to open in a browser: $(abspath build/site/index.html)"
 
 lint: $(VENV)/.installed-dev  ## Check style and format
-	$(BIN)/ruff check src tests benchmarks
-	$(BIN)/ruff format --check src tests benchmarks
+	$(BIN)/ruff check src tests benchmarks docs
+	$(BIN)/ruff format --check src tests benchmarks docs
 
 types: $(VENV)/.installed-dev  ## Check types
 	$(BIN)/mypy

@@ -75,8 +75,10 @@ def run_page(text: str, name: str = "page") -> str:
         When a block fails, or a command ends with another status than the one that is expected.
     """
     import matplotlib
+    import matplotlib.pyplot as plt
 
     matplotlib.use("agg")
+    plt.close("all")
     namespace: dict[str, Any] = {"__name__": "__main__"}
     pieces, done = [], 0
     with _new_folder():
@@ -200,8 +202,9 @@ def _shown(value: object, *, has_figure: bool) -> str:
     if isinstance(value, pd.Series):
         value = value.to_frame()
     if isinstance(value, pd.DataFrame):
-        table = value.to_html(border=0, float_format="{:.4g}".format, na_rep="")
-        return f'\n<div class="output-table">{" ".join(table.split())}</div>\n'
+        table = " ".join(value.to_html(border=0, float_format="{:.4g}".format, na_rep="").split())
+        plain = re.sub(r"<(table|tr) [^>]*>", r"<\1>", table)  # the theme's own style
+        return f'\n<div class="output-table">{plain}</div>\n'
     return _verbatim(repr(value), "output wrapped")
 
 

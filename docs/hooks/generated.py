@@ -29,7 +29,7 @@ SECTIONS = {
     "report": "Material cards",
     "errors": "Errors",
 }
-"""The stages of the package that have public names, in the order of the pages; one that is not here is named by itself."""
+"""The stages of the package that have public names, in the order of the pages; any other is named by itself."""
 
 GUIDES = {
     "fit": ["tutorials/one-test.md", "reading.md", "several-tests.md", "which-law.md"],
@@ -78,8 +78,8 @@ def command_pages() -> dict[str, str]:
     text = [
         "# Commands",
         "",
-        "Each page is made from the command itself. `tissuq COMMAND --help` says the same. Exit status 2 means that the "
-        "input cannot be used (one message says why), 3 that sampling has not converged.",
+        "Each page is made from the command itself. `tissuq COMMAND --help` says the same. Exit status 2 means that "
+        "the input cannot be used (one message says why), 3 that sampling has not converged.",
         "",
         "| command | what it does |",
         "|---|---|",

@@ -6,7 +6,15 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-FETCHED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src", "audio": "src", "object": "data"}
+FETCHED = {
+    "script": "src",
+    "img": "src",
+    "iframe": "src",
+    "source": "src",
+    "video": "src",
+    "audio": "src",
+    "object": "data",
+}
 STYLES = re.compile(r"""(?:@import\s+|url\()\s*['"]?((?:https?:)?//[^'")\s]+)""")
 
 LOCAL = {"https://unpkg.com/iframe-worker/shim": "javascripts/iframe-worker.js"}

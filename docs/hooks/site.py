@@ -9,12 +9,13 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from execution import PageError, has_code, timed_page
-from formulas import with_formulas
-from generated import all_pages, linked_in_site, page_title
 from mkdocs.exceptions import PluginError
 from mkdocs.plugins import get_plugin_logger
 from mkdocs.structure.files import File
+
+from execution import PageError, has_code, timed_page
+from formulas import with_formulas
+from generated import all_pages, linked_in_site, page_title
 from offline import make_local, outside_addresses
 
 log = get_plugin_logger("code of the pages")
@@ -28,9 +29,8 @@ def on_config(config: Any) -> Any:
     _made.update(all_pages())
     sections = {title: entry for part in config.nav for title, entry in part.items()}
     for title, folder in (("Commands", "commands/"), ("Python", "reference/")):
-        sections["Reference"].append(
-            {title: [{page_title(text) if page != f"{folder}index.md" else "All": page} for page, text in _made.items() if page.startswith(folder)]}
-        )
+        pages = {page: text for page, text in _made.items() if page.startswith(folder)}
+        sections["Reference"].append({title: [{page_title(text): page} for page, text in pages.items()]})
     docs = Path(config.docs_dir)
     named = set(_pages_in(config.nav))
     for file in sorted(docs.rglob("*.md")):

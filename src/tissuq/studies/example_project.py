@@ -47,7 +47,8 @@ posterior.save("posterior.nc")
 GUIDE = """\
 # An example project
 
-Human brain cortex in tension, compression and simple shear (Budday et al. 2017). Put your own files in place of those in data/.
+Human brain cortex in tension, compression and simple shear (Budday et al. 2017).
+Put your own files in place of those in data/.
 
     tissuq inspect data/tension-compression.csv        # what is understood of a file
     tissuq fit data/tension-compression.csv            # one test
