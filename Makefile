@@ -46,7 +46,7 @@ frozen: $(VENV)/.installed-dev  ## Hold reference posteriors against their store
 architecture:  ## Write the table of files in docs/architecture.md
 	$(PYTHON) docs/architecture_table.py
 
-docs: $(VENV)/.installed-docs  ## Build the documentation site in build/site, its examples run (a minute and a half on two cores, at first two)
+docs: $(VENV)/.installed-docs  ## Build the documentation site in build/site, its examples run (a minute and a half on two cores)
 	JAX_COMPILATION_CACHE_DIR=$(abspath $(VENV))/jax-cache JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 \
 	  NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "The site, to open in a browser: $(abspath build/site/index.html)"

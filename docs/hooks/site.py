@@ -20,6 +20,8 @@ from offline import make_local, outside_addresses
 
 log = get_plugin_logger("code of the pages")
 PROCESSES = 2
+SETTINGS = {"COLUMNS": "88", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Of the processes that run the code of pages: the width of what commands print, and one thread for small matrices."""
 _made: dict[str, str] = {}
 _executed: dict[str, str] = {}
 
@@ -55,7 +57,8 @@ def on_files(files: Any, config: Any) -> Any:
     pages = {page: text for page, text in texts.items() if has_code(text) and "SKIP_CODE" not in os.environ}
     order = sorted(pages, key=lambda page: page not in config.extra["longest"])
     sys.path.insert(0, str(Path(__file__).parent))  # where the processes find the modules of this folder
-    os.environ.setdefault("COLUMNS", "88")  # of the tables that commands print
+    for name, value in SETTINGS.items():
+        os.environ.setdefault(name, value)
     with ProcessPoolExecutor(PROCESSES, mp_context=multiprocessing.get_context("spawn")) as pool:
         running = {page: pool.submit(timed_page, pages[page], page) for page in order}
         for page, result in running.items():
