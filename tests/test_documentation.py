@@ -23,7 +23,7 @@ def hook(name):
     return module
 
 
-execution, generated, offline = (hook(name) for name in ("execution", "generated", "offline"))
+execution, formulas, generated, offline = (hook(name) for name in ("execution", "formulas", "generated", "offline"))
 
 
 def help_of(*words):
@@ -162,6 +162,11 @@ def test_every_tutorial_runs_code():
     tutorials = sorted((DOCS / "tutorials").glob("*.md"))
     assert len(tutorials) == 7
     assert all(execution.has_code(page.read_text(encoding="utf-8")) for page in [*tutorials, DOCS / "start.md"])
+
+
+def test_a_number_stays_with_its_unit_in_tables_alone():
+    text = "| 95 % | 1.2 ± 0.3 kPa | a b |\n\n95 % of it\n"
+    assert formulas.with_whole_numbers(text) == "| 95\u00a0% | 1.2\u00a0±\u00a00.3\u00a0kPa | a b |\n\n95 % of it\n"
 
 
 @pytest.mark.parametrize(

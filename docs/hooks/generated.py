@@ -47,6 +47,10 @@ GUIDES = {
     "check": ["contributing.md"],
     "study": ["coverage.md"],
     "init": ["start.md"],
+    "doctor": ["start.md"],
+    "discrepancies": ["what-it-computes.md", "energy.md"],
+    "datasets": ["gallery.md"],
+    "show": ["by-example.md"],
 }
 """The pages to read beside that of a command."""
 

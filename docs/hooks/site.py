@@ -14,7 +14,7 @@ from mkdocs.plugins import get_plugin_logger
 from mkdocs.structure.files import File
 
 from execution import PageError, has_code, timed_page
-from formulas import with_formulas
+from formulas import with_formulas, with_whole_numbers
 from generated import all_pages, linked_in_site, page_title
 from offline import make_local, outside_addresses
 
@@ -73,7 +73,7 @@ def on_files(files: Any, config: Any) -> Any:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """Return a page with what its code said, its formulas, and its links to the pages of the site."""
     text = _executed.get(page.file.src_uri, markdown)
-    return with_formulas(linked_in_site(text))
+    return with_formulas(with_whole_numbers(linked_in_site(text)))
 
 
 def on_post_build(config: Any) -> None:
