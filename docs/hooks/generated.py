@@ -144,12 +144,11 @@ def _argument_name(parameter: Any) -> str:
 
 
 def _definition(parameter: Any) -> str:
-    annotation = parameter.type_descriptor.annotation
     if is_option(parameter):
         names = [*parameter.opts, *parameter.secondary_opts]
         anchor = names[0].lstrip("-")
-        often = " <em>may be repeated</em>" if get_origin(annotation) is list else ""
-        kind = _kind(annotation) + often
+        word, is_repeated = _taken_by(parameter)
+        kind = (f" <code>{escape(word)}</code>" if word else "") + (" <em>may be repeated</em>" if is_repeated else "")
     else:
         names, anchor, kind = [_argument_name(parameter)], parameter.name, ""
     code = ", ".join(f"<code>{escape(name)}</code>" for name in names)
@@ -157,14 +156,16 @@ def _definition(parameter: Any) -> str:
     return f'<dt id="{escape(anchor)}">{code}{kind}</dt><dd>{escape(parameter.help or "")}{default}</dd>'
 
 
-def _kind(annotation: Any) -> str:
-    """Return the word for what an option takes: nothing for a flag."""
+def _taken_by(parameter: Any) -> tuple[str, bool]:
+    """Return the word for what an option takes (none for a flag), and whether it may be repeated."""
+    if not hasattr(parameter, "type_descriptor"):  # Typer that is built on click
+        words = {"boolean": "", "path": "PATH", "integer": "NUMBER", "float": "NUMBER"}
+        return words.get(parameter.type.name, "TEXT"), parameter.multiple
+    annotation = parameter.type_descriptor.annotation
     inner = next((part for part in get_args(annotation) if part is not type(None)), annotation)
-    if inner is bool:
-        return ""
     choices = "|".join(map(str, get_args(inner)))
-    word = choices or {Path: "PATH", int: "NUMBER", float: "NUMBER"}.get(inner, "TEXT")
-    return f" <code>{escape(word)}</code>"
+    words = {bool: "", Path: "PATH", int: "NUMBER", float: "NUMBER"}
+    return choices or words.get(inner, "TEXT"), get_origin(annotation) is list
 
 
 def public_names() -> dict[str, str]:
