@@ -85,7 +85,7 @@ $(BENCH)/.installed: pyproject.toml benchmarks/constraints.txt
 	$(BENCH)/bin/python -m pip install --quiet --constraint benchmarks/constraints.txt --editable '.[bench]'
 	touch $@
 
-lock: $(VENV)/.installed-dev  ## Write the installed versions to constraints.txt
+lock: $(VENV)/.installed-dev $(VENV)/.installed-docs  ## Write the installed versions to constraints.txt
 	{ sed -n 1p constraints.txt; $(BIN)/python -m pip list --format=freeze --exclude tissuq --exclude pip --exclude setuptools; } > constraints.new
 	mv constraints.new constraints.txt
 
