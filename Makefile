@@ -11,7 +11,7 @@ BENCH := .venv-bench
 APT := { apt-get install -qq -y calculix-ccx chromium || { apt-get update -qq && apt-get install -qq -y calculix-ccx chromium; }; }
 JAX_CACHE ?= .jax_cache
 
-.PHONY: demo test test-rest test-all mutants fuzz frozen architecture lint types check system lock bench clean help
+.PHONY: demo test test-rest test-all mutants fuzz frozen architecture docs lint types check system lock bench clean help
 
 help:  ## List the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -46,9 +46,14 @@ frozen: $(VENV)/.installed-dev  ## Hold reference posteriors against their store
 architecture:  ## Write the table of files in docs/architecture.md
 	$(PYTHON) docs/architecture_table.py
 
+docs: $(VENV)/.installed-docs  ## Build the documentation site in build/site, its examples run (a minute and a half on two cores)
+	JAX_COMPILATION_CACHE_DIR=$(abspath $(VENV))/jax-cache JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS=0 \
+	  NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+	@echo "The site, to open in a browser: $(abspath build/site/index.html)"
+
 lint: $(VENV)/.installed-dev  ## Check style and format
-	$(BIN)/ruff check src tests benchmarks
-	$(BIN)/ruff format --check src tests benchmarks
+	$(BIN)/ruff check src tests benchmarks docs
+	$(BIN)/ruff format --check src tests benchmarks docs
 
 types: $(VENV)/.installed-dev  ## Check types
 	$(BIN)/mypy
@@ -81,7 +86,7 @@ $(BENCH)/.installed: pyproject.toml benchmarks/constraints.txt
 	$(BENCH)/bin/python -m pip install --quiet --constraint benchmarks/constraints.txt --editable '.[bench]'
 	touch $@
 
-lock: $(VENV)/.installed-dev  ## Write the installed versions to constraints.txt
+lock: $(VENV)/.installed-dev $(VENV)/.installed-docs  ## Write the installed versions to constraints.txt
 	{ sed -n 1p constraints.txt; $(BIN)/python -m pip list --format=freeze --exclude tissuq --exclude pip --exclude setuptools; } > constraints.new
 	mv constraints.new constraints.txt
 
@@ -94,6 +99,10 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
 	touch $@
 
 clean:  ## Remove the environment and caches

@@ -68,7 +68,14 @@ def test_inference_knows_no_particular_material_discrepancy_or_noise():
         *["CONTRIBUTING.md", "docs/prediction.md", "docs/reading.md"],
         *(
             pytest.param(name, marks=pytest.mark.slow)
-            for name in ("README.md", "docs/several-tests.md", "docs/expensive-models.md", "docs/plots.md")
+            for name in (
+                "README.md",
+                "docs/python.md",
+                "docs/several-tests.md",
+                "docs/expensive-models.md",
+                "docs/plots.md",
+                "docs/warnings.md",
+            )
         ),
     ],
 )

@@ -15,6 +15,7 @@ from tissuq.cli import (
     catalogue,
     fit,
     inspect,
+    project,
     runs,
     structure,
     study,
@@ -31,7 +32,6 @@ TERMINATED = 128 + signal.SIGTERM
 app = typer.Typer(
     name="tissuq",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -54,6 +54,7 @@ def _tissuq(
     """Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
 
+app.command("init")(project.init)
 app.command("paper", cls=Renamed)(study.paper)
 app.command("inspect")(inspect.inspect)
 app.command("fit")(fit.fit)
@@ -72,6 +73,7 @@ app.command("check")(catalogue.check)
 app.command("discrepancies")(catalogue.discrepancies)
 app.add_typer(study.study)
 app.command("datasets")(catalogue.datasets)
+app.command("doctor")(project.doctor)
 
 
 def main() -> None:
