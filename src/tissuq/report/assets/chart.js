@@ -92,7 +92,7 @@
     if (plot) plot.destroy();
     plot = new uPlot({
       width, height: Math.round(Math.min(380, Math.max(240, 0.62 * width))), legend: { show: false },
-      cursor: { drag: { x: true, y: true } }, scales: { x: { time: false } },
+      pxAlign: 0, cursor: { drag: { x: true, y: true } }, scales: { x: { time: false } },
       axes: [{ label: view.control }, { label: `engineering stress [${data.unit}]`, size: 62 }],
       series: [{}, ...keys.map(key => ({ show: shown(key), spanGaps: true, points: { show: false }, stroke: "transparent", ...look[key] }))],
       bands: parts.filter(part => part.fill).map(part => ({ series: [position(part.keys[1]), position(part.keys[0])], fill: part.fill })),
