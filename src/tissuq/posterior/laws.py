@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.headed_tables import in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements
-from tissuq.experiments.units import in_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials

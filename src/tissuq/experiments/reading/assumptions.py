@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tissuq.experiments.reading.column_units import MPA_ASSUMED
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
-from tissuq.experiments.reading.measures import MPA_ASSUMED
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
 from tissuq.experiments.reading.positions import ZERO_ASSUMED
 from tissuq.experiments.reading.stated_mode import is_torque

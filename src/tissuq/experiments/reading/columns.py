@@ -40,7 +40,8 @@ from tissuq.experiments.reading.recognition import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import PRESSURE, with_columns_of_tube
-from tissuq.experiments.units import measured_in
+from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS
+from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
 __all__ = [
     "ColumnChoice",
@@ -56,13 +57,16 @@ NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak
 """In a line above the table that speaks of strain or stress without saying what the columns hold."""
 NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
-SHEAR_STRESS = re.compile(r"shear|lateral|horizontal|schub|scher|quer|cisaillement|cort[ae]|taglio|cisalhamento|τ|tau")
+SHEAR_STRESS = re.compile(
+    r"shear|lateral|horizontal|schub|scher|quer|cisaillement|cort[ae]|taglio|cisalhamento|τ|tau|"
+    r"сдвиг|касательн|剪切|剪应|せん断"
+)
 ON_SPECIMEN = re.compile(
     r"exten[sz]om|estensim|aufnehmer|video|opti[ck]|[oó]ptic|ottic|camera|kamera|laser|marker|clip|gau?ge|lvdt|\bdic\b|"
-    r"伸び計|引伸[计計]"
+    r"伸び計|引伸[计計]|экстензометр|видео|оптич|камер|лазер|датчик деформ"
 )
 """Names of a deformation that is measured on the specimen itself, not by the displacement of the machine."""
-NORMAL = re.compile(r"normal|axial|^f ?[nz]$")
+NORMAL = re.compile(r"normal|axial|^f ?[nz]$|нормальн|осев")
 OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
 )
@@ -239,6 +243,8 @@ def _choice(
         load = next((role for role in loads if contents.fitting(role)), "")
         by_unit = None if load else told_by_unit(table, contents, loads)
         load, stress = by_unit or (load, recognise(table, contents, [load or "force"], loads))
+        is_per_width = measured_in(table.unit(stress)) == FORCE_PER_WIDTH.name
+        load = "force" if load == "stress" and is_per_width else load
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
     if measure:
         deformation = find_column(table, measure, mapping[measure])
@@ -262,8 +268,13 @@ def _choice(
             name = contents.quantities[deformation]
             measure = next((measure for measure in measures if name in role_names(measure)), "strain")
             measure = "shear" if is_shear and measure == "strain" else measure
-        if measure == "displacement" and measured_in(table.unit(deformation)) == "strain":
+        by_unit_alone = measured_in(table.unit(deformation))
+        if measure == "displacement" and by_unit_alone == "strain":
             measure = "strain"
+        elif (
+            measure == "strain" and by_unit_alone == "length" and contents.quantities[deformation] in DEFORMATION_NOUNS
+        ):
+            measure = "displacement"
         if measure == "displacement":
             _check_machine(table, contents.quantities, deformation)
     if deformation == stress:

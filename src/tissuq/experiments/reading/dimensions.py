@@ -11,9 +11,11 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import DIMENSION_NAMES, heading, on_axis
+from tissuq.experiments.reading.headings import heading, on_axis
+from tissuq.experiments.reading.inflation import Tube
 from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
 from tissuq.experiments.units import AREA, LENGTH, Quantity
 
 __all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
@@ -141,6 +143,24 @@ class Dimensions:
                 'Say which: --area "10 mm2", and leave out the others.'
             )
         return area
+
+    @property
+    def thickness(self) -> Dimension:
+        """The undeformed thickness.
+
+        Raises
+        ------
+        InputError
+            When it is not known, or sizes are given that a force per width does not need.
+        """
+        if others := sorted(self.set_by_user & {"area", "width", "diameter"}):
+            raise InputError(
+                f"{self.file} holds a force per width, which over the thickness is a stress: leave {others[0]} out, "
+                'and give the undeformed thickness (--thickness "2 mm").'
+            )
+        return self._size(
+            "thickness", 'to turn a force per width into a stress give the undeformed thickness (--thickness "2 mm").'
+        )
 
     def _size(self, name: str, advice: str) -> Dimension:
         """Return a size that must be known, and be stated once."""
@@ -316,3 +336,15 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
 
 def _quantity(name: str) -> Quantity:
     return AREA if name == "area" else LENGTH
+
+
+def in_words(dimension: Dimension) -> str:
+    return f"{dimension.value:g} mm ({dimension.source})"
+
+
+def tube_of(dimensions: Dimensions) -> tuple[Tube, str]:
+    """Return the undeformed tube, and its radii in words."""
+    diameter, thickness = dimensions.wall_of_tube
+    tube = Tube(diameter.value / 2 - thickness.value, diameter.value / 2)
+    words = f"A = {tube.inner:g} mm and B = {tube.outer:g} mm (undeformed radii; diameter {diameter.source}, "
+    return tube, f"{words}thickness {thickness.source})"

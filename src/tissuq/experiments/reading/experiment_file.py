@@ -20,9 +20,10 @@ from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns, mapping_of_each_stress
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
+from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
+from tissuq.experiments.reading.loads import Load, force_in, stress_of
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
-from tissuq.experiments.reading.measures import Load, stress_of, stretch_of, without_machine
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
 from tissuq.experiments.reading.regions import (
@@ -53,6 +54,7 @@ from tissuq.experiments.reading.stated_sizes import names_of_specimen
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tables import read_table
+from tissuq.experiments.units import FORCE
 
 __all__ = [
     "Reading",
@@ -372,7 +374,8 @@ def _measured(
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
-        size = replace(size, divide_forces=choice.load == "force")
+        is_force = choice.load == "force" and force_in(table, choice.stress, compliance[1]) is FORCE
+        size = replace(size, divide_forces=is_force)
         with about_stress(number, labels, mode):
             deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
             stretch, step = stretch_of(table, choice, deformation, load, size, *units)
@@ -404,7 +407,7 @@ def _threshold(preload: str, load: Load) -> float:
             f"preload '{preload}' (--preload) does not go with the pressure in a tube. Give the outer diameter that it "
             "has without pressure as --diameter, and leave rows out with --stretch or --leave-out."
         )
-    return preload_stress(preload, load.area)
+    return preload_stress(preload, load.divided, load.by)
 
 
 def _of_stresses(columns: Column) -> Column:

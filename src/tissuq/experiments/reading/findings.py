@@ -9,10 +9,11 @@ import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.headings import ROLES, heading, on_axis
+from tissuq.experiments.reading.headings import heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
+from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["data_warnings"]

@@ -12,10 +12,10 @@ import numpy as np
 from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
-from tissuq.experiments.reading.headings import SPREADS
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
+from tissuq.experiments.reading.vocabulary import SPREADS
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["Inspection", "inspect", "lines_of_tests", "noise_between_neighbours", "overview"]
@@ -88,8 +88,8 @@ class Inspection:
         table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
         cells = f", separated by {SEPARATORS[table.separator]}; rows in lines {_span(table.lines)}, {head}"
-        in_memory = f"; rows {_span(table.lines)}, counted from 0"
-        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else in_memory}"
+        other = f"; {table.counted}s {_span(table.lines)}, counted from {int(table.counted != 'row')}"
+        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else other}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])

@@ -10,9 +10,9 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading.headings import DIMENSION_NAMES, ROLES_OF_TUBE
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
 from tissuq.experiments.units import is_quantity, unit_of
 
 __all__ = ["READING_OPTIONS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]

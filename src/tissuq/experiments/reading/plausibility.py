@@ -34,7 +34,7 @@ COMPRESSED_LIMIT = 0.5
 """Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
 NOTABLE_SHARE = 0.1
 """Share of the largest stretch change and stress that rows must reach for their sign to matter."""
-COMPRESSION_WORDS = ("compressive", "stauchung", "druck")
+COMPRESSION_WORDS = ("compressive", "stauchung", "druck", "сжима")
 """How names of columns begin whose numbers may be positive in compression."""
 NEGLIGIBLE_STRAIN = 0.1
 """Share of the largest strain up to which strains of the other sign are noise or slack."""

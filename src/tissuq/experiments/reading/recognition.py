@@ -7,18 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import (
-    COMPONENTS,
-    CYCLE_NAMES,
-    STRESS_NOUNS,
-    dimensions_named,
-    heading,
-    role_names,
-)
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, heading, role_names
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES
 from tissuq.experiments.units import measured_in
 
 __all__ = [
@@ -44,14 +38,14 @@ DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": 
 """What a column is that alone has such a unit."""
 OTHER_MEASURE = (
     r"true|cauchy|piola|kirchhoff|pk|log|hencky|green|almansi|lagrang|euler|wahr|vrai|r[ée]elle|verdader|real\b|"
-    r"真|对数|対数"
+    r"真|对数|対数|истинн|логарифм|грина|альманси|коши|пиол"
 )
 """Within names of a strain or stress that is, or may be, another one than the engineering one."""
 NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
-IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
+IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력|давлени")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|tijd|时间|時間|시간|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
+    r"modul|time|zeit|temp|tijd|时间|時間|시간|время|температур|модул|энерги|скорост|温度|模量|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
     + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""

@@ -49,8 +49,8 @@ CONFINED = re.compile(r"(^|-)confined($|-)")
 RHEOMETER = re.compile(r"parallel[ -]plate|plate[ -/]plate|platte[ -/]platte|cone|kegel|geometry name|rheomet")
 """Words above a table of a rheometer."""
 DIRECTIONS_OF_LOAD = {
-    "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축"),
-    "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장"),
+    "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축|сжати"),
+    "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени"),
 }
 """Words for the direction of a load."""
 HEAD_LINES = 20

@@ -5,32 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 
+from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
 from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import (
-    CYCLE_NAMES,
-    SET_NAMES,
-    Heading,
-    dimensions_named,
-    heading,
-    is_of_specimens,
-    plain,
-)
+from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
 from tissuq.experiments.reading.side_by_side import names_above
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.units import AREA, LENGTH, NUMBER, Quantity, number_and_unit, number_in
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
+from tissuq.experiments.units import AREA, LENGTH, Quantity
 
 __all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "stated_sizes"]
 
 UNIT_ASSUMED = "as of displacements)"
 """What follows the unit of a size that a table of specimens states without one."""
-UNITS = r"(?P<unit>(?:mm|cm|um|µm)[2²]?)"
+UNIT = r"(?:mm|cm|um|µm|мм|см|мкм|毫米|厘米)[2²]?"
+UNITS = rf"(?P<unit>{UNIT})"
 """Of sizes, where they stand among other words."""
-BETWEEN_STATEMENTS = re.compile(r";|,\s+(?=[^\W\d])")
-"""As in ``Width 5 mm; thickness 2 mm``."""
+BETWEEN_STATEMENTS = re.compile(rf";|,\s+(?=[^\W\d])(?!{UNIT}\s*[:=])")
+"""As in ``Width 5 mm; thickness 2 mm``, but not in ``Width, mm: 5``."""
 BETWEEN_WORDS = re.compile(
-    rf"[:=\t]|\s{{2,}}|(?<=\w)(?<! x)\s+(?={NUMBER.pattern}\s*[\[(]?{UNITS})".replace("?P<unit>", "?:")
+    rf"[:=\t]|\s{{2,}}|(?<=\w)(?<! x)\s+(?={NUMBER.pattern}\s*[\[(]?{UNIT}|{PRODUCT.pattern}\s*(?:{UNIT}|$))"
 )
 """What stands between the name of a size and its value, as in ``Width : 5 mm`` and ``Width 5 mm``."""
 DEVIATION = re.compile(rf"\s*(?:±|\+/?-)\s*{NUMBER.pattern}")
@@ -40,6 +36,9 @@ UNCLEAR = (
     re.compile(rf"[\[(]{UNITS}[\])]\W*(?P<number>{NUMBER.pattern})"),
 )
 """Numbers with a unit of a size among other words, but for products such as ``5 x 2 mm``."""
+CROSS_OF_NAMES = re.compile(r"\s+[x*]\s+|\s*×\s*")
+NAMES_OF_SIDES = {"l": "length", "b": "width", "w": "width", "h": "thickness", "t": "thickness"}
+"""Symbols of the sides of a specimen in a product, as in ``b x h: 5 x 2 mm``."""
 LONGEST_QUOTE = 60
 """Characters of a line that a message shows."""
 
@@ -104,25 +103,25 @@ def _in_lines(table: Table) -> Iterator[StatedSize]:
         words = [word.strip(' "') for statement in statements for word in BETWEEN_WORDS.split(statement)]
         words = [word for word in words if word]
         pairs = list(zip(words, words[1:], [*words[2:], ""], strict=False))
-        clear = [sizes for pair in pairs if (sizes := _of_words(*pair, f"in line {line}"))]
+        clear = [size for pair in pairs for size in _of_words(*pair, f"in line {line}")]
         yield from clear if clear else _among_words(text, f"in line {line}")
 
 
-def _of_words(name: str, number: str, unit: str, source: str) -> StatedSize | None:
-    """Return the size that a name, and a number after it, state; the unit is with one of them, or comes next."""
+def _of_words(name: str, number: str, unit: str, source: str) -> list[StatedSize]:
+    """Return the sizes that a name, and what follows it, state; the unit is with one of them, or comes next."""
     for text in (f"{number} {unit}", number):
         value = DEVIATION.sub("", text)
-        if (size := _size(heading(name), value, source, f"{name}: {text.strip()}")) is not None:
-            return size
-    return None
+        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}"):
+            return sizes
+    return []
 
 
 def _among_words(text: str, source: str) -> Iterator[StatedSize]:
     """Yield a length or an area among other words, which is a size without a name."""
     for match in filter(None, (pattern.search(text) for pattern in UNCLEAR)):
         shown = " ".join(text.split())[:LONGEST_QUOTE]
-        if (size := _size(Heading("", match["unit"]), match["number"], source, shown)) is not None:
-            yield size
+        if sizes := _sizes(Heading("", match["unit"]), match["number"], source, shown):
+            yield from sizes
             return
 
 
@@ -136,7 +135,8 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
             continue
         value, source = next(iter(cells)), f"in column {table.label(column)}"
         named = (Heading(heading(name).quantity, unit) for unit in table.stated_units(column))
-        yield from filter(None, (_size(of_unit, value, source, f"{name}: {value}") for of_unit in named))
+        for of_unit in named:
+            yield from _sizes(of_unit, value, source, f"{name}: {value}")
 
 
 def _of_specimens(
@@ -164,15 +164,25 @@ def _of_specimens(
                 if not name.unit and len(in_table) == 1:
                     name = Heading(name.quantity, *in_table)
                     where = f"{place} ({name.unit} {UNIT_ASSUMED}"
-                if (size := _size(name, cells[column], where, f"{name.quantity}: {cells[column]}")) is not None:
-                    yield size
+                yield from _sizes(name, cells[column], where, f"{name.quantity}: {cells[column]}")
 
 
-def _size(name: Heading, text: str, source: str, shown: str) -> StatedSize | None:
-    """Return the length or the area that a text states, in the unit there or beside the name; None for others."""
+def _sizes(name: Heading, text: str, source: str, shown: str) -> list[StatedSize]:
+    """Return the length or the area that a text states, in the unit there or beside the name; nothing for others.
+
+    Of a product such as ``5 x 2 mm`` they are the sizes that the name has for its factors, or else the area of two.
+    """
+    sides, unit = sides_and_unit(text)
+    if sides and min(sides) > 0 and (factor := LENGTH.factor_or_none(unit or name.unit)):
+        names = [NAMES_OF_SIDES.get(side, side) for side in re.split(CROSS_OF_NAMES, name.quantity)]
+        if len(names) == len(sides):
+            pairs = zip(names, sides, strict=True)
+            return [StatedSize(side, LENGTH, number * factor, source, shown) for side, number in pairs]
+        is_area = len(sides) == 2
+        return [StatedSize(name.quantity, AREA, prod(sides) * factor**2, source, shown)] if is_area else []
     number, unit = number_and_unit(text)
     for kind in (LENGTH, AREA):
         factor = kind.factor_or_none(unit or name.unit)
         if number and number > 0 and factor:
-            return StatedSize(name.quantity, kind, number * factor, source, shown)
-    return None
+            return [StatedSize(name.quantity, kind, number * factor, source, shown)]
+    return []

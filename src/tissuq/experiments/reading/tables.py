@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import NUMBER, number_and_unit
 from tissuq.experiments.reading.beside import without_statements_beside
 from tissuq.experiments.reading.blocks import blocks_of
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
@@ -36,7 +37,7 @@ from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.thousands import without_thousands
-from tissuq.experiments.units import NUMBER, number_and_unit
+from tissuq.experiments.reading.transposed import transposed_table
 
 __all__ = ["read_table", "read_tables"]
 
@@ -52,7 +53,7 @@ MOST_COLUMNS = 1000
 """Columns of a table that is read in seconds."""
 CACHED_FILES = 2
 """Files whose tables are remembered: tests of one file are read one after another."""
-TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo)|(zeit|time)$")
+TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
 """Names of a column of times."""
 
 
@@ -217,6 +218,8 @@ def _read_every_line(
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
     content = _without_comments(filled)
+    if (on_its_side := transposed_table(file, content, separator, sheet)) is not None:
+        return [on_its_side]
     layout = find_layout([text for _, text in content], separator)
     if layout is None:
         raise _no_table(file, content)
