@@ -77,8 +77,8 @@ def stress_of(
             )
         divided = force_in(table, choice.stress, force_unit)
         factor, unit_source = factor_of(table, choice.stress, divided, "force_unit", force_unit)
-        size, unit = (dimensions.area, "mm2") if divided is FORCE else (dimensions.thickness, "mm")
-        source = f"engineering stress = column {label} in {unit_source} / {size.value:g} {unit} ({size.source})"
+        size, of_size = (dimensions.area, "mm2") if divided is FORCE else (dimensions.thickness, "mm")
+        source = f"engineering stress = column {label} in {unit_source} / {size.value:g} {of_size} ({size.source})"
         shown = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES)
         return Load(values * factor / size.value, shown, source, divided, size.value, factor / size.value)
     sections = sorted(dimensions.set_by_user - {"length"})
