@@ -184,7 +184,7 @@ def _written(
 ) -> Study:
     """Return what comes of a run, when it is written into its folder."""
     from tissuq.cli.tables import print_warnings
-    from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
+    from tissuq.experiments.reading.assumptions import is_doubtful
     from tissuq.report.run_folder import run_folder
 
     with progress() as step:
@@ -192,16 +192,16 @@ def _written(
         step("writing")
         with run_folder(target, force=force) as folder:
             write(study, sources, folder, figures=figures)
-    print_warnings([text for text in study.warnings if DOUBTFUL_UNIT in text])
+    print_warnings([text for text in study.warnings if is_doubtful(text)])
     return study
 
 
 def _print_remarks(study: SpecimenStudy | LawStudy, *lines: str) -> None:
     """Print what could not be fitted, some lines, and the warnings that `_written` left; say what has not converged."""
     from tissuq.cli.tables import print_warnings
-    from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
+    from tissuq.experiments.reading.assumptions import is_doubtful
 
-    print_warnings([text for text in study.warnings if DOUBTFUL_UNIT not in text])
+    print_warnings([text for text in study.warnings if not is_doubtful(text)])
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     print(*lines, sep="\n", end="\n" * bool(lines))

@@ -88,6 +88,8 @@ class ColumnChoice:
         What the other column holds: stress, torque, force or pressure.
     strain_type, stress_type : str
         Which measure of strain, or of shear, and of stress.
+    by_unit : frozenset of int
+        Which of the columns were told by their units alone, under names that are not known.
     """
 
     deformation: int
@@ -96,6 +98,7 @@ class ColumnChoice:
     load: str = "stress"
     strain_type: str = "engineering"
     stress_type: str = "engineering"
+    by_unit: frozenset[int] = frozenset()
 
 
 def choose_columns(
@@ -231,7 +234,7 @@ def _choice(
     axis: str | None,
 ) -> ColumnChoice:
     """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
-    is_shear = mode.controls == (SHEAR,)
+    is_shear, told = mode.controls == (SHEAR,), set[int]()
     _check_roles(table, mapping, is_shear)
     contents = Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
@@ -243,6 +246,7 @@ def _choice(
         load = next((role for role in loads if contents.fitting(role)), "")
         by_unit = None if load else told_by_unit(table, contents, loads)
         load, stress = by_unit or (load, recognise(table, contents, [load or "force"], loads))
+        told |= {stress} if by_unit else set()
         is_per_width = measured_in(table.unit(stress)) == FORCE_PER_WIDTH.name
         load = "force" if load == "stress" and is_per_width else load
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
@@ -263,6 +267,7 @@ def _choice(
         by_unit = None if is_named else told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
+            told.add(deformation)
         else:
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
@@ -283,7 +288,7 @@ def _choice(
             f"give two columns. {columns_there_are(table)}"
         )
     _check_test(table, stress, mapping, is_shear)
-    return _with_types(table, ColumnChoice(deformation, stress, measure, load), contents)
+    return _with_types(table, ColumnChoice(deformation, stress, measure, load, by_unit=frozenset(told)), contents)
 
 
 def _check_machine(table: Table, quantities: Sequence[str], displacement: int) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
+from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
@@ -74,7 +74,7 @@ class Inspection:
         return data_warnings(self.reading)
 
     def __str__(self) -> str:
-        doubts = [text for text in self.warnings if DOUBTFUL_UNIT in text]
+        doubts = [text for text in self.warnings if is_doubtful(text)]
         notes = [text for text in self.warnings if text not in doubts]
         lines = [*(_wrapped("ATTENTION", text) for text in doubts), *[""] * bool(doubts)]
         lines += [f"{self.reading.table.file}: what was understood", ""]
