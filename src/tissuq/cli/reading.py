@@ -93,6 +93,14 @@ OPTIONS: dict[str, Any] = {
         bool | None,
         typer.Option("--compression-positive/--tension-positive", help="Which the file counts as positive [its sign]."),
     ],
+    "turn": Annotated[
+        str | None,
+        typer.Option(help="Signs to change: load (of a cell that counts tension as negative), deformation or both."),
+    ],
+    "load_zero": Annotated[
+        str | None,
+        typer.Option(help="What the load cell reads without load ('0.02 N'), or first: the load of the first row."),
+    ],
     "cycle": Annotated[str | None, typer.Option(help="Use only this cycle: first, last or its number [all].")],
     "branch": Annotated[str | None, typer.Option(help="Use only loading or unloading [both].")],
     "compliance": Annotated[

@@ -38,6 +38,8 @@ class ReadingSettings(BaseModel):
     dimensions: dict[str, str] = Field(default_factory=dict)
     only: dict[str, str | int] = Field(default_factory=dict)
     compression_positive: bool | None = None
+    turn: str | None = None
+    load_zero: str | None = None
     cycle: str | int | None = None
     branch: str | None = None
     compliance: str | None = None

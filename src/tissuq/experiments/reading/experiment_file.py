@@ -22,10 +22,10 @@ from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
-from tissuq.experiments.reading.loads import Load, force_in, stress_of
+from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
+from tissuq.experiments.reading.plausibility import check_signs, check_stretches
 from tissuq.experiments.reading.regions import (
     AUTO,
     Region,
@@ -41,6 +41,7 @@ from tissuq.experiments.reading.several_specimens import (
     only_rows,
     specimen_of,
 )
+from tissuq.experiments.reading.signs import with_signs
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,
@@ -190,6 +191,12 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
         displacements that are positive, too. Without it compression is negative, and asked about where a name says
         compression and the numbers are positive.
+    turn : str, optional
+        ``load``, ``deformation`` or ``both``: which signs are changed, as of a load cell that counts tension as
+        negative. For all loading modes.
+    load_zero : str, optional
+        The reading of the load cell without load, which is taken off: a force or stress with its unit, or ``first`` for
+        that of the first row.
     cycle : str or int, optional
         ``first``, ``last`` or the number (from 1) of the only cycle to use; all unless given.
     branch : str, optional
@@ -302,7 +309,7 @@ def read_rows(
         absent, table = set(table.lines) - set(readable.lines), readable
         measured, loads, spreads, dimensions = _measured(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
-    recorded = with_compression_negative(measured, choices, is_positive, direction_of(*names))
+    recorded = with_signs(measured, choices, is_positive, options.get("turn"), direction_of(*names))
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
@@ -332,7 +339,7 @@ def read_rows(
     if (every := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), every)
         used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
-    check_signs(used, choices, bool(is_positive))
+    check_signs(used, choices, bool(is_positive), options.get("turn"))
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(
@@ -371,19 +378,21 @@ def _measured(
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
     compliance = options.get("compliance"), options.get("force_unit")
+    units_of_load = options.get("stress_unit"), options.get("force_unit")
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
         is_force = choice.load == "force" and force_in(table, choice.stress, compliance[1]) is FORCE
         size = replace(size, divide_forces=is_force)
         with about_stress(number, labels, mode):
+            load, counted = without_zero(table, choice, load, options.get("load_zero"), *units_of_load)
             deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
             stretch, step = stretch_of(table, choice, deformation, load, size, *units)
-            stress = stress_of(table, choice, load, size, options.get("stress_unit"), options.get("force_unit"))
+            stress = stress_of(table, choice, load, size, *units_of_load)
             spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
         stretches.append(stretch)
         stretch_steps.append(f"{step}{given_way}")
-        loads.append(stress)
+        loads.append(replace(stress, source=f"{stress.source}{counted}"))
     measured = MeasuredRows(
         table=table,
         rows=np.arange(len(table.rows)),

@@ -8,15 +8,17 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments import units
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
+from tissuq.experiments.reading.positions import FIRST_ROW
 from tissuq.experiments.reading.stress_measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.torsion import apparent_stress
-from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity
+from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
 
-__all__ = ["Load", "force_in", "stress_of"]
+__all__ = ["Load", "force_in", "stress_of", "without_zero"]
 
 UNIT_OF_STRESSES_FROM_FORCES = "kPa"
 """The unit in which stresses from forces are shown unless another is asked for."""
@@ -97,3 +99,39 @@ def force_in(table: Table, column: int, force_unit: str | None) -> Quantity:
     """Return what a column of forces holds by its unit, or the one that is given: forces, or forces per width."""
     is_per_width = FORCE_PER_WIDTH.factor_or_none(force_unit or table.unit(column)) is not None
     return FORCE_PER_WIDTH if is_per_width else FORCE
+
+
+def without_zero(
+    table: Table,
+    choice: ColumnChoice,
+    values: Column,
+    load_zero: str | None,
+    stress_unit: str | None,
+    force_unit: str | None,
+) -> tuple[Column, str]:
+    """Return the loads of a column, in its unit, less what the load cell reads without load, and words that say so.
+
+    Raises
+    ------
+    InputError
+        When that is not ``first``, or a number with a unit of what the column holds.
+    """
+    if load_zero is None:
+        return values, ""
+    if load_zero == FIRST_ROW:
+        return values - values[0], f", counted from {values[0]:g} (its first row)"
+    number, unit = number_and_unit(str(load_zero))
+    quantities = {"force": force_in(table, choice.stress, force_unit), "torque": TORQUE, "pressure": PRESSURE}
+    quantity = quantities.get(choice.load)
+    example = f"0.05 {quantity.unit if quantity else 'kPa'}"
+    if number is None or not unit or measured_in(unit) not in (choice.load, "stress", "pressure", "force per width"):
+        raise InputError(
+            f"load_zero (--load-zero) must be 'first', or a {choice.load} with its unit such as '{example}', not "
+            f"'{load_zero}'."
+        )
+    if quantity is None:
+        of_column, _ = stress_unit_of(table, choice, stress_unit, float(np.abs(values).max()))
+        offset = number * units.stress_unit(unit).to_mpa / of_column.to_mpa
+    else:
+        offset = number * quantity.factor(unit) / factor_of(table, choice.stress, quantity, "force_unit", force_unit)[0]
+    return values - offset, f", counted from {number:g} {unit} (as given)"
