@@ -13,6 +13,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import heading, on_axis
 from tissuq.experiments.reading.inflation import Tube
+from tissuq.experiments.reading.repeated_sizes import TestBeside
 from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
@@ -22,6 +23,10 @@ __all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses",
 
 SHOWN = 3
 """Number of other sizes that a message shows."""
+NOTABLE_SCATTER = 0.2
+"""Range of measurements of one size over their mean, from which they are hardly those of one specimen."""
+MEAN_OF = "mean of"
+"""How the source of such a size begins."""
 CONTRADICTION = 0.01
 """Relative difference from which two statements of one dimension contradict each other."""
 HOW_TO_GIVE_SECTION = (
@@ -30,6 +35,8 @@ HOW_TO_GIVE_SECTION = (
 )
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
+PLURALS = {"thickness": "thicknesses"}
+"""Of names of sizes that do not end in s alone."""
 TURNED = {"length": "width", "width": "length"}
 """What the undeformed sizes along the first and the second axis are to the second one."""
 
@@ -47,7 +54,8 @@ class Dimensions:
     """The dimensions of a specimen.
 
     Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user;
-    ``divide_forces`` says that the cross-section is needed, beside whatever else is.
+    ``divide_forces`` says that the cross-section is needed, beside whatever else is; ``averages`` of which measurements
+    a size is the mean, and ``is_one_of_several`` that the table holds several tests.
     """
 
     file: str
@@ -57,6 +65,8 @@ class Dimensions:
     others: tuple[StatedSize, ...] = ()
     contradictions: tuple[str, ...] = ()
     divide_forces: bool = False
+    averages: tuple[str, ...] = ()
+    is_one_of_several: bool = False
 
     @property
     def length(self) -> Dimension:
@@ -172,9 +182,12 @@ class Dimensions:
     def _refuse_ambiguous(self, *names: str) -> None:
         for name in names:
             if name in self.ambiguous:
+                one = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
+                count = "two" if self.ambiguous[name].count(" and ") == 1 else "several"
+                sizes = f"{count} {PLURALS.get(name, f'{name}s')}"
                 raise InputError(
-                    f"{self.file}: the file states two {name}s: {self.ambiguous[name]}. Say which: --{name} "
-                    f'"NUMBER {_quantity(name).unit}".'
+                    f"{self.file}: the file states {sizes}: {self.ambiguous[name]}. Say which: --{name} "
+                    f'"NUMBER {_quantity(name).unit}".{one * self.is_one_of_several}'
                 )
 
     def _partly_known(self) -> str:
@@ -197,10 +210,16 @@ class Dimensions:
         return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}."
 
 
-def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None, specimens: Collection[str]) -> Dimensions:
+def dimensions_of(
+    table: Table,
+    set_by_user: Mapping[str, str] | None,
+    specimens: Collection[str],
+    test: TestBeside | None = None,
+) -> Dimensions:
     """Return the dimensions that the user gives, and those of the file where the user gives none.
 
-    The file may state those of several specimens; that in the table is the one which it calls by some names.
+    The file may state those of several specimens; that in the table is the one which it calls by some names, or over
+    whose columns they stand.
 
     Raises
     ------
@@ -213,20 +232,42 @@ def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None, specimens
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
     if len([name for name in ("area", "diameter", "width") if name in texts]) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    every_size = stated_sizes(table, specimens)
+    every_size = stated_sizes(table, specimens, test)
     is_cylinder = "diameter" in texts or any(size.is_of("diameter", is_cylinder=False) for size in every_size)
-    stated, ambiguous, others = dict[str, Dimension](), dict[str, str](), every_size
+    stated, ambiguous, others, averages = dict[str, Dimension](), dict[str, str](), every_size, list[str]()
     for name in DIMENSION_NAMES:
         of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
         others = [size for size in others if size not in of_name]
-        sizes = [Dimension(size.value, size.source) for size in of_name]
+        sizes = _measured(of_name)
+        means = [size for size in sizes if size.source.startswith(MEAN_OF) and name not in texts]
+        averages += [f"the {name} is the {mean.source}: {mean.value:.4g} {_quantity(name).unit}." for mean in means]
         if name not in texts and any(not _agree(size, sizes[0]) for size in sizes):
             ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
         elif sizes:
             stated[name] = sizes[0]
     of_user = {name: Dimension(_quantity(name).value(str(text)), "as given") for name, text in texts.items()}
-    dimensions = Dimensions(table.file, stated | of_user, frozenset(texts), ambiguous, tuple(others))
+    dimensions = Dimensions(
+        table.file,
+        stated | of_user,
+        frozenset(texts),
+        ambiguous,
+        tuple(others),
+        averages=tuple(averages),
+        is_one_of_several=test is not None,
+    )
     return replace(dimensions, contradictions=tuple(_contradictions(dimensions, stated)))
+
+
+def _measured(sizes: Sequence[StatedSize]) -> list[Dimension]:
+    """Return statements of one size, those of several measurements of it as their mean where they differ little."""
+    by_number = {(size.measurement, size.value): size for size in sizes if size.measurement}
+    values = [value for _, value in by_number]
+    once = [Dimension(size.value, size.source) for size in sizes if not size.measurement]
+    if len(values) < 2 or max(values) - min(values) >= NOTABLE_SCATTER * np.mean(values):
+        return [*once, *(Dimension(size.value, size.source) for size in by_number.values())]
+    places = ", ".join(dict.fromkeys(size.source.removeprefix("in ") for size in by_number.values()))
+    listed = ", ".join(f"{value:g}" for value in values)
+    return [*once, Dimension(float(np.mean(values)), f"{MEAN_OF} {len(values)} measurements ({listed}, in {places})")]
 
 
 def dimensions_of_stresses(

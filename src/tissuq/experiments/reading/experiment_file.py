@@ -35,6 +35,7 @@ from tissuq.experiments.reading.regions import (
     slack_error,
     tested_stresses,
 )
+from tissuq.experiments.reading.repeated_sizes import test_beside
 from tissuq.experiments.reading.several_specimens import (
     SeveralSpecimens,
     check_one_specimen,
@@ -352,7 +353,7 @@ def read_rows(
         least_errors=errors | least_errors(tested),
     ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
     problems = (spread.problem for spread in spreads if spread.problem)
-    doubts = *assumptions(used, choices, types[1]), *dimensions.contradictions
+    doubts = *assumptions(used, choices, types[1]), *dimensions.averages, *dimensions.contradictions
     about_loads = filter(None, (load.note for load in loads))
     notes = *table.notes, *problems, *about_loads
     return Reading(
@@ -374,7 +375,11 @@ def _measured(
     numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
     check_one_specimen(table, columns, np.mean([deformation for deformation, _ in numbers], axis=0))
     specimens = names_of_specimen(table, columns, options.get("only"))
-    dimensions = dimensions_of(table, options.get("dimensions"), specimens)
+    test = None
+    if len(columns) == 1:
+        is_shear = mode.controls == (SHEAR,)
+        test = test_beside(table, columns[0].stress, options.get("stress_type"), is_shear=is_shear)
+    dimensions = dimensions_of(table, options.get("dimensions"), specimens, test)
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
     compliance = options.get("compliance"), options.get("force_unit")

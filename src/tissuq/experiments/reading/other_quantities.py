@@ -26,7 +26,8 @@ OTHER_QUANTITIES = {
     "of friction": r"friction|reib(ung|kraft)|frottement|трени|摩擦",
     "of indentation": r"indent|eindring|вдавл|индент|压痕|圧痕",
     "an equivalent (von Mises) value": r"mises|equivalent|vergleichs|эквивалентн|等效|相当",
-    "along another direction than the load": r"transvers|\blateral|\bradial|quer(dehnung|kontraktion|richtung)|попереч|横向",
+    "along another direction than the load": r"transvers|\blateral|\bradial|quer(dehnung|kontraktion|richtung)|"
+    r"попереч|横向",
     "a change of volume": r"volum|объ[её]мн|体积|体積",
     "a change of area": r"area (reduction|change|ratio|strain)|reduction (of|in) area|einschnürung|necking",
     "what remains after a test": r"residual|remaining|permanent|bleibend|restdehnung|остаточн|残余|残留",

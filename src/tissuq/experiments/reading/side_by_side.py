@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from tissuq.experiments.reading.headings import (
     AXES,
+    dimensions_named,
     heading,
     is_of_mean,
     is_of_specimens,
@@ -138,12 +139,14 @@ def _is_test(text: str) -> bool:
 def names_above(table: Table, columns: Sequence[int]) -> list[str]:
     """Return what the last line above the names of columns says over each of some; nothing where it says no names.
 
-    What stands over the first of neighbouring columns goes for them all.
+    What stands over the first of neighbouring columns goes for them all. A line of sizes says no names.
     """
     names = [heading(name).quantity for name in table.names]
     for _, text in reversed(table.head):
         cells = split(text, table.separator)[: len(names)]
         if [heading(cell).quantity for cell in cells] == names[: len(cells)] or not any(cells):
+            continue
+        if any(dimensions_named(heading(cell).quantity, is_cylinder=True) for cell in cells):
             continue
         above = filled_on(cells + [""] * (len(names) - len(cells)))
         over = [above[column] for column in columns]

@@ -51,7 +51,9 @@ RHEOMETER = re.compile(
     r"interval data|rheocompass|\btrios\b"
 )
 """Words above a table of a rheometer."""
-OF_RHEOMETER = re.compile(r"normal ?(force|stress|kraft|spannung)|force normale|\bgap\b|spalt|нормальн|法向力|法線力|^step time$")
+OF_RHEOMETER = re.compile(
+    r"normal ?(force|stress|kraft|spannung)|force normale|\bgap\b|spalt|нормальн|法向力|法線力|^step time$"
+)
 """Names of columns that a rheometer writes beside strain and stress."""
 DIRECTIONS_OF_LOAD = {
     "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축|сжати"),
