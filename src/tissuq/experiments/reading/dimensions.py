@@ -55,7 +55,8 @@ class Dimensions:
 
     Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user;
     ``divide_forces`` says that the cross-section is needed, beside whatever else is; ``averages`` of which measurements
-    a size is the mean, and ``is_one_of_several`` that the table holds several tests.
+    a size is the mean, and ``is_one_of_several`` that the table holds several tests;
+    ``open_height`` asks which side is the height.
     """
 
     file: str
@@ -67,6 +68,7 @@ class Dimensions:
     divide_forces: bool = False
     averages: tuple[str, ...] = ()
     is_one_of_several: bool = False
+    open_height: str = ""
 
     @property
     def length(self) -> Dimension:
@@ -136,6 +138,7 @@ class Dimensions:
             When it is not known, or follows in two ways that contradict each other.
         """
         areas = _sections(self.sizes)
+        self._refuse_open_height("area", "width", "thickness", "diameter")
         areas_of_user = {name: area for name, area in areas.items() if self.set_by_user & set(SECTIONS[name])}
         if not areas_of_user:
             self._refuse_ambiguous("area", "width", "thickness", "diameter")
@@ -174,10 +177,15 @@ class Dimensions:
 
     def _size(self, name: str, advice: str) -> Dimension:
         """Return a size that must be known, and be stated once."""
+        self._refuse_open_height(name)
         self._refuse_ambiguous(name)
         if name not in self.sizes:
             raise InputError(f"{self.file}: {advice} {self._others(LENGTH, name)}")
         return self.sizes[name]
+
+    def _refuse_open_height(self, *names: str) -> None:
+        if self.open_height and not self.set_by_user & set(names):
+            raise InputError(f"{self.file}: {self.open_height}")
 
     def _refuse_ambiguous(self, *names: str) -> None:
         for name in names:

@@ -22,6 +22,7 @@ from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
+from tissuq.experiments.reading.height_of_block import of_block
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
@@ -380,6 +381,10 @@ def _measured(
         is_shear = mode.controls == (SHEAR,)
         test = test_beside(table, columns[0].stress, options.get("stress_type"), is_shear=is_shear)
     dimensions = dimensions_of(table, options.get("dimensions"), specimens, test)
+    if len(columns) == 1:
+        words = [Path(table.file).name, table.sheet, table.title, options.get("name") or ""]
+        words += ["compression"] if options.get("compression_positive") else []
+        dimensions = of_block(table, columns[0], (numbers[0][0], numbers[0][1]), dimensions, words)
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
     units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
     compliance = options.get("compliance"), options.get("force_unit")
