@@ -222,8 +222,10 @@ def measured(
     modes: Sequence[str] | None,
     specimens: Sequence[str] | None,
     noise_sd: str | None,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], list[Reading]]:
     """Return the settings of a fit that say what was measured: of the only test, or of each of several.
+
+    And what has been read of every test.
 
     Raises
     ------
@@ -235,19 +237,20 @@ def measured(
 
     noise = _numbers(noise_sd)
     if not files:
-        return reading | {"noise_sd": noise[0] if noise else None}
+        return reading | {"noise_sd": noise[0] if noise else None}, []
     of_files = [
         find_tests(file, reading | {"mode": mode}, is_only_file=len(files) == 1)
         for file, mode in zip(files, _modes(files, modes), strict=True)
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
+    found = [of_test for of_file in of_files for _, of_test in of_file]
     if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
-        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}
+        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, found
     if len(tests) > len(files):
-        print(*lines_of_tests([Inspection.of(of_test) for of_file in of_files for _, of_test in of_file]), "", sep="\n")
+        print(*lines_of_tests(list(map(Inspection.of, found))), "", sep="\n")
     stated_noise = noise if noise and len(noise) > 1 else None
     for name, option, values in (
         ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)
@@ -260,7 +263,7 @@ def measured(
             f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for each "
             f"file, in their order ({', '.join(loading_modes())})."
         )
-    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}
+    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}, found
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

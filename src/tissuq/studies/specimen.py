@@ -16,6 +16,7 @@ from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.notes import concerned, each_once
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import (
@@ -91,7 +92,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     def _measured(self) -> Self:
         if bool(self.file) == bool(self.tests):
             raise ValueError("give one file, or several tests with a file each")
-        reading = set(ReadingSettings.model_fields)
+        reading = {"name", *ReadingSettings.model_fields}
         if self.tests and self.model_fields_set & reading:
             misplaced = ", ".join(sorted(self.model_fields_set & reading))
             raise ValueError(f"reading options belong in each of the tests, not beside them ({misplaced})")
@@ -102,9 +103,12 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
             raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
         return self
 
-    def readings(self, folder: Path = Path()) -> list[Reading]:
-        """Read the file, or those of all tests; relative ones lie in ``folder``."""
-        return [test.reading(folder) for test in self.tests] or [self.reading(folder)]
+    def readings(self, folder: Path = Path(), found: Sequence[Reading] = ()) -> list[Reading]:
+        """Return what is read from the file, or those of all tests, unless that is found."""
+        tests = self.tests or (self,)
+        return [
+            test.reading(folder, of_test) for test, of_test in zip(tests, found or [None] * len(tests), strict=True)
+        ]
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements, of all tests together."""
@@ -181,8 +185,11 @@ def run_specimen(
     folder: Path = Path(),
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
+    found: Sequence[Reading] = (),
 ) -> SpecimenStudy:
     """Read the file, or those of several tests, and fit the material with every chosen discrepancy.
+
+    What has been read of every test may be given as ``found``.
 
     Settings may come from a file, so that a law of the user's own which they name is not run; it is given as ``law``.
 
@@ -192,7 +199,7 @@ def run_specimen(
         When file or settings cannot be used. A discrepancy that cannot be fitted is an error when it was named, and
         is skipped with the reason when all were asked for.
     """
-    readings = settings.readings(folder)
+    readings = settings.readings(folder, found)
     experiment = Experiment.of([reading.experiment for reading in readings])
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
@@ -296,18 +303,15 @@ def _options(
 
 
 def warnings_of_files(readings: Sequence[Reading]) -> tuple[str, ...]:
-    """Return the warnings about the files, each with the name of its test if there are several."""
-    messages = [(reading.experiment.name, text) for reading in readings for text in data_warnings(reading)]
-    return tuple(f"{name}: {text}" if len(readings) > 1 else text for name, text in messages)
+    """Return the warnings about the files, each once, with the names of its tests if there are several."""
+    messages = ((reading.experiment.name, text) for reading in readings for text in data_warnings(reading))
+    return tuple(each_once(messages, len(readings), "all tests"))
 
 
 def warnings_of_fits(posteriors: Mapping[str, Posterior]) -> list[str]:
     """Return the warnings about fits, each once with the names of those that it concerns."""
-    concerned: dict[str, list[str]] = {}
-    for name, posterior in posteriors.items():
-        for text in posterior.warnings:
-            concerned.setdefault(text, []).append(name)
-    return [f"{', '.join(names)}: {text}" for text, names in concerned.items()]
+    messages = ((name, text) for name, posterior in posteriors.items() for text in posterior.warnings)
+    return [f"{', '.join(names)}: {text}" for text, names in concerned(messages).items()]
 
 
 def _every() -> list[str]:

@@ -13,6 +13,7 @@ from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.notes import concerned
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.reading.vocabulary import SPREADS
@@ -183,12 +184,9 @@ def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:
 
 def overview(inspections: Sequence[Inspection]) -> str:
     """Return what was understood of several tests: a line and the warnings of each."""
-    noted: dict[str, list[str]] = {}
-    for number, inspection in enumerate(inspections, start=1):
-        for text in inspection.warnings:
-            noted.setdefault(text, []).append(str(number))
+    pairs = [(str(number), text) for number, test in enumerate(inspections, start=1) for text in test.warnings]
     lines = [f"{len(inspections)} tests were understood", "", *lines_of_tests(inspections)]
-    for text, numbers in noted.items():
+    for text, numbers in concerned(pairs).items():
         of_tests = "all tests" if len(numbers) == len(inspections) else f"test {', '.join(numbers)}"
         lines += ["", _wrapped("Note", f"{of_tests}: {text}")]
     return "\n".join([*lines, "", "To see one of them: tissuq inspect 'FILE#NAME', with its name or number."])

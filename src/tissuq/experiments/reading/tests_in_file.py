@@ -19,6 +19,7 @@ from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
+from tissuq.experiments.reading.notes import concerned
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
@@ -82,10 +83,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     """
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     tests = find_tests_in_file(path, **plain)
-    noted: dict[str, list[str]] = {}
-    for test in tests:
-        for text in test.reading.notes:
-            noted.setdefault(text, []).append(test.name)
+    noted = concerned((test.name, text) for test in tests for text in test.reading.notes)
     for text, names in noted.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=2)
     return [test.reading.experiment for test in tests]
