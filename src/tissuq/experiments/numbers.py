@@ -14,6 +14,7 @@ __all__ = [
     "number_and_unit",
     "number_in",
     "sides_and_unit",
+    "without_marks",
 ]
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -23,6 +24,9 @@ GROUPED = {
 }
 """Numbers with a mark between thousands, by that mark; with one mark in all they may be decimal numbers as well."""
 MEAN_WITH_SPREAD = re.compile(rf"({NUMBER.pattern})\s*(?:±|\+/?[-−])\s*({NUMBER.pattern})")
+MARKED = re.compile(r"(?<![\w.,'’])([+-]?\d{1,3})((?:[\u00a0\u202f\u2009'’]\d{3})+)(?=[.,\s;|\"<]|$)")
+"""Digits with marks between thousands that are never decimal marks."""
+MARKS = re.compile("[\u00a0\u202f\u2009'’]")
 CROSS = r"\s*[x×*X]\s*"
 """Between the sides of something."""
 SIDE = rf"{NUMBER.pattern}\s*(?:[^\W\dxX×_]+)?"
@@ -34,6 +38,19 @@ def number_in(cell: str) -> float:
     """Return the number in a cell, written with a decimal point or comma; nan where it holds none, or no finite one."""
     number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else nan
     return number if isfinite(number) else nan
+
+
+def without_marks(text: str) -> str:
+    """Return a text without apostrophes, no-break spaces and thin spaces between the thousands of its numbers.
+
+    Examples
+    --------
+    >>> without_marks("1'364.3;0.5"), without_marks("12\u00a0345,6"), without_marks("the 5' end")
+    ('1364.3;0.5', '12345,6', "the 5' end")
+    """
+    if not MARKS.search(text):
+        return text
+    return MARKED.sub(lambda match: match[1] + MARKS.sub("", match[2]), text)
 
 
 def number_and_unit(text: str) -> tuple[float | None, str]:

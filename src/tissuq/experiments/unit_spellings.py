@@ -20,11 +20,36 @@ MERCURY = re.compile(r"мм\.?\s*рт\.?\s*ст\.?")
 WORD = re.compile(r"[\u0400-\u04ff\u4e00-\u9fff]+")
 SPELLINGS = dict.fromkeys(["micron", "microns", "micrometer", "micrometre"], "um") | {"inch": "in", "inches": "in"}
 SPELLINGS |= {"lbf": "lbf", "kgf": "kgf", "newton": "N", "newtons": "N", "millimeter": "mm", "millimetre": "mm"}
+SPELLINGS |= {"millimeters": "mm", "millimetres": "mm", "centimeter": "cm", "centimetre": "cm", "centimeters": "cm"}
+SPELLINGS |= {"centimetres": "cm", "meter": "m", "metre": "m", "meters": "m", "metres": "m", "micrometers": "um"}
+SPELLINGS |= {"micrometres": "um", "millinewton": "mN", "millinewtons": "mN", "kilonewton": "kN", "kilonewtons": "kN"}
 """Units in other spellings, in small letters."""
 SYMBOLS = (
     {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
     | {"bar", "mbar", "atm", "mmHg", "mmhg", "Hg", "torr", "Torr", "cmH2O", "mmH2O"}
-    | {"N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lbF", "lb", "kg", "g"}
+    | {
+        "N",
+        "mN",
+        "uN",
+        "nN",
+        "pN",
+        "cN",
+        "dN",
+        "daN",
+        "hN",
+        "kN",
+        "MN",
+        "kgf",
+        "gf",
+        "kp",
+        "dyn",
+        "dyne",
+        "lbf",
+        "lbF",
+        "lb",
+        "kg",
+        "g",
+    }
     | {
         "m",
         "cm",

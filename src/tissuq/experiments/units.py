@@ -69,6 +69,14 @@ UNIT_EXPRESSION = re.compile(
 )
 """Products, quotients and powers of names, and no arithmetic of numbers, which could take for ever."""
 
+POWER_OF_TEN = re.compile(
+    r"(?:10\s*(?:(?:\^|\*\*)\s*\(?(?P<power>[+-]?\d+)\)?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+))|1[eE](?P<digits>[+-]?\d+))"
+    r"\s*[*·⋅]?\s*(?P<unit>[^\W\d].*)"
+)
+"""Before a unit that is multiplied by it, as in ``10^-2 MPa``; ``x 10^-2`` may be of the numbers instead."""
+RAISED = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-0123456789")
+LARGEST_POWER = 12
+"""Exponent of ten before a unit, at most."""
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
@@ -110,8 +118,13 @@ def stress_unit(text: str) -> StressUnit:
     0.001
     >>> stress_unit("N/mm²")
     StressUnit(name='N/mm²', to_mpa=1.0)
+    >>> stress_unit("10^-2 MPa").to_mpa
+    0.01
     """
     name = str(text).strip()
+    multiple, unit = _without_power(name)
+    if multiple != 1:
+        return StressUnit(name, multiple * stress_unit(unit).to_mpa)
     compact = _compact(name)
     if compact == "mPa":
         raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
@@ -119,6 +132,15 @@ def stress_unit(text: str) -> StressUnit:
         compact = PASCALS[compact.lower()]
     factor = COMMON_STRESS_UNITS.get(compact)
     return StressUnit(name, _factor_from_pint(in_latin(name)) if factor is None else factor)
+
+
+def _without_power(unit: str) -> tuple[float, str]:
+    """Return the power of ten before a unit, 1 where there is none, and the unit."""
+    match = POWER_OF_TEN.fullmatch(unit.strip())
+    if not match:
+        return 1.0, unit
+    power = int(match["power"] or match["digits"] or match["raised"].translate(RAISED))
+    return (float(f"1e{power}"), match["unit"]) if abs(power) <= LARGEST_POWER else (1.0, unit)
 
 
 def _compact(unit: str) -> str:
@@ -184,8 +206,10 @@ class Quantity:
 
     def factor_or_none(self, text: str) -> float | None:
         """Return what one unit of that name is in the unit of this quantity; None for other quantities."""
-        compact = re.sub(self.ignored, "", in_latin(text)).replace("µ", "u").replace("μ", "u").replace("²", "2")
-        return self.factors.get(SPELLINGS.get(compact.lower(), compact))
+        multiple, unit = _without_power(text)
+        compact = re.sub(self.ignored, "", in_latin(unit)).replace("µ", "u").replace("μ", "u").replace("²", "2")
+        factor = self.factors.get(SPELLINGS.get(compact.lower(), compact))
+        return None if factor is None else factor * multiple
 
     def factor(self, text: str) -> float:
         """Return what one unit of that name is in the unit of this quantity.
@@ -239,7 +263,8 @@ AREA = Quantity("area", "mm2", {f"{unit}2": factor**2 for unit, factor in LENGTH
 FORCE = Quantity(
     "force",
     "N",
-    {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
+    {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
+    | {"cN": 1e-2, "dN": 0.1, "daN": 10.0, "hN": 100.0, "MN": 1e6, "nN": 1e-9, "pN": 1e-12, "dyn": 1e-5},
 )
 FORCE_PER_WIDTH = Quantity(
     "force per width",
@@ -285,7 +310,7 @@ def measured_in(unit: str) -> str:
     >>> [measured_in(unit) for unit in ("kPa", "mmHg", "N", "mm", "%", "s", "V", "")]
     ['stress', 'pressure', 'force', 'length', 'strain', 'time', '', '']
     """
-    compact = _compact(unit)
+    compact = _compact(_without_power(unit)[1])
     if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
         return "stress"
     for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE, FORCE_PER_WIDTH):

@@ -55,6 +55,9 @@ SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
 NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak|end of")
 """In a line above the table that speaks of strain or stress without saying what the columns hold."""
+STRETCH_LESS = r"(lambda|λ|stretch( ratio)?|streckung)\s*[-–−]\s*{}\s*([\[(].*)?"
+LESS_ONE, LESS_TWO = (re.compile(STRETCH_LESS.format(number), re.IGNORECASE) for number in (1, 2))
+"""A strain as a stretch less one, unless others are numbered likewise, as ``lambda-2`` is."""
 NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
 """Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
 SHEAR_STRESS = re.compile(
@@ -203,6 +206,9 @@ def _names(table: Table) -> list[tuple[str, str]]:
     Beside columns of a spread without words for a mean.
     """
     quantities = [heading(name).quantity for name in table.names]
+    if not any(LESS_TWO.fullmatch(name.strip()) for name in table.names):
+        strains = map(LESS_ONE.fullmatch, map(str.strip, table.names))
+        quantities = ["strain" if strain else name for name, strain in zip(quantities, strains, strict=True)]
     is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]
     quantities = [without_gradient(name) if ratio else name for name, ratio in zip(quantities, is_ratio, strict=True)]
     is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]

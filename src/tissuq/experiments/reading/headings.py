@@ -98,6 +98,13 @@ UNIT_IN_HEADING = (
 """Forms of a name with a unit; brackets are often mistyped, as in ``Stress [kPa}``."""
 QUOTIENT = re.compile(rf"[^{re.escape(BRACKETS)}/]+/[^{re.escape(BRACKETS)}/]+")
 """A unit without brackets, as in ``Stress N/mm^2``."""
+FORMULA = re.compile(r"(?P<quantity>[^\[]*?[0o1])\s*(?:[\[(](?P<unit>[^\])]*)[\])])?", re.IGNORECASE)
+FORMULAS = {
+    **dict.fromkeys(["l/l0", "l/lo", "h/h0"], "stretch"),
+    **dict.fromkeys(["δl/l0", "dl/l0", "deltal/l0", "δh/h0", "(l-l0)/l0", "l/l0-1", "u/l0"], "engineering strain"),
+    **dict.fromkeys(["f/a0", "f/s0"], "engineering stress"),
+}
+"""What quotients of symbols are, in small letters without blanks."""
 REMEMBERED = 4096
 """Names that are taken apart once."""
 COPY = re.compile(r"(?<=[^\d\s])\.\d$")
@@ -119,6 +126,10 @@ class Heading:
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
     name = CHANNEL.sub("", name)
+    if formula := FORMULA.fullmatch(name.strip()):
+        quantity = FORMULAS.get(re.sub(r"[\s_]", "", formula["quantity"]).lower())
+        if quantity:
+            return Heading(quantity, (formula["unit"] or "").strip())
     name = MEASURE_IN_BRACKETS.sub(r" \1", COPY.sub("", NEXT_WORD.sub(" ", name.strip()))).strip()
     matches = list(filter(None, (pattern.fullmatch(name) for pattern in UNIT_IN_HEADING)))
     suffix = UNIT_AS_SUFFIX.fullmatch(name)

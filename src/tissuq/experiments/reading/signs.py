@@ -20,7 +20,7 @@ __all__ = ["with_signs"]
 
 SIGNED = ("strain", "displacement", *SHEARS)
 """Deformations that may be counted the other way round."""
-COMPRESSION_WORDS = ("compressive", "stauchung", "druck", "сжима")
+COMPRESSION_WORDS = ("compressive", "compression", "stauchung", "druck", "сжима")
 """How names of columns begin whose numbers may be positive in compression."""
 NEGLIGIBLE_STRAIN = 0.1
 """Share of the largest strain up to which strains of the other sign are noise or slack."""

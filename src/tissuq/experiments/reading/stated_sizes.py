@@ -82,6 +82,8 @@ def stated_sizes(table: Table, specimens: Collection[str], test: TestBeside | No
 
     Of several tests side by side in it they are those over the columns of one, or that have its number.
     """
+    if test is None and not table.number:
+        specimens = {*specimens, *_only_specimen(table)}
     sizes = [*_in_lines(table, test), *_in_columns(table), *_of_specimens(table, "", table.head, specimens)]
     for sheet, lines in table.other_lines.items():
         sizes += _of_specimens(table, sheet, lines, specimens)
@@ -190,6 +192,18 @@ def _in_columns(table: Table) -> Iterator[StatedSize]:
         for unit in table.stated_units(column):
             sizes = _sizes(Heading(quantity, unit), value, source, f"{name}: {value}")
             yield from (replace(size, measurement=measurement) for size in sizes)
+
+
+def _only_specimen(table: Table) -> set[str]:
+    """Return the name of the specimen in a table of one row above the measurements; nothing where there are more."""
+    is_beneath, names = False, set[str]()
+    for _, text in table.head:
+        cells = split(text.lstrip("# "), table.separator)
+        if any(map(NUMBER.fullmatch, cells)):
+            names |= {plain(cells[0])} if is_beneath else set()
+        elif any(dimensions_named(heading(cell).quantity) for cell in cells[1:]):
+            is_beneath = True
+    return names if len(names) == 1 else set()
 
 
 def _of_specimens(

@@ -310,7 +310,9 @@ def _title(above: Sequence[str], separator: str) -> str:
             break
         lines.pop()
     cells = lines[-1] if lines else last
-    return cells[0] if len(cells) == 1 and not NUMBER.fullmatch(cells[0].split()[0]) else ""
+    if len(cells) != 1 or number_and_unit(cells[0])[0] is not None or all(map(NUMBER.fullmatch, cells[0].split())):
+        return ""
+    return cells[0]
 
 
 def _statement(cells: Sequence[str]) -> tuple[str, str] | None:

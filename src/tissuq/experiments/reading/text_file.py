@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import without_marks
 
 __all__ = ["read_lines"]
 
@@ -52,7 +53,7 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """
     text = _decoded(path, _content(Path(path)))
     text = FORTRAN_EXPONENT.sub(r"\1e\2", text) if any(sign in text for sign in ("D+", "D-", "d+", "d-")) else text
-    lines = text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = without_marks(text.replace("\u2212", "-")).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines

@@ -48,7 +48,8 @@ ROLES = {
         "拉伸比, 伸长比, 伸張比"
     ),
     "strain": names_of(
-        "strain, engineering strain, nominal strain, tensile strain, compressive strain, dehnung, stauchung, eps, "
+        "strain, engineering strain, nominal strain, tensile strain, nominelle dehnung, gerinim, birim uzama, "
+        "compressive strain, dehnung, stauchung, eps, "
         "epsilon, ε, déformation, deformación, deformação, deformazione, rek, töjning, tøyning, 应变, 應變, ひずみ, "
         "歪み, 歪, 변형률, деформация, деформация растяжения, деформация сжатия, осевая деформация, "
         "продольная деформация, "
@@ -75,7 +76,8 @@ ROLES = {
         "перемещение сдвига, сдвиговое перемещение, 剪切位移, せん断変位"
     ),
     "displacement": names_of(
-        "displacement, disp, axial displacement, compressive displacement, extension, tensile extension, "
+        "displacement, disp, elongation, compression, uzama, yer değiştirme, "
+        "axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
         "axial position, crosshead position, stroke, travel, traverse, déplacement, allongement, desplazamiento, "
         "alargamiento, deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
@@ -89,6 +91,7 @@ ROLES = {
     ),
     "force": names_of(
         "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
+        "kuvvet, yük, "
         "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft, shear force, lateral force, "
         "horizontal force, force per width, force per unit width, line load, membrane force, "
         "kraft pro breite, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, "
@@ -104,7 +107,8 @@ ROLES = {
         "момент, крутящий момент, вращающий момент, момент кручения"
     ),
     "stress": names_of(
-        "stress, tensile stress, compressive stress, shear stress, spannung, druckspannung, schubspannung, "
+        "stress, wall stress, tensile stress, compressive stress, shear stress, gerilme, "
+        "spannung, zugspannung, druckspannung, schubspannung, "
         "contrainte, tensión, esfuerzo, tensão, tensione, sforzo, spanning, spänning, 应力, 應力, 応力, 응력, "
         "напряжение, осевое напряжение, напряжение растяжения, растягивающее напряжение, напряжение сжатия, "
         "сжимающее напряжение, напряжение сдвига, касательное напряжение, 拉应力, 拉伸应力, 压应力, 剪切应力, 剪应力, "
@@ -180,6 +184,7 @@ SPECIMEN_NAME = re.compile(
 DIMENSION_NAMES = {
     "area": names_of(
         "area, cross section, cross sectional area, cross section area, s0, a0, querschnitt, querschnittsfläche, "
+        "fläche, probenfläche, "
         "probenquerschnitt, anfangsquerschnitt, section, section transversale, section droite, aire, "
         "aire de la section, sección, sección transversal, área, área de la sección, "
         "área de la sección transversal, seção, secção, seção transversal, secção transversal, área da seção, "
@@ -218,6 +223,7 @@ HEIGHT_NAMES = names_of("height, h0, höhe, probenhöhe, hauteur, altura, altezz
 OF_SPECIMEN = re.compile(
     r"\b((de|del|della|di|du|da|do|van) )*(la |het |l'|d')?(specimen|sample|test piece|disc|disk|eprouvette|"
     r"echantillon|probeta|muestra|provino|campione|corpo de prova|amostra|proefstuk|monster)('s)?\b|"
+    r"\b(bei startposition|zu beginn|at (the )?(start|beginning)|before (the )?test)\b|"
     r"\b(initiale?|initieel|inicial|iniziale|original|undeformed|(mean|average)(?! diameter))\b|"
     r"原始|初始|初期|试样|試樣|試験片|样品|の|"
     r"\b(перво)?начальн(ая|ый|ое)\b|\bисходн(ая|ый|ое)\b|\b(образца|пробы)\b"
