@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -67,7 +69,7 @@ def test_cells_that_span_columns_keep_the_others_in_their_places(tmp_path):
 
 @pytest.mark.parametrize(
     ("unit", "newtons"),
-    [("cN", 1e-2), ("dN", 0.1), ("daN", 10), ("hN", 100), ("MN", 1e6), ("nN", 1e-9), ("pN", 1e-12), ("10^-3 N", 1e-3)],
+    [("cN", 1e-2), ("dN", 0.1), ("daN", 10), ("hN", 100), ("nN", 1e-9), ("pN", 1e-12), ("10^-3 N", 1e-3)],
 )
 def test_forces_have_all_prefixes(tmp_path, unit, newtons):
     assert FORCE.factor(unit) == pytest.approx(newtons)
@@ -113,6 +115,14 @@ def test_what_is_numbered_from_one_to_two_is_of_axes(tmp_path):
 )
 def test_displacements_and_forces(tmp_path, head):
     check(written(tmp_path, head, D, N), **SIZES)
+
+
+@pytest.mark.parametrize(("unit", "values", "sizes"), [("%", 100 * (L - 1), {}), ("mm", D, {"length": "20 mm"})])
+def test_an_elongation_is_what_its_unit_says_without_a_warning(tmp_path, unit, values, sizes):
+    path = written(tmp_path, f"Elongation ({unit}),Stress (kPa)", values, P)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check(path, **sizes)
 
 
 def test_a_compression_is_a_strain_whose_sign_is_asked_about(tmp_path):

@@ -264,7 +264,7 @@ FORCE = Quantity(
     "force",
     "N",
     {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
-    | {"cN": 1e-2, "dN": 0.1, "daN": 10.0, "hN": 100.0, "MN": 1e6, "nN": 1e-9, "pN": 1e-12, "dyn": 1e-5},
+    | {"cN": 1e-2, "dN": 0.1, "daN": 10.0, "hN": 100.0, "nN": 1e-9, "pN": 1e-12, "dyn": 1e-5},
 )
 FORCE_PER_WIDTH = Quantity(
     "force per width",

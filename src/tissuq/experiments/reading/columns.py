@@ -40,7 +40,7 @@ from tissuq.experiments.reading.recognition import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import PRESSURE, with_columns_of_tube
-from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS
+from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOUT_UNIT
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
 __all__ = [
@@ -273,7 +273,7 @@ def _choice(
         by_unit = None if is_named else told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
-            told.add(deformation)
+            told |= {deformation} if contents.quantities[deformation] not in OPEN_WITHOUT_UNIT else set()
         else:
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]

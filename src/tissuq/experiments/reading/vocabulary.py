@@ -14,6 +14,7 @@ __all__ = [
     "MEAN_WORDS",
     "NOUNS",
     "OF_SPECIMEN",
+    "OPEN_WITHOUT_UNIT",
     "ROLES",
     "ROLES_OF_TUBE",
     "SET_NAMES",
@@ -76,7 +77,7 @@ ROLES = {
         "перемещение сдвига, сдвиговое перемещение, 剪切位移, せん断変位"
     ),
     "displacement": names_of(
-        "displacement, disp, elongation, compression, uzama, yer değiştirme, "
+        "displacement, disp, compression, uzama, yer değiştirme, "
         "axial displacement, compressive displacement, extension, tensile extension, "
         "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
         "axial position, crosshead position, stroke, travel, traverse, déplacement, allongement, desplazamiento, "
@@ -155,6 +156,8 @@ SPREAD_WORDS = {
     "open": r"±|\+/|^\+$|error|err|fehler|uncertainty",
 }
 """Words for them, and those that leave open which it is."""
+OPEN_WITHOUT_UNIT = names_of("elongation, relative elongation, относительное удлинение")
+"""Names of strains or displacements, as their unit says."""
 DEFORMATION_NOUNS = names_of("déformation, deformación, deformação, deformazione, деформация")
 """Names of strains that are displacements where their unit is a length."""
 MEAN_WORDS = (
