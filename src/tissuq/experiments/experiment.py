@@ -41,6 +41,7 @@ class Curve:
     name, source, stress_unit, specimen : str
         Those of the test.
     least_errors : mapping of str to float
+    direction, condition : str
         Those of the test.
     """
 
@@ -54,6 +55,8 @@ class Curve:
     stress_unit: str
     specimen: str
     least_errors: Mapping[str, float] = field(default_factory=dict)
+    direction: str = ""
+    condition: str = ""
 
     def __len__(self) -> int:
         return len(self.stress)
@@ -105,6 +108,8 @@ class Experiment:
         Standard deviations that errors of the test have at least, as the measurements themselves show, by their names
         in `tissuq.Tolerances`: ``{"slack": 0.01}`` where load begins at a stretch known to 0.01. Unless tolerances are
         stated as numbers, those of a fit are as large. The attribute is of several tests the largest ones.
+    direction, condition : str
+        In which direction of the tissue the specimen was loaded, and its state or treatment, in words.
 
     Attributes
     ----------
@@ -146,6 +151,8 @@ class Experiment:
         specimen: str = "",
         standard_error: ArrayLike | None = None,
         least_errors: Mapping[str, float] | None = None,
+        direction: str = "",
+        condition: str = "",
     ) -> None:
         mode = loading_mode(mode)
         values, unit = _in_mpa(stress, stress_unit)
@@ -161,8 +168,8 @@ class Experiment:
             if errors.shape != stresses.shape or (errors < 0).any():
                 raise InputError(f"experiment '{name}': give one standard error for every stress, none negative.")
         columns = zip(stresses.reshape(len(stresses), -1).T, errors.reshape(len(stresses), -1).T, strict=True)
-        labels, least = (name, source, unit, specimen), dict(least_errors or {})
-        curves = tuple(Curve(mode, channel, points, *column, *labels, least) for channel, column in enumerate(columns))
+        labels = name, source, unit, specimen, dict(least_errors or {}), direction, condition
+        curves = tuple(Curve(mode, channel, points, *column, *labels) for channel, column in enumerate(columns))
         object.__setattr__(self, "curves", curves)
 
     @classmethod
@@ -254,6 +261,16 @@ class Experiment:
         return self.curves[0].specimen if len(self.tests) == 1 else ""
 
     @property
+    def direction(self) -> str:
+        """In which direction of the tissue it was loaded; of several tests see that of each."""
+        return self.curves[0].direction if len(self.tests) == 1 else ""
+
+    @property
+    def condition(self) -> str:
+        """The state or the treatment of the specimen; of several tests see that of each."""
+        return self.curves[0].condition if len(self.tests) == 1 else ""
+
+    @property
     def least_errors(self) -> dict[str, float]:
         """Standard deviations that errors of the tests have at least, by their names: the largest of all tests."""
         pairs = [pair for curve in self.curves for pair in curve.least_errors.items()]
@@ -327,7 +344,7 @@ class Experiment:
         return mode.paths[channel].at(points, next(curves, UNMEASURED))
 
     def labelled(self, **labels: str) -> Experiment:
-        """Return the same measurements with another name, source, specimen, or stress_unit to read them in."""
+        """Return the same measurements with another name, source, specimen, direction or condition, or unit to read."""
         return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
 
     def where(self, selected: NDArray[Any]) -> Experiment:
@@ -378,6 +395,8 @@ class Experiment:
             specimen=self.specimen,
             standard_error=error,
             least_errors=self.least_errors,
+            direction=self.direction,
+            condition=self.condition,
         )
         return joined.labelled(stress_unit=self.stress_unit)
 

@@ -72,6 +72,7 @@ SYMBOLS = (
         "F",
     }
     | {"Nm", "mNm", "uNm", "nNm", "kNm", "Ncm", "mNcm", "Nmm", "mNmm"}
+    | {"px", "pixel", "pixels", "Pixel", "Pixels", "pix"}
     | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
 )
 """Of quantities of any kind."""

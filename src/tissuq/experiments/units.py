@@ -21,6 +21,7 @@ __all__ = [
     "FORCE_PER_WIDTH",
     "LENGTH",
     "MASSES",
+    "PIXELS",
     "PRESSURE",
     "RATE",
     "TIME",
@@ -227,6 +228,11 @@ class Quantity:
         factor = self.factor_or_none(text)
         if factor is None and self.name == "force" and text in MASSES:
             raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {text}f.")
+        if factor is None and self.name == LENGTH.name and PIXELS.factor_or_none(text):
+            raise InputError(
+                f"'{text}' is no length. A distance between marks in pixels is read as --column length=NAME, with the "
+                'undeformed one (--length "812 px") where the test does not begin there.'
+            )
         if factor is None:
             raise InputError(f"'{text}' is not a unit of {self.name}; write one of {', '.join(self.factors)}.")
         return factor
@@ -258,6 +264,8 @@ class Quantity:
 
 
 LENGTH = Quantity("length", "mm", {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4})
+PIXELS = Quantity("pixels", "px", dict.fromkeys(["px", "pixel", "pixels", "Pixel", "Pixels", "pix"], 1.0))
+"""Distances in pictures, which are lengths only in proportion to another one."""
 ANGLE = Quantity("angle", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "degrees": pi / 180})
 AREA = Quantity("area", "mm2", {f"{unit}2": factor**2 for unit, factor in LENGTH.factors.items()})
 FORCE = Quantity(
@@ -313,7 +321,7 @@ def measured_in(unit: str) -> str:
     compact = _compact(_without_power(unit)[1])
     if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
         return "stress"
-    for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE, FORCE_PER_WIDTH):
+    for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE, FORCE_PER_WIDTH, PIXELS):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
     return (

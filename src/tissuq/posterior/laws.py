@@ -66,9 +66,9 @@ class LawComparison:
     seconds: Mapping[str, float]
     skipped: Mapping[str, str]
 
-    @cached_property
+    @property
     def table(self) -> pd.DataFrame:
-        """The laws side by side, the most probable first.
+        """The laws side by side, the most probable first, with moduli in the unit of the measurements.
 
         - parameters: number of parameters of the law.
         - log_evidence, log_evidence_error; probability of the law, were all as probable before the data.
@@ -79,9 +79,31 @@ class LawComparison:
         - discrepancy_share, _low, _high: the part of the stress that the discrepancy carries: mean and 95 % interval.
         - stable, stable_beyond: probability of stability over the range of the invariants that was measured, and up to
           1.5 times these; in the least stable loading mode. Missing where the energy does not tell.
-        - modulus, modulus_low, modulus_high: median and 95 % HDI of the law's initial shear modulus, MPa.
+        - modulus, modulus_low, modulus_high: median and 95 % HDI of the law's initial shear modulus.
         - seconds: how long the fit took.
+
+        The unit of the moduli stands at the head of the columns; `table_in` gives another one.
         """
+        return self.table_in(self._unit)
+
+    def table_in(self, unit: str) -> pd.DataFrame:
+        """Return `table` with moduli in a unit of stress, such as ``"MPa"``.
+
+        Raises
+        ------
+        InputError
+            When it is none.
+        """
+        return in_unit(self._table, ["modulus", "modulus_low", "modulus_high"], unit)
+
+    @property
+    def _unit(self) -> str:
+        """The unit of stress of the measurements."""
+        return next(iter(self.fits.values())).unit().name
+
+    @cached_property
+    def _table(self) -> pd.DataFrame:
+        """The laws side by side, moduli in MPa."""
         import pandas as pd
 
         rows = [self._row(name, posterior) for name, posterior in self.fits.items()]
@@ -136,8 +158,7 @@ class LawComparison:
 
         weighted = [(weight, self.fits[name].solution) for name, weight in self._likely.items()]
         table = pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
-        unit = weighted[0][1].model.experiment.stress_unit
-        return in_unit(table, ["median", "low", "high"], unit)
+        return in_unit(table, ["median", "low", "high"], self._unit)
 
     @cached_property
     def _moduli(self) -> Mapping[str, Marginal]:

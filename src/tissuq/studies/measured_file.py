@@ -82,13 +82,16 @@ class MeasuredTest(MeasuredFile):
     """One of several files that are fitted together."""
 
     specimen: str = ""
+    direction: str = ""
+    condition: str = ""
     noise_sd: float | None = Field(None, gt=0)
 
     def reading(self, folder: Path = Path(), found: Reading | None = None) -> Reading:
-        """Return what is read from the file, and say which specimen it was."""
+        """Return what is read from the file, with the specimen, the direction and the condition that are stated."""
         reading = super().reading(folder, found)
-        specimen = self.specimen or reading.experiment.specimen
-        return replace(reading, experiment=reading.experiment.labelled(specimen=specimen))
+        stated = {"specimen": self.specimen, "direction": self.direction, "condition": self.condition}
+        labels = {name: label for name, label in stated.items() if label}
+        return replace(reading, experiment=reading.experiment.labelled(**labels))
 
 
 class FittedSettings(BaseModel):

@@ -269,7 +269,7 @@ def _choice(
         if not is_shear and not contents.fitting(*measures):
             measures = ["displacement"] if contents.fitting("displacement") else ["length"]
         is_named = bool(contents.fitting(*measures)) or (is_shear and load != "torque")
-        kinds = ("angle",) if is_shear else ("strain", "length")
+        kinds = ("angle",) if is_shear else ("strain", "length", "pixels")
         by_unit = None if is_named else told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
@@ -299,7 +299,7 @@ def _choice(
 
 def _check_machine(table: Table, quantities: Sequence[str], displacement: int) -> None:
     """Ask which is read where an extensometer or a camera measures the specimen beside the machine's displacement."""
-    roles = {"length": "displacement", "strain": "strain"}
+    roles = {"length": "displacement", "strain": "strain", "pixels": "length"}
     seen = {column: roles.get(measured_in(table.unit(column))) for column in _columns_on_specimen(table, quantities)}
     seen = {column: role for column, role in seen.items() if role}
     if displacement in _columns_on_specimen(table, quantities) or not seen:

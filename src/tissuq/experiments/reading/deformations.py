@@ -11,11 +11,11 @@ from tissuq.experiments.reading.column_units import declared_unit, factor_of, st
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words, initial_size, tube_of
 from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
-from tissuq.experiments.reading.positions import FIRST_ROW, ZERO_ASSUMED, check_lengths, check_positions
+from tissuq.experiments.reading.positions import FIRST_ROW, LITTLE_LOAD, ZERO_ASSUMED, check_lengths, check_positions
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS
-from tissuq.experiments.units import ANGLE, FORCE, LENGTH, RATE, TIME, Quantity, measured_in
+from tissuq.experiments.units import ANGLE, FORCE, LENGTH, PIXELS, RATE, TIME, Quantity, measured_in
 
 __all__ = ["stretch_of", "without_machine"]
 
@@ -55,7 +55,7 @@ def stretch_of(
             "displacements. Leave zero (--zero) out, or give the column as displacement."
         )
     if choice.measure == "length":
-        return _from_length(table, choice, values, dimensions, displacement_unit)
+        return _from_length(table, choice, values, load, dimensions, displacement_unit)
     if choice.measure in DIAMETERS:
         return _from_diameter(table, choice, values, dimensions, displacement_unit)
     _refuse(table, choice, "displacement_unit", displacement_unit)
@@ -200,9 +200,11 @@ def _from_rate(table: Table, choice: ColumnChoice, values: Column) -> tuple[Colu
 
 
 def _from_length(
-    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
+    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions, unit: str | None
 ) -> tuple[Column, str]:
-    """Return current lengths or heights over the undeformed one, or that of the first row, and how that was done."""
+    """Return current lengths, heights or distances over the undeformed one, or the first, and how that was done."""
+    if PIXELS.factor_or_none(unit or declared_unit(table, choice.deformation)):
+        return _from_distance(table, choice, values, load, dimensions)
     factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", unit)
     current = values * factor
     length = dimensions.length if "length" in dimensions.sizes else Dimension(float(current[0]), "in its first row")
@@ -212,6 +214,23 @@ def _from_length(
         current / length.value,
         f"stretch = column {label} in {unit_source} / {length.value:g} mm (length {length.source})",
     )
+
+
+def _from_distance(
+    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions
+) -> tuple[Column, str]:
+    """Return distances in pixels over the undeformed one, which must be known, and how that was done."""
+    distance = dimensions.distance(float(values[0]))
+    check_lengths(table, choice, values, "px")
+    share = abs(float(load[0])) / max(float(np.abs(load).max()), np.finfo(float).tiny)
+    if "length" not in dimensions.set_by_user and share > LITTLE_LOAD:
+        raise InputError(
+            f"{table.place(choice.deformation, 0)}: the distance begins at {values[0]:g} px with {share:.0%} of the "
+            f'largest load. Give the undeformed distance in pixels: --length "{values[0]:.4g} px" (in Python '
+            f'length="{values[0]:.4g} px") if it is that, or the one it is.'
+        )
+    column = f"column {table.label(choice.deformation)} in px"
+    return values / distance.value, f"stretch = {column} / {distance.value:g} px (undeformed: {distance.source})"
 
 
 def _from_diameter(

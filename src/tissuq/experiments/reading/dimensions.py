@@ -10,6 +10,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import heading, on_axis
 from tissuq.experiments.reading.inflation import Tube
@@ -17,7 +18,7 @@ from tissuq.experiments.reading.repeated_sizes import TestBeside
 from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
-from tissuq.experiments.units import AREA, LENGTH, Quantity
+from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
 __all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
 
@@ -43,10 +44,11 @@ TURNED = {"length": "width", "width": "length"}
 
 @dataclass(frozen=True)
 class Dimension:
-    """One dimension in mm or mm², and the words that tell where it comes from."""
+    """One dimension in mm or mm², or in pixels, and the words that tell where it comes from."""
 
     value: float
     source: str
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,23 @@ class Dimensions:
             + area_too
             * (self.divide_forces and not _sections(self.sizes)),
         )
+
+    def distance(self, first: float) -> Dimension:
+        """Return the undeformed distance of marks in pixels: the one that is given, or else the first of the test.
+
+        Raises
+        ------
+        InputError
+            When a length is given that is not in pixels.
+        """
+        if "length" not in self.set_by_user:
+            return Dimension(first, "in its first row", PIXELS.unit)
+        if self.sizes["length"].unit != PIXELS.unit:
+            raise InputError(
+                f"{self.file}: distances are in pixels, and so must be the undeformed one: give it as "
+                f'--length "{first:.4g} px", or leave it out where the test begins undeformed.'
+            )
+        return self.sizes["length"]
 
     @property
     def radius(self) -> Dimension:
@@ -179,7 +198,7 @@ class Dimensions:
         """Return a size that must be known, and be stated once."""
         self._refuse_open_height(name)
         self._refuse_ambiguous(name)
-        if name not in self.sizes:
+        if name not in self.sizes or self.sizes[name].unit == PIXELS.unit:
             raise InputError(f"{self.file}: {advice} {self._others(LENGTH, name)}")
         return self.sizes[name]
 
@@ -253,7 +272,7 @@ def dimensions_of(
             ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
         elif sizes:
             stated[name] = sizes[0]
-    of_user = {name: Dimension(_quantity(name).value(str(text)), "as given") for name, text in texts.items()}
+    of_user = {name: _given(name, str(text)) for name, text in texts.items()}
     dimensions = Dimensions(
         table.file,
         stated | of_user,
@@ -370,7 +389,8 @@ def _sections(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:
 def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> Iterator[str]:
     """Yield a sentence where the file states another length or cross-section than the user."""
     pairs = []
-    if "length" in dimensions.set_by_user and "length" in stated:
+    is_length = "length" in dimensions.set_by_user and not dimensions.sizes["length"].unit
+    if is_length and "length" in stated:
         pairs.append(("length", "mm", dimensions.length, stated["length"]))
     is_set_by_user = any(dimensions.set_by_user & set(SECTIONS[form]) for form in _sections(dimensions.sizes))
     if is_set_by_user and _sections(stated):
@@ -381,6 +401,13 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
                 f"the {what} is {size.value:g} {unit} ({size.source}), but the file says {in_file.value:g} {unit} "
                 f"({in_file.source})."
             )
+
+
+def _given(name: str, text: str) -> Dimension:
+    """Return a dimension that the user gives with its unit; a length may be in pixels."""
+    if name == "length" and PIXELS.factor_or_none(number_and_unit(text)[1]):
+        return Dimension(PIXELS.value(text), "as given", PIXELS.unit)
+    return Dimension(_quantity(name).value(text), "as given")
 
 
 def _quantity(name: str) -> Quantity:

@@ -23,6 +23,7 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
 from tissuq.experiments.reading.height_of_block import of_block
+from tissuq.experiments.reading.labels import check_labels, columns_only, labels_of
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
@@ -274,7 +275,10 @@ def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     if (mode := plain.get("mode")) is not None:
         checked_mode(mode, plain)
     table = table_of(path, plain)
-    return read_rows(only_rows(table, plain.get("only")), table.file if is_data_frame(path) else path, **plain)
+    rows = only_rows(table, columns_only(table, plain.get("only")))
+    reading = read_rows(rows, table.file if is_data_frame(path) else path, **plain)
+    check_labels(table, reading.experiment, plain.get("only"))
+    return reading
 
 
 def table_of(path: Any, options: ReadingOptions) -> Table:
@@ -352,7 +356,7 @@ def read_rows(
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
         least_errors=errors | least_errors(tested),
-    ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
+    ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
     problems = (spread.problem for spread in spreads if spread.problem)
     doubts = *assumptions(used, choices, types[1]), *dimensions.averages, *dimensions.contradictions
     about_loads = filter(None, (load.note for load in loads))
@@ -411,7 +415,7 @@ def _measured(
         standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
         labels=labels,
     )
-    for name, value in (options.get("only") or {}).items():
+    for name, value in columns_only(table, options.get("only")).items():
         measured = measured.with_step(f"only rows with '{value}' in column '{name}'")
     measured = measured.with_step(*stretch_steps).with_step(*(load.source for load in loads))
     if any(spread.source for spread in spreads):

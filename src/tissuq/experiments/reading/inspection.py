@@ -95,6 +95,9 @@ class Inspection:
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])
         yield "mode", f"{self.reading.experiment.mode.name} ({self.reading.mode_source})"
+        labels = {name: getattr(self.reading.experiment, name) for name in ("specimen", "direction", "condition")}
+        if any(labels.values()):
+            yield "test", ", ".join(f"{name} {label}" for name, label in labels.items() if label)
         spans = dict(self._spans())
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""

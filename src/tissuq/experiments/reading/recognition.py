@@ -35,7 +35,7 @@ LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
 DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
 LOADS = ("stress", "torque", "force", PRESSURE)
-DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
+DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist", "pixels": "length"}
 """What a column is that alone has such a unit."""
 OTHER_MEASURE = (
     r"true|cauchy|piola|kirchhoff|pk|log|hencky|green|almansi|lagrang|euler|wahr|vrai|r[ée]elle|verdader|real\b|"

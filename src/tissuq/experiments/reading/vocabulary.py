@@ -87,7 +87,9 @@ ROLES = {
         "перемещение траверсы, перемещение захвата, положение, положение траверсы, позиция"
     ),
     "length": names_of(
-        "gap, gap width, gap height, height, sample height, specimen height, current length, current height, spalt, "
+        "marker distance, marker separation, distance between markers, distance of markers, markerabstand, "
+        "distance entre marqueurs, distancia entre marcadores, 标记间距, gap, gap width, gap height, height, "
+        "sample height, specimen height, current length, current height, spalt, "
         "spaltweite, höhe, probenhöhe, зазор, высота, высота образца, текущая длина, текущая высота, 间隙, 間隙, すき間"
     ),
     "force": names_of(
