@@ -114,6 +114,29 @@ def test_measurements_may_follow_one_another_in_a_line_without_cells(tmp_path):
         check([tq.read(path)], ["TEST"])
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        ["Specimen,A,B,C", "Length (mm),20,21,19"],
+        ["Specimen,1,2,3", "Length (mm),20,21,19"],
+        [",A 1,A 2,A 3", "Length (mm),20,21,19"],
+        ["Length (mm),20,21,19", ",A 1,A 2,A 3"],
+    ],
+)
+def test_values_of_named_specimens_are_no_measurements_of_one(tmp_path, head):
+    path = written(tmp_path, [*head, "Disp (mm),Load (N)"], EACH[:2])
+    with pytest.raises(InputError, match=r"several lengths: 20 mm .* 21 mm .* 19 mm"):
+        tq.read(path, area="6 mm2")
+
+
+def test_numbered_sizes_above_several_tables_are_of_the_tables(tmp_path):
+    rows = [f"{u:.8g},{f:.8g}" for u, f in zip(*EACH[:2], strict=True)]
+    head = ["Length 1 (mm),20", "Length 2 (mm),21", "Disp (mm),Load (N)"]
+    (tmp_path / "test.csv").write_text("\n".join([*head, *rows, "", "Disp (mm),Load (N)", *rows]), encoding="utf-8")
+    with pytest.raises(InputError, match="two lengths: 20 mm in line 1 and 21 mm in line 2"):
+        tq.read_tests(tmp_path / "test.csv", area="6 mm2")
+
+
 def test_measurements_far_apart_are_asked_about(tmp_path):
     head = ["L0 (mm),20", "Width (mm),5", "Thickness 1 (mm),1.0", "Thickness 2 (mm),1.3", "Disp (mm),Load (N)"]
     path = written(tmp_path, head, EACH[:2])

@@ -14,6 +14,7 @@ from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import heading, on_axis
 from tissuq.experiments.reading.inflation import Tube
+from tissuq.experiments.reading.mean_size import MEAN_OF, statements_of_size
 from tissuq.experiments.reading.repeated_sizes import TestBeside
 from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
@@ -24,10 +25,6 @@ __all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses",
 
 SHOWN = 3
 """Number of other sizes that a message shows."""
-NOTABLE_SCATTER = 0.2
-"""Range of measurements of one size over their mean, from which they are hardly those of one specimen."""
-MEAN_OF = "mean of"
-"""How the source of such a size begins."""
 CONTRADICTION = 0.01
 """Relative difference from which two statements of one dimension contradict each other."""
 HOW_TO_GIVE_SECTION = (
@@ -265,7 +262,7 @@ def dimensions_of(
     for name in DIMENSION_NAMES:
         of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
         others = [size for size in others if size not in of_name]
-        sizes = _measured(of_name)
+        sizes = [Dimension(*statement) for statement in statements_of_size(of_name)]
         means = [size for size in sizes if size.source.startswith(MEAN_OF) and name not in texts]
         averages += [f"the {name} is the {mean.source}: {mean.value:.4g} {_quantity(name).unit}." for mean in means]
         if name not in texts and any(not _agree(size, sizes[0]) for size in sizes):
@@ -283,18 +280,6 @@ def dimensions_of(
         is_one_of_several=test is not None,
     )
     return replace(dimensions, contradictions=tuple(_contradictions(dimensions, stated)))
-
-
-def _measured(sizes: Sequence[StatedSize]) -> list[Dimension]:
-    """Return statements of one size, those of several measurements of it as their mean where they differ little."""
-    by_number = {(size.measurement, size.value): size for size in sizes if size.measurement}
-    values = [value for _, value in by_number]
-    once = [Dimension(size.value, size.source) for size in sizes if not size.measurement]
-    if len(values) < 2 or max(values) - min(values) >= NOTABLE_SCATTER * np.mean(values):
-        return [*once, *(Dimension(size.value, size.source) for size in by_number.values())]
-    places = ", ".join(dict.fromkeys(size.source.removeprefix("in ") for size in by_number.values()))
-    listed = ", ".join(f"{value:g}" for value in values)
-    return [*once, Dimension(float(np.mean(values)), f"{MEAN_OF} {len(values)} measurements ({listed}, in {places})")]
 
 
 def dimensions_of_stresses(

@@ -6,7 +6,7 @@ import re
 
 from tissuq.experiments.units import measured_in
 
-__all__ = ["DERIVATIVE", "other_quantity"]
+__all__ = ["other_quantity"]
 
 OTHER_QUANTITIES = {
     "a modulus": r"modul|^[ge]('|\"|′|″)?$|^young",
@@ -43,7 +43,8 @@ OTHER_QUANTITIES = {
 }
 """What names with such words, in small letters, are of, in words that follow *is*."""
 PATTERNS = {what: re.compile(words) for what, words in OTHER_QUANTITIES.items()}
-DERIVATIVE = re.compile(r"\bd ?[^\W\d_]+ ?/ ?d ?[^\W\d_]+|derivative|ableitung|\bslope|gradient|steigung|производн")
+SYMBOL = r"d ?([^\W\d_]{1,2}|stress|strain|stretch|force|load|sigma|epsilon|lambda|disp(lacement)?)"
+DERIVATIVE = re.compile(rf"\b{SYMBOL} ?/ ?{SYMBOL}\b|derivative|ableitung|\bslope|gradient|steigung|производн")
 """One quantity by another."""
 
 

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from tissuq.experiments.numbers import NUMBER, number_and_unit
-from tissuq.experiments.reading.headings import dimensions_named, heading, plain
+from tissuq.experiments.reading.headings import dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import WHITESPACE, split
 from tissuq.experiments.reading.side_by_side import columns_side_by_side
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import looks_like_unit
 
-__all__ = ["Place", "SizesInLine", "TestBeside", "numbered", "sizes_in_line", "test_beside"]
+__all__ = ["Place", "SizesInLine", "TestBeside", "are_named", "numbered", "sizes_in_line", "test_beside"]
 
 NUMBERED = re.compile(
     r"(?P<name>[^\d]*[^\W\d]{2}[^\d]*?)[\s_]*(?:(?:[#№]|\bn[or]\.?)\s*)?(?P<number>[1-9])\s*(?P<unit>[\[(][^\])]*[\])])?"
@@ -85,6 +85,23 @@ def numbered(name: str) -> tuple[str, str]:
     if match and dimensions_named(plain(match["name"]), is_cylinder=True):
         return " ".join(filter(None, (match["name"].strip(), match["unit"]))), match["number"]
     return name, ""
+
+
+def are_named(sizes: SizesInLine, table: Table) -> bool:
+    """Tell whether another line above a table names what stands in the columns of values, as those of specimens."""
+    columns = [place.column for place in sizes.places]
+    for _, text in table.head:
+        cells = split(text, table.separator)
+        if set(table.names) & {*cells} - {""}:
+            continue
+        over = [cells[column] for column in columns if column < len(cells)]
+        label = heading(cells[0]).quantity if cells else ""
+        if is_of_specimens(label) and sum(map(bool, over)) > 1:
+            return True
+        words = [cell for cell in over if cell and number_and_unit(cell)[0] is None and not looks_like_unit(cell)]
+        if len(words) > 1 and len(set(columns)) > 1:
+            return True
+    return False
 
 
 def sizes_in_line(text: str, separator: str) -> list[SizesInLine]:

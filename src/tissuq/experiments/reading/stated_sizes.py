@@ -11,7 +11,7 @@ from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
-from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, numbered, sizes_in_line
+from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, are_named, numbered, sizes_in_line
 from tissuq.experiments.reading.side_by_side import names_above
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
@@ -121,18 +121,20 @@ def names_of_specimen(
 
 def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     """Yield what lines above the table state: ``Width : 5 mm``, ``"Probendicke";1,55;"mm"``, or less clear ones."""
+    is_of_one = not table.number and not any(is_of_specimens(heading(name).quantity) for name in table.names)
     for line, text in table.head:
         text, source = text.lstrip("# "), f"in line {line}"
         if several := sizes_in_line(text, table.separator):
             for sizes in several:
-                yield from _of_several(sizes, test, source)
+                is_measured_again = is_of_one and not are_named(sizes, table)
+                yield from _of_several(sizes, test, source, is_measured_again=is_measured_again)
             continue
         cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
         statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
         words = list(_words(statements))
         pairs = zip(words, words[1:], [*words[2:], ("", "")], strict=False)
         clear = [
-            replace(size, measurement=measurement)
+            replace(size, measurement=measurement if is_of_one or test else "")
             for (name, measurement), (number, _), (unit, _) in pairs
             for size in _of_words(name, number, unit, source)
         ]
@@ -151,14 +153,16 @@ def _words(statements: Sequence[str]) -> Iterator[tuple[str, str]]:
             yield from ((word.strip(' "'), "") for word in BETWEEN_WORDS.split(part) if word.strip(' "'))
 
 
-def _of_several(sizes: SizesInLine, test: TestBeside | None, source: str) -> Iterator[StatedSize]:
+def _of_several(
+    sizes: SizesInLine, test: TestBeside | None, source: str, *, is_measured_again: bool
+) -> Iterator[StatedSize]:
     """Yield the value of a test of several that a line states, or all: of one specimen they are its measurements."""
     if test and (text := sizes.over(test)) is not None:
         yield from _sizes(heading(sizes.name), text, f"{source}, over its columns", f"{sizes.name}: {text}")
         return
     for number, place in enumerate(sizes.places, 1):
         for size in _sizes(heading(sizes.name), place.text, source, f"{sizes.name}: {place.text}"):
-            yield replace(size, measurement="" if test else str(number))
+            yield replace(size, measurement=str(number) if is_measured_again and not test else "")
 
 
 def _of_words(name: str, number: str, unit: str, source: str) -> list[StatedSize]:
