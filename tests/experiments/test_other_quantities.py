@@ -45,6 +45,10 @@ def proposed(message):
         ("Stress offset", "offset"),
         ("dStress/dStrain", "derivative"),
         ("log10 stress", "logarithm"),
+        ("G*", "modulus"),
+        ("Predicted stress", "model"),
+        ("Stress difference", "difference"),
+        ("Failure stress", "failure"),
     ],
 )
 def test_what_is_no_stress_is_read_as_one_only_where_one_says_so(tmp_path, name, what):
@@ -71,6 +75,9 @@ def test_what_is_no_stress_is_read_as_one_only_where_one_says_so(tmp_path, name,
         ("Residual strain", "remains"),
         ("Area reduction", "area"),
         ("Flexural strain", "bending"),
+        ("Plastic strain", "remains"),
+        ("Mineral density", "concentration"),
+        ("Poisson ratio", "another direction"),
     ],
 )
 def test_what_is_no_strain_is_read_as_one_only_where_one_says_so(tmp_path, name, what):

@@ -20,6 +20,7 @@ from tissuq.experiments.reading.headings import (
     without_mean,
 )
 from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
@@ -112,6 +113,7 @@ def _told_by_unit(table: Table, column: int) -> _Role:
     quantity = heading(table.names[column]).quantity
     load, test = measured_in(table.unit(column)), without_mean(quantity)
     is_of_test = bool(test) and (_is_test(quantity) or is_of_mean(quantity)) and not of_spread(quantity)[0]
+    is_of_test = is_of_test and not other_quantity(quantity, table.unit(column))
     return _Role(load, test) if load in LOADS and is_of_test else _Role("", "")
 
 
