@@ -52,6 +52,19 @@ def test_each_value_may_have_its_own_label_whichever_column_comes_first(tmp_path
     check(tq.read_tests(written(tmp_path, head, each)))
 
 
+def test_each_value_may_stand_in_one_cell_with_its_label(tmp_path):
+    head = ["S1,,S2,,S3,"]
+    for name, unit, values in (("L0", "mm", LENGTHS), ("Width", "mm", WIDTHS), ("Thickness", "mm", THICKNESSES)):
+        head.append(",,".join(f"{name} = {value} {unit}" for value in values) + ",")
+    check(tq.read_tests(written(tmp_path, [*head, ",".join(["Disp (mm),Load (N)"] * 3)], EACH)))
+
+
+def test_sizes_named_after_tests_are_theirs(tmp_path):
+    sizes = {"Length": LENGTHS, "Width": WIDTHS, "Thickness": THICKNESSES}
+    head = [f"{name} S{k + 1} (mm),{size[k]}" for name, size in sizes.items() for k in range(3)]
+    check(tq.read_tests(written(tmp_path, [*head, "S1,,S2,,S3,", ",".join(["Disp (mm),Load (N)"] * 3)], EACH)))
+
+
 def test_forces_beside_one_displacement_have_their_own_sizes(tmp_path):
     moved = np.linspace(0, 4, 50)
     stretches = [1 + moved / length for length in LENGTHS]
@@ -98,6 +111,7 @@ def test_the_number_of_a_size_is_not_its_value(tmp_path, head):
     [
         ["Thickness 1 (mm),1.1", "Thickness 2 (mm),1.2", "Thickness 3 (mm),1.3"],
         ["Thickness (mm),1.1,1.2,1.3"],
+        ["Thickness (mm): 1.1, 1.2, 1.3"],
         ["Thickness 1: 1.1 mm", "Thickness 2: 1.2 mm", "Thickness 3: 1.3 mm", "Mean thickness: 1.2 mm"],
     ],
 )

@@ -33,6 +33,7 @@ HOW_TO_GIVE_SECTION = (
 )
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
+EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
 PLURALS = {"thickness": "thicknesses"}
 """Of names of sizes that do not end in s alone."""
 TURNED = {"length": "width", "width": "length"}
@@ -206,12 +207,11 @@ class Dimensions:
     def _refuse_ambiguous(self, *names: str) -> None:
         for name in names:
             if name in self.ambiguous:
-                one = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
                 count = "two" if self.ambiguous[name].count(" and ") == 1 else "several"
                 sizes = f"{count} {PLURALS.get(name, f'{name}s')}"
                 raise InputError(
                     f"{self.file}: the file states {sizes}: {self.ambiguous[name]}. Say which: --{name} "
-                    f'"NUMBER {_quantity(name).unit}".{one * self.is_one_of_several}'
+                    f'"NUMBER {_quantity(name).unit}".{EACH_ALONE * self.is_one_of_several}'
                 )
 
     def _partly_known(self) -> str:
@@ -231,7 +231,8 @@ class Dimensions:
         which = "that" if len(sizes) == 1 else "one of these"
         number = f"{sizes[0].value:g}" if len(sizes) == 1 else "NUMBER"
         options = " or ".join(f'--{name} "{number} {kind.unit}"' for name in names)
-        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}."
+        each_alone = EACH_ALONE * self.is_one_of_several
+        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}.{each_alone}"
 
 
 def dimensions_of(

@@ -110,14 +110,15 @@ def sizes_in_line(text: str, separator: str) -> list[SizesInLine]:
         return _after_words(text)
     label, of_label = "", -1
     values, labels = dict[str, list[tuple[str, int, int]]](), list[str]()
-    for column, cell in enumerate(split(text, separator)):
-        is_value = number_and_unit(cell)[0] is not None
+    cells = enumerate(split(text, separator))
+    parts = ((column, part.strip()) for column, cell in cells for part in re.split("[:=]", cell))
+    for column, part in parts:
+        is_value = number_and_unit(part)[0] is not None
         if is_value and label:
-            values.setdefault(label, []).append((cell, column, of_label))
+            values.setdefault(label, []).append((part, column, of_label))
             of_label = column + 1
-        elif cell and not is_value and not looks_like_unit(cell):
-            name = cell.rstrip(" :=")
-            label = name if dimensions_named(heading(name).quantity, is_cylinder=True) else ""
+        elif part and not is_value and not looks_like_unit(part):
+            label = part if dimensions_named(heading(part).quantity, is_cylinder=True) else ""
             of_label = column
             labels.append(label)
     several = {name: cells for name, cells in values.items() if len(cells) > 1}

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.headings import (
     AXES,
     dimensions_named,
@@ -138,6 +139,12 @@ def _is_test(text: str) -> bool:
     )
 
 
+def _states_size(cell: str) -> bool:
+    """Tell whether a cell names a size, or holds one with its unit."""
+    name = re.split("[:=]", cell)[0]
+    return bool(dimensions_named(heading(name).quantity, is_cylinder=True) or number_and_unit(cell)[1])
+
+
 def names_above(table: Table, columns: Sequence[int]) -> list[str]:
     """Return what the last line above the names of columns says over each of some; nothing where it says no names.
 
@@ -148,7 +155,7 @@ def names_above(table: Table, columns: Sequence[int]) -> list[str]:
         cells = split(text, table.separator)[: len(names)]
         if [heading(cell).quantity for cell in cells] == names[: len(cells)] or not any(cells):
             continue
-        if any(dimensions_named(heading(cell).quantity, is_cylinder=True) for cell in cells):
+        if any(map(_states_size, cells)):
             continue
         above = filled_on(cells + [""] * (len(names) - len(cells)))
         over = [above[column] for column in columns]

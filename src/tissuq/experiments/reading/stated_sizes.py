@@ -93,10 +93,15 @@ def stated_sizes(table: Table, specimens: Collection[str], test: TestBeside | No
 
 
 def _of_test(size: StatedSize, sizes: Sequence[StatedSize], test: TestBeside) -> StatedSize | None:
-    """Return a size that may be that of one of several tests, by its number; None where it is that of another test.
+    """Return a size that may be that of one of several tests, by its number or name; None where it is that of another.
 
     As many as there are tests are no measurements of one specimen, whatever their numbers.
     """
+    if not dimensions_named(size.name, is_cylinder=True):
+        for name in test.names:
+            alone = plain(re.sub(rf"(?<!\w){re.escape(plain(name))}(?!\w)", " ", size.name))
+            if alone != size.name and dimensions_named(alone, is_cylinder=True):
+                return replace(size, name=alone) if name == test.name else None
     numbers = {other.measurement for other in sizes if (other.name, other.kind) == (size.name, size.kind)}
     if not size.measurement or len(numbers) < len(test.loads):
         return size
