@@ -141,8 +141,9 @@ def _is_test(text: str) -> bool:
 
 def _states_size(cell: str) -> bool:
     """Tell whether a cell names a size, or holds one with its unit."""
-    name = re.split("[:=]", cell)[0]
-    return bool(dimensions_named(heading(name).quantity, is_cylinder=True) or number_and_unit(cell)[1])
+    name, unit = re.split("[:=]", cell)[0], number_and_unit(cell)[1].removesuffix("2").removesuffix("²")
+    is_length = measured_in(unit) == "length" and len(unit) > 1  # one letter may be of months or minutes
+    return bool(dimensions_named(heading(name).quantity, is_cylinder=True)) or is_length
 
 
 def names_above(table: Table, columns: Sequence[int]) -> list[str]:
