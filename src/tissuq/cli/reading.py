@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
 
 __all__ = [
+    "DIMENSIONS",
+    "OPTIONS",
     "Mode",
     "files_of",
     "find_tests",
@@ -27,6 +29,7 @@ __all__ = [
     "reads_files",
     "resolve",
     "run_name",
+    "settings_of",
     "tolerances",
 ]
 
@@ -150,7 +153,7 @@ def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = 
     @wraps(command)
     def reading(**arguments: Any) -> None:
         values = {name: arguments.pop(names[name]) for name in OPTIONS}
-        command(**arguments, read_as=_settings(values))
+        command(**arguments, read_as=settings_of(values))
 
     reading.__signature__ = signature.replace(  # type: ignore[attr-defined]  # what Typer reads
         parameters=[*parameters[:position], *options, *parameters[position + 1 :]]
@@ -158,7 +161,7 @@ def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = 
     return reading
 
 
-def _settings(values: dict[str, Any]) -> dict[str, Any]:
+def settings_of(values: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of a file's reading for the options' values by name."""
     dimensions = {name: values.pop(name) for name in DIMENSIONS}
     columns = once_each("--column", map(_role, values.pop("column") or []))

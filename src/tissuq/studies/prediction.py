@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.experiment import Experiment, checked_points
+from tissuq.experiments.checked_arrays import checked_points
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.headed_tables import in_unit
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit, stress_unit

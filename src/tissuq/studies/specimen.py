@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Self
@@ -106,9 +107,8 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     def readings(self, folder: Path = Path(), found: Sequence[Reading] = ()) -> list[Reading]:
         """Return what is read from the file, or those of all tests, unless that is found."""
         tests = self.tests or (self,)
-        return [
-            test.reading(folder, of_test) for test, of_test in zip(tests, found or [None] * len(tests), strict=True)
-        ]
+        of_tests = found or repeat(None, len(tests))
+        return [test.reading(folder, of_test) for test, of_test in zip(tests, of_tests, strict=True)]
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements, of all tests together."""

@@ -21,7 +21,16 @@ from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
 from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
-__all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
+__all__ = [
+    "Dimension",
+    "Dimensions",
+    "dimensions_of",
+    "dimensions_of_stresses",
+    "given_size",
+    "in_words",
+    "initial_size",
+    "tube_of",
+]
 
 SHOWN = 3
 """Number of other sizes that a message shows."""
@@ -270,7 +279,7 @@ def dimensions_of(
             ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
         elif sizes:
             stated[name] = sizes[0]
-    of_user = {name: _given(name, str(text)) for name, text in texts.items()}
+    of_user = {name: given_size(name, str(text)) for name, text in texts.items()}
     dimensions = Dimensions(
         table.file,
         stated | of_user,
@@ -389,7 +398,7 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
             )
 
 
-def _given(name: str, text: str) -> Dimension:
+def given_size(name: str, text: str) -> Dimension:
     """Return a dimension that the user gives with its unit; a length may be in pixels."""
     if name == "length" and PIXELS.factor_or_none(number_and_unit(text)[1]):
         return Dimension(PIXELS.value(text), "as given", PIXELS.unit)
@@ -401,6 +410,7 @@ def _quantity(name: str) -> Quantity:
 
 
 def in_words(dimension: Dimension) -> str:
+    """Return a length and where it comes from."""
     return f"{dimension.value:g} mm ({dimension.source})"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
@@ -41,6 +42,7 @@ __all__ = [
     "on_lettered_axis",
     "plain",
     "role_names",
+    "stretches_less_one",
     "without_gradient",
     "without_mean",
 ]
@@ -105,6 +107,9 @@ FORMULAS = {
     **dict.fromkeys(["f/a0", "f/s0"], "engineering stress"),
 }
 """What quotients of symbols are, in small letters without blanks."""
+STRETCH_LESS = r"(lambda|λ|stretch( ratio)?|streckung)\s*[-–−]\s*{}\s*([\[(].*)?"
+LESS_ONE, LESS_TWO = (re.compile(STRETCH_LESS.format(number), re.IGNORECASE) for number in (1, 2))
+"""As in ``lambda - 1``, unless others are numbered likewise, as ``lambda-2`` is."""
 REMEMBERED = 4096
 """Names that are taken apart once."""
 COPY = re.compile(r"(?<=[^\d\s])\.\d$")
@@ -175,6 +180,18 @@ def without_gradient(quantity: str) -> str:
     ('stretch 11', 'stretch yy', 'f1')
     """
     return DEFORMATION_GRADIENT.sub(r"stretch \1", quantity) if DEFORMATION_GRADIENT.fullmatch(quantity) else quantity
+
+
+def stretches_less_one(names: Sequence[str]) -> list[bool]:
+    """Tell which columns are strains by names that take one off a stretch; none where names number two stretches.
+
+    Examples
+    --------
+    >>> stretches_less_one(["lambda - 1", "stress"]), stretches_less_one(["lambda-1", "lambda-2"])
+    ([True, False], [False, False])
+    """
+    are_numbered = any(LESS_TWO.fullmatch(name.strip()) for name in names)
+    return [LESS_ONE.fullmatch(name.strip()) is not None and not are_numbered for name in names]
 
 
 def role_names(role: str) -> frozenset[str]:

@@ -28,6 +28,10 @@ DOUBTFUL_STRAIN = 1.0
 RATIO_ASSUMED = "(a plain ratio assumed: the file states no unit)"
 COMPRESSED_LIMIT = 0.5
 """Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
+TURN_ONE = (
+    "If the machine counts so, give turn='load' (--turn load); if the deformations have the wrong sign, "
+    "turn='deformation' (--turn deformation). Or check which columns are read."
+)
 NOTABLE_SHARE = 0.1
 """Share of the largest stretch change and stress that rows must reach for their sign to matter."""
 
@@ -69,13 +73,7 @@ def _check_work(measured: MeasuredRows, choices: Sequence[ColumnChoice], compres
         return
     clear = measured.taken(alike)
     for choice, stretch, stress in zip(choices, clear.stretch, clear.stress, strict=True):
-        if len(choices) > 1 and _wrong_sign(stretch, stress, stretch != 1) is not None:
-            raise InputError(
-                f"{clear.table.place(choice.stress)}: the stress is negative in tension, or positive in compression. "
-                "If the machine counts so, give turn='load' (--turn load); if the sign of the deformations is wrong, "
-                "turn='deformation'. Or check which columns are read."
-            )
-        _check_signs(clear.table, choice, stretch, stress, compression_positive)
+        _check_signs(clear.table, choice, stretch, stress, compression_positive, is_only=len(choices) == 1)
 
 
 def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Column, has_unit: bool) -> None:
@@ -120,7 +118,7 @@ def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
 
 
 def _check_signs(
-    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool
+    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool, *, is_only: bool
 ) -> None:
     row = _wrong_sign(stretch, stress, stretch < 1)
     if row is not None:
@@ -130,6 +128,8 @@ def _check_signs(
                 f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
                 "(--compression-positive)."
             )
+        if not is_only:
+            raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {TURN_ONE}")
         other = "; if the column of stretches holds strain, give it as strain"
         if choice.measure in ("strain", "displacement"):
             other = (
@@ -144,7 +144,9 @@ def _check_signs(
     row = _wrong_sign(stretch, stress, stretch > 1)
     if row is not None:
         advice = "If the machine counts so, give turn='load' (--turn load), or check which columns are read."
-        if choice.measure in ("strain", "displacement"):
+        if not is_only:
+            advice = TURN_ONE
+        elif choice.measure in ("strain", "displacement"):
             advice = (
                 f"If this is compression, whose {choice.measure} the machine counts as positive, give "
                 "compression_positive=True (--compression-positive); if it is tension, turn the sign of "

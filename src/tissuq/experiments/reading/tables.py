@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.numbers import NUMBER, number_and_unit
 from tissuq.experiments.reading.beside import without_statements_beside
 from tissuq.experiments.reading.blocks import blocks_of
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
-from tissuq.experiments.reading.headings import heading, is_of_specimens
+from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import (
     WHITESPACE,
     column_names,
@@ -37,6 +36,7 @@ from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.thousands import without_thousands
+from tissuq.experiments.reading.titles import number_before, title_of
 from tissuq.experiments.reading.transposed import transposed_table
 
 __all__ = ["read_table", "read_tables"]
@@ -277,7 +277,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         lines=[line for line, _ in content[layout.first_row :]],
         head=[(line, text) for line, text in filled if line < first_line],
         sheet=sheet,
-        title=_number_before(names) or _title(texts[: layout.names or 0], separator),
+        title=number_before(names) or title_of(texts[: layout.names or 0], separator),
     )
     table = without_statements_beside(table)
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
@@ -285,40 +285,6 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         table = with_names_above(table, texts[layout.names - 1])
     table = with_spreads_apart(without_percent_signs(without_thousands(table)))
     return _without_summary(table)
-
-
-def _number_before(names: Sequence[str]) -> str:
-    """Return the number of a table that stands before the names of its columns; an empty text where none does."""
-    return names[0] if names and NUMBER.fullmatch(names[0]) else ""
-
-
-def _title(above: Sequence[str], separator: str) -> str:
-    """Return what the lines above the names call the table; an empty text where they do not.
-
-    That is the specimen that they state, or else what stands alone in the last of them that states no size; sizes may
-    stand beneath it.
-    """
-    lines = [[cell for cell in split(line, separator) if cell] for line in above]
-    if separator == WHITESPACE:
-        lines = [[" ".join(cells)] for cells in lines]
-    last = lines[-1] if lines else []
-    while lines and (statement := _statement(lines[-1])):
-        name, value = statement
-        if is_of_specimens(heading(name).quantity):
-            return value
-        if number_and_unit(value)[0] is None:
-            break
-        lines.pop()
-    cells = lines[-1] if lines else last
-    if len(cells) != 1 or number_and_unit(cells[0])[0] is not None or all(map(NUMBER.fullmatch, cells[0].split())):
-        return ""
-    return cells[0]
-
-
-def _statement(cells: Sequence[str]) -> tuple[str, str] | None:
-    """Return the name and the value in a line such as ``Width: 5 mm``, in one cell or in several; None in others."""
-    name, *values = [word.strip() for cell in cells for word in re.split(r"[:=]", cell)]
-    return (name, " ".join(filter(None, values))) if any(values) and not NUMBER.fullmatch(name) else None
 
 
 def _joined(tables: Sequence[Table]) -> list[Table]:
