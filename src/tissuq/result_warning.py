@@ -25,7 +25,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "best-fit-target": "The discrepancy aims at the best fit of the material, not at its initial modulus.",
         "contradicting-tests": "Several tests contradict one material.",
         "correlated-residuals": "The residuals of consecutive measurements are correlated.",
-        "doubtful-unit": "The file states no unit, and one was assumed.",
+        "doubtful-reading": "The file states no unit, or a column was read whose name says something else.",
         "few-measurements": "There are too few measurements to show how the stress deviates from the material.",
         "inaccurate-integral": "Numerical integration is inaccurate.",
         "inseparable-noise": "The data cannot separate noise from discrepancy.",

@@ -165,3 +165,26 @@ def test_settings_that_contradict_each_other_are_refused(cli, here, text, words)
     said = cli("fit", "--config", "run.toml")
     assert said.status == 2
     assert words in " ".join(said.err.split())
+
+
+def test_each_file_is_read_once_and_each_note_is_printed_once(cli, here, monkeypatch):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    stretch = np.linspace(1, 1.3, 31)
+    for name, factor in (("S1", 1.0), ("S2", 1.1)):
+        sheet = book.create_sheet(name)
+        for row in (["Stretch", "Stress"], *zip(stretch, factor * 0.05 * (stretch - stretch**-2), strict=True)):
+            sheet.append(list(row))
+    book.save(here / "two.xlsx")
+    with monkeypatch.context() as patch:
+        patch.setattr("tissuq.studies.measured_file.read_file", None)
+        said = cli("fit", "two.xlsx", *ALONE)
+        one = cli("fit", "two.xlsx#S2", *ALONE, "--out", "one")
+        laws = cli("fit", "two.xlsx", *ALONE, "--material", "neo-hookean", "--material", "gent", "--out", "laws")
+    assert [outcome.status for outcome in (said, one, laws)] == [0, 0, 0]
+    assert " ".join(said.out.split()).count("the file states no unit of stress") == 1
+    assert "S2: neo-hookean" in one.out
+    again = cli("fit", "--config", "one/run.toml", *ALONE, "--out", "again")
+    means = [summary_of(here / folder)[0]["C10_mean"] for folder in ("again", "one")]
+    assert (again.status, means[0]) == (0, means[1])

@@ -57,3 +57,50 @@ def test_what_is_no_deformation_raises_no_question(tmp_path, local):
     path.write_text("\n".join([lines[0], *rows]))
     data = tq.read_experiment(path, dimensions=SIZES)
     np.testing.assert_allclose(data.stretch - 1, MACHINE_STRAIN * (STRETCH - 1), atol=1e-8)
+
+
+DISTANCE = 812.0
+"""Of the undeformed marks, px."""
+
+
+@pytest.mark.parametrize(
+    "name", ["Marker distance (px)", "Distance [pixels]", "Video extensometer (px)", "Markerabstand / Pixel", "d [px]"]
+)
+@pytest.mark.parametrize("stated", ["", "812 px", "812 pixel"])
+def test_distances_of_marks_in_pixels_over_the_undeformed_one_are_stretches(tmp_path, name, stated):
+    stretch = np.linspace(1, 1.3, 40)
+    path = tmp_path / "test.csv"
+    columns = DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
+    path.write_text("\n".join([f"{name};Force (N)", *map("{:.9f};{:.9f}".format, *columns)]))
+    data = tq.read(path, area="10 mm2", length=stated or None)
+    np.testing.assert_allclose(data.stretch, stretch, rtol=1e-9)
+    np.testing.assert_allclose(data.stress, columns[1] / 10, atol=1e-9)
+    assert f"/ 812 px (undeformed: {'as given' if stated else 'in its first row'})" in data.source
+
+
+def test_distances_in_pixels_that_begin_under_load_are_asked_about_and_the_advice_reads_them(tmp_path):
+    stretch = np.linspace(1.1, 1.3, 40)
+    path = tmp_path / "test.csv"
+    columns = DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
+    path.write_text("\n".join(["Gauge length: 20 mm", "Marks (px);Force (N)", *map("{:.9f};{:.9f}".format, *columns)]))
+    with pytest.raises(
+        InputError, match=r"with 3\d% of the largest load. Give the undeformed distance in pixels: --length"
+    ):
+        tq.read(path, area="10 mm2")
+    np.testing.assert_allclose(tq.read(path, area="10 mm2", length="812 px").stretch, stretch, rtol=1e-9)
+    with pytest.raises(InputError, match=r'so must be the undeformed one: give it as --length "893.2 px"'):
+        tq.read(path, area="10 mm2", length="20 mm")
+
+
+def test_pixels_beside_the_displacement_of_the_machine_are_asked_about(tmp_path):
+    stretch = np.linspace(1, 1.3, 40)
+    path = tmp_path / "test.csv"
+    columns = 25 * (stretch - 1), DISTANCE * stretch, 10 * 0.05 * (stretch - stretch**-2)
+    rows = [",".join(map("{:.9f}".format, row)) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join(["Displacement (mm),Marker distance (px),Force (N)", *rows]))
+    with pytest.raises(InputError, match=r'--column length="Marker distance \(px\)"'):
+        tq.read(path, area="10 mm2", length="20 mm")
+    data = tq.read(path, area="10 mm2", columns={"length": "Marker distance (px)"})
+    np.testing.assert_allclose(data.stretch, stretch, rtol=1e-9)
+    with pytest.raises(InputError, match=r"read as --column length=NAME"):
+        tq.read(path, area="10 mm2", columns={"displacement": "Marker distance (px)"}, length="20 mm")

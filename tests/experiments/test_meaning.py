@@ -177,6 +177,16 @@ def test_what_a_rheometer_sheared_is_not_read_as_tension(tmp_path):
     check(path, "simple-shear", L - 1, mode="simple-shear")
 
 
+@pytest.mark.parametrize("beside", ["Normal force", "Normalkraft", "Gap", "Torque"])
+def test_strains_and_stresses_beside_what_a_rheometer_writes_are_asked_about(tmp_path, beside):
+    head = f"Time (s),Strain (%),Stress (Pa),{beside}"
+    path = written(tmp_path, "export.csv", head, L, 100 * (L - 1), 1000 * P, P)
+    with pytest.raises(InputError, match=rf"{beside}'.* --mode simple-shear.* --mode uniaxial"):
+        tq.read_tests(path)
+    check(path, "simple-shear", L - 1, mode="simple-shear")
+    check(path, "uniaxial", mode="uniaxial")
+
+
 def test_components_of_tensors_are_of_axes_once_their_measures_are_said(tmp_path):
     across = 1 + (L - 1) / 2
     path = written(

@@ -54,3 +54,101 @@ def test_a_gap_with_tension_positive_is_not_turned(tmp_path):
     force = AREA * neo_hookean(BOTH_WAYS)
     with pytest.raises(InputError, match=r"already negative in the file\. Leave out"):
         read(tmp_path, "Gap (mm)", LENGTH * BOTH_WAYS, force, compression_positive=True)
+
+
+TENSION = np.linspace(1, 1.3, 40)
+
+
+@pytest.mark.parametrize(("turn", "sign", "sign_of_load"), [("load", 1, -1), ("deformation", -1, 1), ("both", -1, -1)])
+@pytest.mark.parametrize("stretch", [TENSION, BOTH_WAYS], ids=["tension", "both ways"])
+def test_signs_are_turned_as_asked(tmp_path, turn, sign, sign_of_load, stretch):
+    stress = neo_hookean(stretch)
+    deformation, force = sign * LENGTH * (stretch - 1), sign_of_load * AREA * stress
+    data = read(tmp_path, "Displacement (mm)", deformation, force, turn=turn)
+    np.testing.assert_allclose(data.stretch, stretch, atol=1e-8)
+    np.testing.assert_allclose(data.stress, stress, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["Displacement (mm)", "Stretch"])
+def test_the_message_on_tension_with_negative_loads_names_the_option_that_reads_it(tmp_path, name):
+    stress = neo_hookean(TENSION)
+    deformation = TENSION if name == "Stretch" else LENGTH * (TENSION - 1)
+    path = tmp_path / "test.csv"
+    path.write_text("\n".join([f"{name},Force (N)", *map("{:.9f},{:.9f}".format, deformation, -AREA * stress)]))
+    sizes = {"area": "300 mm2"} if name == "Stretch" else SIZES
+    with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
+        tq.read(path, dimensions=sizes)
+    np.testing.assert_allclose(tq.read(path, dimensions=sizes, turn="load").stress, stress, atol=1e-8)
+
+
+def test_shear_of_the_other_sign_is_turned(tmp_path):
+    shear = np.linspace(0, 0.4, 30)
+    path = tmp_path / "test.csv"
+    path.write_text("\n".join(["Shear,Stress (kPa)", *map("{:.9f},{:.9f}".format, shear, -40 * shear)]))
+    with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
+        tq.read(path, mode="simple-shear")
+    for turn, sign in (("load", 1), ("deformation", -1)):
+        data = tq.read(path, mode="simple-shear", turn=turn)
+        np.testing.assert_allclose(data.stretch, sign * shear, atol=1e-9)
+        np.testing.assert_allclose(data.stress, sign * 0.04 * shear, atol=1e-12)
+
+
+def test_both_loads_of_a_sheet_are_turned(tmp_path):
+    stress = 0.04 * (TENSION - TENSION**-5)
+    columns = [TENSION, -1e3 * stress, TENSION, -1e3 * stress]
+    path = tmp_path / "test.csv"
+    rows = [",".join(map("{:.9f}".format, row)) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join(["stretch x,stress x (kPa),stretch y,stress y (kPa)", *rows]))
+    with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
+        tq.read(path)
+    np.testing.assert_allclose(tq.read(path, turn="load").stress, np.column_stack([stress, stress]), atol=1e-9)
+    with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
+        tq.read(path, compression_positive=True)
+
+
+def test_negative_numbers_of_a_test_that_is_called_tension_are_asked_about(tmp_path):
+    path = tmp_path / "tension.csv"
+    columns = -LENGTH * (TENSION - 1), -AREA * neo_hookean(TENSION)
+    path.write_text("\n".join(["Displacement (mm),Force (N)", *map("{:.9f},{:.9f}".format, *columns)]))
+    with pytest.raises(InputError, match=r"turn='both' \(--turn both\).*--tension-positive"):
+        tq.read(path, dimensions=SIZES)
+    np.testing.assert_allclose(tq.read(path, dimensions=SIZES, turn="both").stretch, TENSION, atol=1e-8)
+    assert tq.read(path, dimensions=SIZES, compression_positive=False).stretch.max() == 1
+
+
+def test_what_cannot_be_turned_and_a_turn_that_is_wrong_are_refused(tmp_path):
+    stress = neo_hookean(TENSION)
+    with pytest.raises(InputError, match=r"turn \(--turn\) must be one of load, deformation, both"):
+        read(tmp_path, "Displacement (mm)", TENSION - 1, stress, turn="stress")
+    with pytest.raises(InputError, match="give one of them"):
+        read(tmp_path, "Displacement (mm)", TENSION - 1, stress, turn="load", compression_positive=True)
+    with pytest.raises(InputError, match=r"--turn load: turn others, or leave it out"):
+        read(tmp_path, "Displacement (mm)", LENGTH * (TENSION - 1), AREA * stress, turn="load")
+    with pytest.raises(InputError, match=r"has no other sign: turn the load alone"):
+        read(tmp_path, "Gap (mm)", LENGTH * TENSION, -AREA * stress, turn="both")
+
+
+@pytest.mark.parametrize(
+    ("load_zero", "unit", "scale"),
+    [("first", "N", 1.0), ("0.5 N", "N", 1.0), ("500 mN", "N", 1.0), ("0.5 N", "mN", 1e3), ("first", "mN", 1e3)],
+)
+def test_what_a_load_cell_reads_without_load_is_taken_off(tmp_path, load_zero, unit, scale):
+    stress = neo_hookean(TENSION)
+    path = tmp_path / "test.csv"
+    columns = LENGTH * (TENSION - 1), scale * (AREA * stress + 0.5)
+    path.write_text("\n".join([f"Displacement (mm),Force ({unit})", *map("{:.9f},{:.9f}".format, *columns)]))
+    data = tq.read(path, dimensions=SIZES, load_zero=load_zero)
+    np.testing.assert_allclose(data.stress, stress, atol=1e-8)
+    assert "counted from" in data.source
+
+
+def test_the_zero_of_stresses_is_taken_off_and_inspect_proposes_it(tmp_path):
+    stress = neo_hookean(TENSION)
+    path = tmp_path / "test.csv"
+    path.write_text("\n".join(["Stretch,Stress (kPa)", *map("{:.9f},{:.9f}".format, TENSION, 1e3 * stress + 6)]))
+    assert "--load-zero first takes off" in " ".join(str(tq.inspect(path)).split())
+    for load_zero in ("first", "6 kPa", "0.006 MPa"):
+        np.testing.assert_allclose(tq.read(path, load_zero=load_zero).stress, stress, atol=1e-9)
+    for wrong in ("6", "six", "6 N", "6 mm"):
+        with pytest.raises(InputError, match=r"load_zero \(--load-zero\) must be 'first', or a stress"):
+            tq.read(path, load_zero=wrong)

@@ -243,8 +243,60 @@ def test_sizes_in_one_line_are_read_between_semicolons_and_commas(tmp_path):
 def test_a_product_of_sizes_is_not_quoted_as_one_of_them(tmp_path, product):
     text = rows(LENGTH * (STRETCH - 1), forces(5), separator=",")
     path = written(tmp_path, f"Specimen {product}\nDisplacement (mm),Force (N)\n{text}")
-    with pytest.raises(InputError, match="None is recognised in the file"):
+    with pytest.raises(InputError, match=r'if that is the area, give --area "10 mm2"\.'):
         tq.read(path, dimensions={"length": "20 mm"})
+    np.testing.assert_allclose(tq.read(path, length="20 mm", area="10 mm2").stress, STRESS, rtol=1e-6)
+    np.testing.assert_allclose(tq.read(path, length="20 mm", area=product).stress, STRESS, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        "Cross-section: 5 x 2 mm",
+        "Cross-section 5 × 2 mm",
+        "cross section (mm): 5mm x 2mm",
+        "Querschnitt: 0,5 x 0,2 cm",
+        "Width x thickness: 5 x 2 mm",
+        "b x h [mm]: 5 x 2",
+        "Length x width x thickness: 20 x 5 x 2 mm",
+    ],
+)
+def test_a_product_that_is_called_a_cross_section_or_its_sides_is_read(tmp_path, stated):
+    path = written(tmp_path, f"{stated}\n{TABLE}{MEASURED}")
+    data = tq.read(path) if stated.startswith("Length") else tq.read(path, length="20 mm")
+    np.testing.assert_allclose(data.stress, STRESS, rtol=1e-6)
+    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-6)
+
+
+def test_a_width_that_is_a_product_is_refused_and_as_an_area_it_is_read(tmp_path):
+    path = written(tmp_path, TABLE + MEASURED)
+    with pytest.raises(InputError, match=r"two sides of a cross-section: give it as area \(--area\)"):
+        tq.read(path, length="20 mm", width="5 x 2 mm", thickness="2 mm")
+
+
+@pytest.mark.parametrize("name", ["Force per width (N/m)", "Tension [N/m]", "Line load (N/m)", "Force (N/m)"])
+@pytest.mark.parametrize("stated", ["Thickness: 2 mm", "Width x thickness: 5 x 2 mm", ""])
+def test_a_force_per_width_over_the_thickness_is_a_stress(tmp_path, name, stated):
+    # In N/m it is 1000 times the stress in MPa times the thickness in mm.
+    text = rows(STRETCH, 1e3 * STRESS * THICKNESS)
+    path = written(tmp_path, f"{stated}\nStretch;{name}\n{text}")
+    if not stated:
+        with pytest.raises(InputError, match=r'give the undeformed thickness \(--thickness "2 mm"\)'):
+            tq.read(path)
+    data = tq.read(path) if stated else tq.read(path, thickness="2 mm")
+    np.testing.assert_allclose(data.stress, STRESS, rtol=1e-6, atol=1e-9)
+    taut = tq.read(path, preload="8 N/m", **({} if stated else {"thickness": "2 mm"}))
+    assert taut.stress[0] >= 8e-3 / 2
+    assert len(taut) < len(data)
+
+
+def test_the_options_that_a_force_per_width_does_not_need_are_refused(tmp_path):
+    path = written(tmp_path, f"Stretch;Force per width (N/m)\n{rows(STRETCH, 2e3 * STRESS)}")
+    with pytest.raises(InputError, match="leave area out"):
+        tq.read(path, area="10 mm2")
+    with pytest.raises(InputError, match=r"--column force=NAME. and give the undeformed thickness"):
+        tq.read(path, stress=2, stress_unit="N/m")
+    np.testing.assert_allclose(tq.read(path, force=2, thickness="2 mm").stress, STRESS, rtol=1e-6, atol=1e-9)
 
 
 def test_all_sizes_that_are_missing_are_asked_for_at_once_and_the_advice_reads_the_file(tmp_path):

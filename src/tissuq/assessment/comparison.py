@@ -16,8 +16,9 @@ from tissuq.assessment.sensitivity import SCALE_FACTORS
 from tissuq.assessment.stability import is_calibrated
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import StressUnit, headed, in_unit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.inference.solution import Marginals, Solution
 from tissuq.prediction.bands import predict_average, stress_ratio

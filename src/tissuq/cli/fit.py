@@ -19,6 +19,7 @@ from tissuq.studies.settings import load_settings, setting_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.mechanics import Material
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
@@ -121,7 +122,8 @@ def fit(
         "estimand": estimand, "tolerances": reading.tolerances(tolerance), "stable_in": stable_in or None,
         "held_out": held_out,
     }  # fmt: skip
-    options |= reading.measured([] if config else files, read_as, mode, specimen, noise_sd)
+    measured, found = reading.measured([] if config else files, read_as, mode, specimen, noise_sd)
+    options |= measured
     if prior:
         options["priors"] = once_each("--prior", map(parse_prior, prior))
     if not file and not config:
@@ -143,32 +145,46 @@ def fit(
     target = out or Path("runs") / reading.run_name(file or [], config, sources)
     check_target(target, force=force)
     fit_all = _compare_laws if is_comparison else _fit_one
-    fit_all(settings, beside, own, sources, target, figures=figures, force=force)
+    fit_all(settings, beside, own, found, sources, target, figures=figures, force=force)
 
 
 def _fit_one(
-    settings: Any, beside: Path, own: dict[str, Material], sources: list[Path], target: Path, **options: bool
+    settings: Any,
+    beside: Path,
+    own: dict[str, Material],
+    found: list[Reading],
+    sources: list[Path],
+    target: Path,
+    **options: bool,
 ) -> None:
     """Fit one material, write the run and print its summary."""
     from tissuq.cli.tables import print_summary
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import run_specimen
 
-    run = partial(run_specimen, settings, beside, law=next(iter(own.values()), None))
+    run = partial(run_specimen, settings, beside, law=next(iter(own.values()), None), found=found)
     study = _written(run, write_specimen_run, sources, target, **options)
     print_summary(target, study.experiment)
     _print_omissions(study)
 
 
 def _compare_laws(
-    settings: Any, beside: Path, own: dict[str, Material], sources: list[Path], target: Path, **options: bool
+    settings: Any,
+    beside: Path,
+    own: dict[str, Material],
+    found: list[Reading],
+    sources: list[Path],
+    target: Path,
+    **options: bool,
 ) -> None:
     """Fit several laws, write the run and print their table."""
     from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
     from tissuq.studies.laws import run_laws
 
-    study = _written(partial(run_laws, settings, beside, own=own), write_law_run, sources, target, **options)
+    study = _written(
+        partial(run_laws, settings, beside, own=own, found=found), write_law_run, sources, target, **options
+    )
     problems = [warning for warning in study.warnings if warning.severity is Severity.PROBLEM]
     print_warnings(problems)
     print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))

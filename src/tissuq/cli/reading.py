@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
 
 __all__ = [
+    "DIMENSIONS",
+    "OPTIONS",
     "Mode",
     "files_of",
     "find_tests",
@@ -27,6 +29,7 @@ __all__ = [
     "reads_files",
     "resolve",
     "run_name",
+    "settings_of",
     "tolerances",
 ]
 
@@ -93,6 +96,14 @@ OPTIONS: dict[str, Any] = {
         bool | None,
         typer.Option("--compression-positive/--tension-positive", help="Which the file counts as positive [its sign]."),
     ],
+    "turn": Annotated[
+        str | None,
+        typer.Option(help="Signs to change: load (of a cell that counts tension as negative), deformation or both."),
+    ],
+    "load_zero": Annotated[
+        str | None,
+        typer.Option(help="What the load cell reads without load ('0.02 N'), or first: the load of the first row."),
+    ],
     "cycle": Annotated[str | None, typer.Option(help="Use only this cycle: first, last or its number [all].")],
     "branch": Annotated[str | None, typer.Option(help="Use only loading or unloading [both].")],
     "compliance": Annotated[
@@ -142,7 +153,7 @@ def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = 
     @wraps(command)
     def reading(**arguments: Any) -> None:
         values = {name: arguments.pop(names[name]) for name in OPTIONS}
-        command(**arguments, read_as=_settings(values))
+        command(**arguments, read_as=settings_of(values))
 
     reading.__signature__ = signature.replace(  # type: ignore[attr-defined]  # what Typer reads
         parameters=[*parameters[:position], *options, *parameters[position + 1 :]]
@@ -150,7 +161,7 @@ def reads_files(command: Callable[..., None], names: Mapping[str, str] | None = 
     return reading
 
 
-def _settings(values: dict[str, Any]) -> dict[str, Any]:
+def settings_of(values: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of a file's reading for the options' values by name."""
     dimensions = {name: values.pop(name) for name in DIMENSIONS}
     columns = once_each("--column", map(_role, values.pop("column") or []))
@@ -214,8 +225,10 @@ def measured(
     modes: Sequence[str] | None,
     specimens: Sequence[str] | None,
     noise_sd: str | None,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], list[Reading]]:
     """Return the settings of a fit that say what was measured: of the only test, or of each of several.
+
+    And what has been read of every test.
 
     Raises
     ------
@@ -227,19 +240,20 @@ def measured(
 
     noise = _numbers(noise_sd)
     if not files:
-        return reading | {"noise_sd": noise[0] if noise else None}
+        return reading | {"noise_sd": noise[0] if noise else None}, []
     of_files = [
         find_tests(file, reading | {"mode": mode}, is_only_file=len(files) == 1)
         for file, mode in zip(files, _modes(files, modes), strict=True)
     ]
     tests, counts = [settings for of_file in of_files for settings, _ in of_file], list(map(len, of_files))
+    found = [of_test for of_file in of_files for _, of_test in of_file]
     if len(tests) == 1:
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
-        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}
+        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, found
     if len(tests) > len(files):
-        print(*lines_of_tests([Inspection.of(of_test) for of_file in of_files for _, of_test in of_file]), "", sep="\n")
+        print(*lines_of_tests(list(map(Inspection.of, found))), "", sep="\n")
     stated_noise = noise if noise and len(noise) > 1 else None
     for name, option, values in (
         ("mode", "--mode", modes), ("specimen", "--specimen", specimens), ("noise_sd", "--noise-sd", stated_noise)
@@ -252,7 +266,7 @@ def measured(
             f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for each "
             f"file, in their order ({', '.join(loading_modes())})."
         )
-    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}
+    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}, found
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

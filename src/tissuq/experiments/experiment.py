@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
+from tissuq.experiments.checked_arrays import checked, checked_points, in_mpa
 from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
 from tissuq.experiments.picture import draw_curves, small_svg
-from tissuq.experiments.units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["Curve", "Experiment", "checked_points"]
+__all__ = ["Curve", "Experiment"]
 
 FloatArray = NDArray[np.float64]
 
@@ -43,6 +43,7 @@ class Curve:
     name, source, stress_unit, specimen : str
         Those of the test.
     least_errors : mapping of str to float
+    direction, condition : str
         Those of the test.
     """
 
@@ -56,6 +57,8 @@ class Curve:
     stress_unit: str
     specimen: str
     least_errors: Mapping[str, float] = field(default_factory=dict)
+    direction: str = ""
+    condition: str = ""
 
     def __len__(self) -> int:
         return len(self.stress)
@@ -113,6 +116,8 @@ class Experiment:
         Standard deviations that errors of the test have at least, as the measurements themselves show, by their names
         in `tissuq.Tolerances`: ``{"slack": 0.01}`` where load begins at a stretch known to 0.01. Unless tolerances are
         stated as numbers, those of a fit are as large. The attribute is of several tests the largest ones.
+    direction, condition : str
+        In which direction of the tissue the specimen was loaded, and its state or treatment, in words.
 
     Attributes
     ----------
@@ -154,10 +159,12 @@ class Experiment:
         specimen: str = "",
         standard_error: ArrayLike | None = None,
         least_errors: Mapping[str, float] | None = None,
+        direction: str = "",
+        condition: str = "",
     ) -> None:
         mode = loading_mode(mode)
-        values, unit = _in_mpa(stress, stress_unit)
-        points, stresses = checked_points(mode, stretch), _checked("stress", values, mode.stresses)
+        values, unit = in_mpa(stress, stress_unit)
+        points, stresses = checked_points(mode, stretch), checked("stress", values, mode.stresses)
         if len(points) != len(stresses):
             raise InputError(
                 f"experiment '{name}': {len(points)} stretches but {len(stresses)} stresses; "
@@ -165,12 +172,15 @@ class Experiment:
             )
         errors = np.zeros_like(stresses)
         if standard_error is not None:
-            errors = _checked("standard error", _in_mpa(standard_error, stress_unit)[0], mode.stresses)
+            errors = checked("standard error", in_mpa(standard_error, stress_unit)[0], mode.stresses)
             if errors.shape != stresses.shape or (errors < 0).any():
                 raise InputError(f"experiment '{name}': give one standard error for every stress, none negative.")
         columns = zip(stresses.reshape(len(stresses), -1).T, errors.reshape(len(stresses), -1).T, strict=True)
         labels, least = (name, source, unit, specimen), dict(least_errors or {})
-        curves = tuple(Curve(mode, channel, points, *column, *labels, least) for channel, column in enumerate(columns))
+        curves = tuple(
+            Curve(mode, channel, points, *column, *labels, least, direction, condition)
+            for channel, column in enumerate(columns)
+        )
         object.__setattr__(self, "curves", curves)
 
     @classmethod
@@ -290,6 +300,16 @@ class Experiment:
         return self.curves[0].specimen if len(self.tests) == 1 else ""
 
     @property
+    def direction(self) -> str:
+        """In which direction of the tissue it was loaded; of several tests see that of each."""
+        return self.curves[0].direction if len(self.tests) == 1 else ""
+
+    @property
+    def condition(self) -> str:
+        """The state or the treatment of the specimen; of several tests see that of each."""
+        return self.curves[0].condition if len(self.tests) == 1 else ""
+
+    @property
     def least_errors(self) -> dict[str, float]:
         """Standard deviations that errors of the tests have at least, by their names: the largest of all tests."""
         pairs = [pair for curve in self.curves for pair in curve.least_errors.items()]
@@ -363,7 +383,7 @@ class Experiment:
         return mode.paths[channel].at(points, next(curves, UNMEASURED))
 
     def labelled(self, **labels: str) -> Experiment:
-        """Return the same measurements with another name, source, specimen, or stress_unit to read them in."""
+        """Return the same measurements with another name, source, specimen, direction or condition, or unit to read."""
         return self._of_curves(replace(curve, **labels) for curve in self.curves)  # type: ignore[arg-type]  # strings
 
     def where(self, selected: NDArray[Any]) -> Experiment:
@@ -405,74 +425,6 @@ class Experiment:
             for test in (self, experiment)
         ]
         stretch, stress, error = map(np.concatenate, zip(*columns, strict=True))
-        joined = Experiment(
-            self.mode,
-            stretch,
-            stress,
-            self.name,
-            self.source,
-            specimen=self.specimen,
-            standard_error=error,
-            least_errors=self.least_errors,
-        )
-        return joined.labelled(stress_unit=self.stress_unit)
-
-
-def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
-    """Return points of a mode as an array (n,), or (n, c) where the mode has c controls.
-
-    Raises
-    ------
-    InputError
-        When it is not of this shape, or holds what is no value of a control.
-    """
-    checked = _checked("stretch", _magnitude(points, "dimensionless"), [control.name for control in mode.controls])
-    for control, column in zip(mode.controls, checked.reshape(len(checked), -1).T, strict=True):
-        low = np.flatnonzero(column <= control.above)
-        if len(low):
-            raise InputError(
-                f"{control.name} {column[low[0]]:g} at position {low[0]} is not positive. "
-                "A stretch is deformed over undeformed length; if this is a strain, add 1."
-            )
-    return checked
-
-
-def _in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
-    """Return stresses in MPa, and the unit in which people want to read them."""
-    if is_quantity(stress):
-        return _magnitude(stress, "megapascal"), stress_unit_of(unit or unit_of(stress)).name
-    given = stress_unit_of(unit or "MPa")
-    return _numbers("stress", stress) * given.to_mpa, given.name
-
-
-def _magnitude(values: Any, unit: str) -> Any:
-    """Return a quantity of pint as numbers in a unit; anything else as it is."""
-    if not is_quantity(values):
-        return values
-    if not values.is_compatible_with(unit):
-        raise InputError(f"values in '{values.units}' were given where {unit} was expected.")
-    return values.to(unit).magnitude
-
-
-def _numbers(name: str, values: Any) -> FloatArray:
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be an array of numbers: {error}.") from error
-
-
-def _checked(name: str, values: Any, columns: Sequence[str]) -> FloatArray:
-    """Return an array of finite numbers, (n,) or with several columns (n, k), that cannot be changed."""
-    array = _numbers(name, values)
-    count = len(columns)
-    if array.ndim != min(count, 2) or not array.size or array.shape[1:] != (count,)[: array.ndim - 1]:
-        form = f"an array with {count} columns ({', '.join(columns)})" if count > 1 else "a one-dimensional array"
-        raise InputError(f"{name} must be {form} with values, not of shape {array.shape}.")
-    for column, numbers in zip(columns, array.reshape(len(array), -1).T, strict=True):
-        bad = np.flatnonzero(~np.isfinite(numbers))
-        if len(bad):
-            raise InputError(
-                f"{column} is {numbers[bad[0]]} at position {bad[0]}; every value must be a finite number."
-            )
-    array.flags.writeable = False
-    return array
+        labels = {name: getattr(self, name) for name in ("name", "source", "specimen", "direction", "condition")}
+        joined = Experiment(self.mode, stretch, stress, standard_error=error, least_errors=self.least_errors)
+        return joined.labelled(stress_unit=self.stress_unit, **labels)

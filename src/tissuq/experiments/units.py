@@ -1,56 +1,42 @@
-"""Units as laboratories write them, and numbers with them: stress in MPa, plain strain, length, area and force."""
+"""Units as laboratories write them: of stress in MPa, of strain as a plain ratio, of length, area, force and others."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from math import isfinite, nan, pi
-from typing import TYPE_CHECKING, Any
+from math import pi, prod
+from typing import Any
 
 from tissuq.errors import InputError
-
-if TYPE_CHECKING:
-    import pandas as pd
+from tissuq.experiments.numbers import number_and_unit, sides_and_unit
+from tissuq.experiments.unit_spellings import SPELLINGS, SYMBOLS, in_latin
 
 __all__ = [
     "ANGLE",
     "AREA",
     "BRACKETS",
     "FORCE",
-    "GROUPED",
+    "FORCE_PER_WIDTH",
     "LENGTH",
     "MASSES",
-    "MEAN_WITH_SPREAD",
-    "NUMBER",
+    "PIXELS",
     "PRESSURE",
     "RATE",
     "TIME",
     "TORQUE",
     "Quantity",
     "StressUnit",
-    "headed",
-    "in_unit",
     "is_quantity",
     "looks_like_unit",
     "measured_in",
-    "number_and_unit",
-    "number_in",
     "strain_factor",
     "stress_in_mpa",
     "stress_unit",
     "stress_units_in",
     "unit_of",
 ]
-
-NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?")
-GROUPED = {
-    ",": re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d*)?"),
-    ".": re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+(?:,\d+)?"),
-}
-"""Numbers with a mark between thousands, by that mark; with one mark in all they may be decimal numbers as well."""
-MEAN_WITH_SPREAD = re.compile(rf"({NUMBER.pattern})\s*(?:±|\+/?[-−])\s*({NUMBER.pattern})")
 
 COMMON_STRESS_UNITS = {
     "Pa": 1e-6,
@@ -77,9 +63,6 @@ STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
 STRAIN_UNITS |= dict.fromkeys(["‰", "permille", "mε", "millistrain"], 1e-3)
 STRAIN_UNITS |= dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
 
-SPELLINGS = dict.fromkeys(["micron", "microns", "micrometer", "micrometre"], "um") | {"inch": "in", "inches": "in"}
-SPELLINGS |= {"lbf": "lbf", "kgf": "kgf", "newton": "N", "newtons": "N", "millimeter": "mm", "millimetre": "mm"}
-"""Units in other spellings, in small letters."""
 LONGEST_UNIT = 40
 """Characters."""
 UNIT_EXPRESSION = re.compile(
@@ -87,35 +70,14 @@ UNIT_EXPRESSION = re.compile(
 )
 """Products, quotients and powers of names, and no arithmetic of numbers, which could take for ever."""
 
-SYMBOLS = (
-    {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
-    | {"bar", "mbar", "atm", "mmHg", "mmhg", "Hg", "torr", "Torr", "cmH2O", "mmH2O"}
-    | {"N", "mN", "uN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lbF", "lb", "kg", "g"}
-    | {
-        "m",
-        "cm",
-        "mm",
-        "um",
-        "micron",
-        "nm",
-        "in",
-        "inch",
-        "ft",
-        "h",
-        "min",
-        "sec",
-        "Sec",
-        "s",
-        "ms",
-        "Hz",
-        "K",
-        "C",
-        "F",
-    }
-    | {"Nm", "mNm", "uNm", "nNm", "kNm", "Ncm", "mNcm", "Nmm", "mNmm"}
-    | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
+POWER_OF_TEN = re.compile(
+    r"(?:10\s*(?:(?:\^|\*\*)\s*\(?(?P<power>[+-]?\d+)\)?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+))|1[eE](?P<digits>[+-]?\d+))"
+    r"\s*[*·⋅]?\s*(?P<unit>[^\W\d].*)"
 )
-
+"""Before a unit that is multiplied by it, as in ``10^-2 MPa``; ``x 10^-2`` may be of the numbers instead."""
+RAISED = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-0123456789")
+LARGEST_POWER = 12
+"""Exponent of ten before a unit, at most."""
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
 SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
@@ -157,39 +119,34 @@ def stress_unit(text: str) -> StressUnit:
     0.001
     >>> stress_unit("N/mm²")
     StressUnit(name='N/mm²', to_mpa=1.0)
+    >>> stress_unit("10^-2 MPa").to_mpa
+    0.01
     """
     name = str(text).strip()
-    compact = re.sub(r"\s+|\^|\*\*", "", name).replace("²", "2")
+    multiple, unit = _without_power(name)
+    if multiple != 1:
+        return StressUnit(name, multiple * stress_unit(unit).to_mpa)
+    compact = _compact(name)
     if compact == "mPa":
         raise InputError("'mPa' is the millipascal; write MPa for megapascal, or millipascal in full.")
     if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
     factor = COMMON_STRESS_UNITS.get(compact)
-    return StressUnit(name, _factor_from_pint(name) if factor is None else factor)
+    return StressUnit(name, _factor_from_pint(in_latin(name)) if factor is None else factor)
 
 
-def in_unit(table: pd.DataFrame, columns: Sequence[str], unit: str) -> pd.DataFrame:
-    """Return a table whose columns in MPa are in another unit of stress, which stands at the head of the columns.
-
-    Raises
-    ------
-    InputError
-        When it is no unit of stress.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> print(in_unit(pd.DataFrame({"stretch": [1.1], "low": [0.002]}), ["low"], "kPa"))
-    stresses in kPa  stretch  low
-    0                    1.1  2.0
-    """
-    given = stress_unit(unit)
-    return headed(table.assign(**{name: table[name] / given.to_mpa for name in columns}), given)
+def _without_power(unit: str) -> tuple[float, str]:
+    """Return the power of ten before a unit, 1 where there is none, and the unit."""
+    match = POWER_OF_TEN.fullmatch(unit.strip())
+    if not match:
+        return 1.0, unit
+    power = int(match["power"] or match["digits"] or match["raised"].translate(RAISED))
+    return (float(f"1e{power}"), match["unit"]) if abs(power) <= LARGEST_POWER else (1.0, unit)
 
 
-def headed(table: pd.DataFrame, unit: StressUnit) -> pd.DataFrame:
-    """Return a table with the unit of its stresses at the head of its columns, as their name."""
-    return table.rename_axis(columns=f"stresses in {unit.name}")
+def _compact(unit: str) -> str:
+    """Return a unit of stress without blanks and marks of powers, in Latin letters."""
+    return re.sub(r"\s+|\^|\*\*", "", in_latin(unit)).replace("²", "2")
 
 
 def stress_in_mpa(stress: Any) -> Any:
@@ -228,7 +185,7 @@ def strain_factor(text: str) -> float:
     >>> strain_factor("%"), strain_factor("mm/m")
     (0.01, 0.001)
     """
-    compact = re.sub(r"\s+", "", str(text)).lower()
+    compact = re.sub(r"\s+", "", in_latin(str(text))).lower()
     if compact in STRAIN_UNITS:
         return STRAIN_UNITS[compact]
     length, _, over = compact.partition("/")
@@ -250,8 +207,10 @@ class Quantity:
 
     def factor_or_none(self, text: str) -> float | None:
         """Return what one unit of that name is in the unit of this quantity; None for other quantities."""
-        compact = re.sub(self.ignored, "", text).replace("µ", "u").replace("μ", "u").replace("²", "2")
-        return self.factors.get(SPELLINGS.get(compact.lower(), compact))
+        multiple, unit = _without_power(text)
+        compact = re.sub(self.ignored, "", in_latin(unit)).replace("µ", "u").replace("μ", "u").replace("²", "2")
+        factor = self.factors.get(SPELLINGS.get(compact.lower(), compact))
+        return None if factor is None else factor * multiple
 
     def factor(self, text: str) -> float:
         """Return what one unit of that name is in the unit of this quantity.
@@ -269,12 +228,17 @@ class Quantity:
         factor = self.factor_or_none(text)
         if factor is None and self.name == "force" and text in MASSES:
             raise InputError(f"'{text}' is a mass, not a force; if the unit of force is meant, write {text}f.")
+        if factor is None and self.name == LENGTH.name and PIXELS.factor_or_none(text):
+            raise InputError(
+                f"'{text}' is no length. A distance between marks in pixels is read as --column length=NAME, with the "
+                'undeformed one (--length "812 px") where the test does not begin there.'
+            )
         if factor is None:
             raise InputError(f"'{text}' is not a unit of {self.name}; write one of {', '.join(self.factors)}.")
         return factor
 
     def value(self, text: str) -> float:
-        """Return a positive number with its unit, such as ``1.5 mm``, in the unit of this quantity.
+        """Return a positive number with its unit, such as ``1.5 mm``, or an area by its sides, in the unit of this.
 
         Raises
         ------
@@ -283,10 +247,15 @@ class Quantity:
 
         Examples
         --------
-        >>> LENGTH.value("1.5 cm")
-        15.0
+        >>> LENGTH.value("1.5 cm"), AREA.value("5 x 2 mm")
+        (15.0, 10.0)
         """
+        sides, unit_of_sides = sides_and_unit(text)
+        if len(sides) == 2 and min(sides) > 0 and self.name == AREA.name:
+            return prod(sides) * LENGTH.factor(unit_of_sides) ** 2
         number, unit = number_and_unit(text)
+        if len(sides) == 2 and self.name == LENGTH.name:
+            raise InputError(f"'{text}' is no length, but two sides of a cross-section: give it as area (--area).")
         if number is None or number <= 0:
             raise InputError(f"'{text}' is not a {self.name}; write a positive number with its unit: '10 {self.unit}'.")
         if not unit:
@@ -295,13 +264,26 @@ class Quantity:
 
 
 LENGTH = Quantity("length", "mm", {"mm": 1.0, "cm": 10.0, "m": 1e3, "um": 1e-3, "in": 25.4})
+PIXELS = Quantity("pixels", "px", dict.fromkeys(["px", "pixel", "pixels", "Pixel", "Pixels", "pix"], 1.0))
+"""Distances in pictures, which are lengths only in proportion to another one."""
 ANGLE = Quantity("angle", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "degrees": pi / 180})
 AREA = Quantity("area", "mm2", {f"{unit}2": factor**2 for unit, factor in LENGTH.factors.items()})
 FORCE = Quantity(
     "force",
     "N",
-    {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605},
+    {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
+    | {"cN": 1e-2, "dN": 0.1, "daN": 10.0, "hN": 100.0, "nN": 1e-9, "pN": 1e-12, "dyn": 1e-5},
 )
+FORCE_PER_WIDTH = Quantity(
+    "force per width",
+    "N/mm",
+    {
+        f"{force}/{length}": FORCE.factors[force] / LENGTH.factors[length]
+        for force in FORCE.factors
+        for length in LENGTH.factors
+    },
+)
+"""As of sheets and membranes, whose thickness makes it a stress."""
 TIME = Quantity("time", "s", {"s": 1.0, "sec": 1.0, "Sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0})
 RATE = Quantity(
     "rate",
@@ -327,7 +309,7 @@ TORQUE = Quantity(
 
 
 def measured_in(unit: str) -> str:
-    """Return what a usual unit is one of: stress, pressure, force, length, angle, torque, strain or time, or nothing.
+    """Return what a usual unit is one of, such as a stress, a pressure, a force, a length or a time; or nothing.
 
     Units that pressures and stresses share are those of a stress.
 
@@ -336,10 +318,10 @@ def measured_in(unit: str) -> str:
     >>> [measured_in(unit) for unit in ("kPa", "mmHg", "N", "mm", "%", "s", "V", "")]
     ['stress', 'pressure', 'force', 'length', 'strain', 'time', '', '']
     """
-    compact = re.sub(r"\s+|\^|\*\*", "", unit).replace("²", "2")
+    compact = _compact(_without_power(unit)[1])
     if compact in COMMON_STRESS_UNITS or compact.lower() in PASCALS:
         return "stress"
-    for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE):
+    for quantity in (FORCE, LENGTH, ANGLE, TORQUE, PRESSURE, FORCE_PER_WIDTH, PIXELS):
         if quantity.factor_or_none(compact) is not None:
             return quantity.name
     return (
@@ -349,18 +331,6 @@ def measured_in(unit: str) -> str:
         if TIME.factor_or_none(compact.lower())
         else ""
     )
-
-
-def number_in(cell: str) -> float:
-    """Return the number in a cell, written with a decimal point or comma; nan where it holds none, or no finite one."""
-    number = float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else nan
-    return number if isfinite(number) else nan
-
-
-def number_and_unit(text: str) -> tuple[float | None, str]:
-    """Return the number at the head of a text, if there is one, and what follows it."""
-    match = re.fullmatch(rf"\s*({NUMBER.pattern})\s*\[?\(?([^\d\s\[\]()][^\s\[\]()]*)?[\])]?\s*", text)
-    return (float(match[1].replace(",", ".")), match[2] or "") if match else (None, "")
 
 
 def is_quantity(values: Any) -> bool:
@@ -382,7 +352,7 @@ def unit_of(quantity: Any) -> str:
 
 def looks_like_unit(text: str) -> bool:
     """Tell whether a cell beneath a column name reads as a unit of anything: ``[kPa]``, ``%``, ``s``."""
-    text = text.strip()
+    text = in_latin(text.strip())
     if re.fullmatch(r"[\[({<].*[\])}>]|[%‰°1-]|", text):
         return True
     symbols = [
@@ -401,7 +371,7 @@ def stress_units_in(text: str) -> list[str]:
     >>> stress_units_in("Stress.kPa of the 2nd cycle"), stress_units_in("P in N/mm2"), stress_units_in("Pascal's test")
     (['kPa'], ['N/mm2'], [])
     """
-    words = re.findall(r"[^\W\d_]+(?:/[^\W\d_]+[2²])?", text.replace("^", ""))
+    words = re.findall(r"[^\W\d_]+(?:/[^\W\d_]+[2²])?", in_latin(text.replace("^", "")))
     return [word for word in words if word in COMMON_STRESS_UNITS or word.lower() in PASCALS.keys() - {"pa"}]
 
 
@@ -414,6 +384,11 @@ def _factor_from_pint(name: str) -> float:
             raise InputError(
                 f"'{name}' is a mass over an area, not a stress. If the unit of force is meant, write it as "
                 "a force: kgf/cm2, gf/mm2 or lbf/in2 (psi)."
+            )
+        if quantity is not None and quantity.check("[force] / [length]"):
+            raise InputError(
+                f"'{name}' is a force over a width, not a stress. Say that the column holds forces (--column "
+                "force=NAME) and give the undeformed thickness (--thickness)."
             )
         if quantity is not None and quantity.check("[force]"):
             raise InputError(

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Experiment, checked_points
+from tissuq.experiments.checked_arrays import checked_points
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.named import material_named

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.modulus import modulus_moments
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Experiment, checked_points
+from tissuq.experiments.checked_arrays import checked_points
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode, loading_modes
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.mechanics import Material

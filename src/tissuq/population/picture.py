@@ -32,8 +32,8 @@ SMALL_MARKS_ABOVE = 25
 
 def draw_specimens(drawn: Panels, population: Population, unit: StressUnit) -> None:
     """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order."""
-    symbols, summary = population.symbols, numbers_of(population.summary())
-    table = numbers_of(population.specimen_summary())
+    symbols, summary = population.symbols, numbers_of(population.summary(unit="MPa"))
+    table = numbers_of(population.specimen_summary(unit="MPa"))
     order = sorted(population.names, key=lambda name: table[name, symbols[0]]["median"])
     small, size = len(order) > SMALL_MARKS_ABOVE, relative_size()
     for number, (panel, symbol) in enumerate(zip(drawn.axes, symbols, strict=True)):

@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
+from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import headed, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.population.likelihoods import Coordinates
 from tissuq.population.patient import matching_draws, patient_curves, patient_posterior
-from tissuq.population.picture import draw_specimens, height_of, unit_factor
+from tissuq.population.picture import draw_specimens, height_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
 
@@ -157,13 +158,25 @@ class Population:
             )
         return tuple(sentences)
 
-    def summary(self, prob: float = 0.95) -> pd.DataFrame:
-        """Return median and interval of every pooled parameter (MPa), by partial and by complete pooling.
+    def unit(self, name: str | None = None) -> StressUnit:
+        """Return the unit of stress of that name, or that of the measurements; MPa where theirs differ."""
+        units = {posterior.unit().name for posterior in self.posteriors.values()}
+        return stress_unit(name or (units.pop() if len(units) == 1 else "MPa"))
+
+    def _unit_of(self, symbol: str, unit: StressUnit) -> float:
+        """Return what one unit of a parameter is in MPa, or in its own unit, where stresses are in a unit."""
+        parameters = self.complete.model.parameters
+        return unit.to_mpa if next(p for p in parameters if p.symbol == symbol).unit else 1.0
+
+    def summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
+        """Return median and interval of every pooled parameter, by partial and by complete pooling.
 
         Parameters
         ----------
         prob : float
             Probability inside the intervals.
+        unit : str, optional
+            Unit of stress; that of the measurements unless given, MPa where theirs differ.
 
         Returns
         -------
@@ -171,29 +184,32 @@ class Population:
             Indexed by parameter and quantity: ``median`` (of the population), ``spread`` (between specimens: sd of the
             logarithm, or of a parameter of either sign itself), ``new patient``, and ``complete pooling``, whose
             interval is one for specimens that were all the same: it is no range of patients. Columns median, hdi_low
-            and hdi_high.
+            and hdi_high; the unit of stresses stands at their head.
         """
         import pandas as pd
 
         _check_probability(prob)
         rows = {}
-        for index, symbol in enumerate(self.symbols):
+        for index, (symbol, is_log) in enumerate(zip(self.symbols, self.coordinates.is_log, strict=True)):
+            factor = self._unit_of(symbol, self.unit(unit))
             for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
-                rows[symbol, name] = _interval(draws[..., index], prob)
+                is_ratio = name == "spread" and is_log
+                rows[symbol, name] = np.array(_interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
             marginal = self.complete.marginals[symbol]
-            rows[symbol, "complete pooling"] = (float(marginal.quantile(0.5)), *marginal.hdi(prob))
-        return pd.DataFrame.from_dict(rows, orient="index", columns=INTERVAL_COLUMNS).set_index(
-            pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
-        )
+            rows[symbol, "complete pooling"] = np.array([marginal.quantile(0.5), *marginal.hdi(prob)]) / factor
+        index_of_rows = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
+        return headed(pd.DataFrame(list(rows.values()), index_of_rows, INTERVAL_COLUMNS), self.unit(unit))
 
-    def specimen_summary(self, prob: float = 0.95) -> pd.DataFrame:
-        """Return every specimen's parameters (MPa) from its separate fit and within the population.
+    def specimen_summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
+        """Return every specimen's parameters from its separate fit and within the population.
+
+        Parameters are those of `summary`.
 
         Returns
         -------
         pandas.DataFrame
             Indexed by specimen and parameter: median, hdi_low and hdi_high with partial pooling, and the same with no
-            pooling (``alone_median`` and so on).
+            pooling (``alone_median`` and so on); the unit of stresses stands at their head.
         """
         import pandas as pd
 
@@ -203,11 +219,11 @@ class Population:
             for column, symbol in enumerate(self.symbols):
                 marginal = posterior.marginals[symbol]
                 single = float(marginal.quantile(0.5)), *marginal.hdi(prob)
-                rows[name, symbol] = (*_interval(draws[..., i, column], prob), *single)
+                factor = self._unit_of(symbol, self.unit(unit))
+                rows[name, symbol] = np.array([*_interval(draws[..., i, column], prob), *single]) / factor
         index = pd.MultiIndex.from_tuples(rows, names=["specimen", "parameter"])
-        return pd.DataFrame(
-            list(rows.values()), index, [*INTERVAL_COLUMNS, *(f"alone_{end}" for end in INTERVAL_COLUMNS)]
-        )
+        columns = [*INTERVAL_COLUMNS, *(f"alone_{end}" for end in INTERVAL_COLUMNS)]
+        return headed(pd.DataFrame(list(rows.values()), index, columns), self.unit(unit))
 
     def correlations(self, prob: float = 0.95) -> pd.DataFrame:
         """Return the correlation between specimens of every pair of parameters, on the line of `coordinates`."""
@@ -228,6 +244,7 @@ class Population:
         channel: int = 0,
         discrepancy: bool = True,
         prob: float = 0.95,
+        unit: str | None = None,
     ) -> pd.DataFrame:
         """Return the engineering stress that is expected of a patient who has not been measured.
 
@@ -247,11 +264,13 @@ class Population:
             Add the model error to the material's stress.
         prob : float
             Probability between low and high, equal tails.
+        unit : str, optional
+            As of `summary`.
 
         Returns
         -------
         pandas.DataFrame
-            Columns stretch, median, low, high; MPa.
+            Columns stretch, median, low, high, with the unit of the latter at their head.
         """
         import pandas as pd
 
@@ -279,7 +298,8 @@ class Population:
                 "error there is unknown: predict nearer to the data, or with discrepancy=False."
             )
         low, median, high = np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
-        return pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
+        table = pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
+        return in_unit(table, ["median", "low", "high"], self.unit(unit).name)
 
     def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:
         """Draw the parameters of every specimen, by itself and within the population: a panel for each of `symbols`.
@@ -298,25 +318,13 @@ class Population:
         Axes, or (d,) array of Axes
         """
         with panels(ax, len(self.symbols), height=height_of(self, 0.8)) as drawn:
-            draw_specimens(drawn, self, stress_unit(unit or self._stress_unit))
+            draw_specimens(drawn, self, self.unit(unit))
         return drawn.result
 
     def _repr_html_(self) -> str:
         """Return the population's parameters in the unit of the measurements as a table, which notebooks show."""
-        unit = stress_unit(self._stress_unit)
-        is_log = dict(zip(self.symbols, self.coordinates.is_log, strict=True))
-        table = self.summary()
-        factors = [
-            1.0 if quantity == "spread" and is_log[symbol] else unit_factor(self, symbol, unit)[0]
-            for symbol, quantity in table.index
-        ]
-        shown = headed(table.div(factors, axis=0), unit).to_html(float_format="{:.4g}".format)
+        shown = self.summary().to_html(float_format="{:.4g}".format)
         return f"<p>{escape(repr(self))}; the spread of a positive parameter is the sd of its logarithm</p>{shown}"
-
-    @property
-    def _stress_unit(self) -> str:
-        """The unit of the measurements."""
-        return self.complete.model.experiment.stress_unit
 
     @cached_property
     def data(self) -> xr.DataTree:

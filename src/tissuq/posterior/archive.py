@@ -31,7 +31,7 @@ T = TypeVar("T", Material, Discrepancy)
 
 MODEL, TESTS = "model", "tests"
 """Groups of the model's arrays, and of one for each test."""
-LABELS = ("name", "source", "stress_unit", "specimen")
+LABELS = ("name", "source", "stress_unit", "specimen", "direction", "condition")
 """Texts of an experiment."""
 
 
@@ -125,7 +125,7 @@ def _standard_error_of(test: Experiment) -> dict[str, Any]:
 
 
 def _test(group: Group) -> Experiment:
-    labels = {label: str(group.attrs[label]) for label in LABELS}
+    labels = {label: str(group.attrs.get(label, "")) for label in LABELS}
     stretch, stress = group.arrays["stretch"], group.arrays["stress"]
     errors = {
         "standard_error": group.arrays.get("standard_error", np.zeros(stress.size)).reshape(stress.T.shape).T,

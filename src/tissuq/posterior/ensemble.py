@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.stability import calibrated_range, stable_draws
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError, ModelError
+from tissuq.experiments.headed_tables import headed
 from tissuq.experiments.modes import LoadingMode, Path, States, curve_modes, loading_mode
-from tissuq.experiments.units import headed, stress_unit
+from tissuq.experiments.units import stress_unit
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution, are_isotropic
 from tissuq.mechanics import Material, StretchMaterial, stress_basis

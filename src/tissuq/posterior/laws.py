@@ -17,10 +17,11 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.stability import stable_ranges
 from tissuq.drawing.panels import panels
 from tissuq.errors import ConvergenceError, InputError, ModelError
+from tissuq.experiments.headed_tables import in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.tests_in_file import measurements
-from tissuq.experiments.units import in_unit, stress_unit
+from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.mechanics import Material, material_named
 from tissuq.mechanics.material import materials
@@ -69,9 +70,9 @@ class LawComparison:
     seconds: Mapping[str, float]
     skipped: Mapping[str, str]
 
-    @cached_property
+    @property
     def table(self) -> pd.DataFrame:
-        """The laws side by side, the most probable first.
+        """The laws side by side, the most probable first, with moduli in the unit of the measurements.
 
         - parameters: number of parameters of the law.
         - log_evidence, log_evidence_error; probability of the law, were all as probable before the data.
@@ -82,9 +83,31 @@ class LawComparison:
         - discrepancy_share, _low, _high: the part of the stress that the discrepancy carries: mean and 95 % interval.
         - stable, stable_beyond: probability of stability over the range of the invariants that was measured, and up to
           1.5 times these; in the least stable loading mode. Missing where the energy does not tell.
-        - modulus, modulus_low, modulus_high: median and 95 % HDI of the law's initial shear modulus, MPa.
+        - modulus, modulus_low, modulus_high: median and 95 % HDI of the law's initial shear modulus.
         - seconds: how long the fit took.
+
+        The unit of the moduli stands at the head of the columns; `table_in` gives another one.
         """
+        return self.table_in(self._unit)
+
+    def table_in(self, unit: str) -> pd.DataFrame:
+        """Return `table` with moduli in a unit of stress, such as ``"MPa"``.
+
+        Raises
+        ------
+        InputError
+            When it is none.
+        """
+        return in_unit(self._table, ["modulus", "modulus_low", "modulus_high"], unit)
+
+    @property
+    def _unit(self) -> str:
+        """The unit of stress of the measurements."""
+        return next(iter(self.fits.values())).unit().name
+
+    @cached_property
+    def _table(self) -> pd.DataFrame:
+        """The laws side by side, moduli in MPa."""
         import pandas as pd
 
         rows = [self._row(name, posterior) for name, posterior in self.fits.items()]
@@ -139,8 +162,7 @@ class LawComparison:
 
         weighted = [(weight, self.fits[name].solution) for name, weight in self._likely.items()]
         table = pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
-        unit = weighted[0][1].model.experiment.stress_unit
-        return in_unit(table, ["median", "low", "high"], unit)
+        return in_unit(table, ["median", "low", "high"], self._unit)
 
     def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:
         """Draw the initial shear modulus of every law, the most probable on top, and their average.
@@ -158,7 +180,7 @@ class LawComparison:
         -------
         Axes
         """
-        shown = stress_unit(unit or self._stress_unit)
+        shown = stress_unit(unit or self._unit)
         named = {f"{name} ({_percent(self.probabilities[name])})": self._moduli[name] for name in self._in_order}
         with panels(ax, 1, height=ROW * (len(named) + 1) + 0.3) as drawn:
             intervals(drawn.axes[0], named, self.modulus, f"initial shear modulus [{shown.name}]", shown.to_mpa)
@@ -174,18 +196,13 @@ class LawComparison:
             low, high = modulus.hdi()
             rows.append((self.probabilities[name], float(modulus.quantile(0.5)), low, high))
         columns = ["probability", "modulus", "modulus_low", "modulus_high"]
-        table = in_unit(pd.DataFrame(rows, self._in_order, columns), columns[1:], self._stress_unit)
+        table = in_unit(pd.DataFrame(rows, self._in_order, columns), columns[1:], self._unit)
         return str(table.to_html(float_format="{:.4g}".format))
 
     @property
     def _in_order(self) -> list[str]:
         """The laws, the most probable first."""
         return sorted(self.fits, key=lambda name: -self.probabilities[name])
-
-    @property
-    def _stress_unit(self) -> str:
-        """The unit of the measurements."""
-        return next(iter(self.fits.values())).model.experiment.stress_unit
 
     @cached_property
     def _moduli(self) -> Mapping[str, Marginal]:

@@ -26,6 +26,8 @@ HEADERS = ["test", "expected sd", "reduction", "note"]
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
 BEYOND = UNSTABLE
+SDS = ("sd_now", "sd_after")
+"""Columns in the unit of a target."""
 
 
 def readable_design(study: DesignStudy, target: Target) -> list[list[str]]:
@@ -67,7 +69,9 @@ def design_figure(study: DesignStudy) -> Figure:
 
 
 def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, figures: bool = True) -> None:
-    """Write design.csv and design.json (MPa), the figure, run.toml and report.html into an empty folder.
+    """Write design.csv and design.json, the figure, run.toml and report.html into an empty folder.
+
+    Standard deviations are in the unit of the data, which stands beside each.
 
     Parameters
     ----------
@@ -79,7 +83,7 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
     figures : bool
         Draw it, too.
     """
-    rows: list[Row] = [{str(name): value for name, value in row.items()} for row in study.table.to_dict("records")]
+    rows = _rows_in_unit(study)
     write_csv(folder / "design.csv", rows)
     write_json(folder / "design.json", rows)
     write_recipe(folder, "design", recipe)
@@ -102,6 +106,17 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
         warnings=study.warnings,
         command="design",
     )  # fmt: skip
+
+
+def _rows_in_unit(study: DesignStudy) -> list[Row]:
+    """Return the rows of the table, standard deviations in the unit of the data."""
+    units = {target.name: _unit(study, target) for target in study.targets}
+    rows: list[Row] = []
+    for record in study.table.to_dict("records"):
+        factor, unit = units[record["target"]]
+        in_unit: Row = {"unit": unit} | {name: record[name] / factor for name in SDS}
+        rows.append({str(name): value for name, value in record.items()} | in_unit)
+    return rows
 
 
 def _rows_of(study: DesignStudy, target: Target) -> pd.DataFrame:

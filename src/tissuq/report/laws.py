@@ -48,7 +48,7 @@ def write_law_run(study: LawStudy, sources: Sequence[Path], folder: Path, *, fig
     command = write_inputs(study.settings, study.experiment, sources, folder, figures=figures)
     rows = [
         {"law": name} | {str(column): known_number(value) for column, value in row.items()}
-        for name, row in study.comparison.table.iterrows()
+        for name, row in study.comparison.table_in("MPa").iterrows()
     ]
     write_csv(folder / "laws.csv", with_named_units(rows, MODULUS, study.unit))
     write_json(folder / "laws.json", in_unit_of(rows, MODULUS, study.unit))
@@ -60,7 +60,7 @@ def write_law_run(study: LawStudy, sources: Sequence[Path], folder: Path, *, fig
 
 def readable_laws(study: LawStudy) -> list[list[str]]:
     """Return the rows of the table in words, under `HEADERS`; the moduli in the unit of the file."""
-    return [_readable(str(name), row, study.unit.to_mpa) for name, row in study.comparison.table.iterrows()]
+    return [_readable(str(name), row, study.unit.to_mpa) for name, row in study.comparison.table_in("MPa").iterrows()]
 
 
 def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
@@ -83,7 +83,7 @@ def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
 def law_lead(study: LawStudy) -> str:
     """Return the finding in a few sentences."""
     comparison, unit = study.comparison, study.unit
-    table, modulus = comparison.table, comparison.modulus
+    table, modulus = comparison.table_in("MPa"), comparison.modulus
     low, high = (significant(end / unit.to_mpa) for end in modulus.hdi())
     is_close = table.elpd_difference > -SIGNIFICANT_ERRORS * table.elpd_difference_error
     close = [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]

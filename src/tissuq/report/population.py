@@ -132,7 +132,7 @@ def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Pa
     write_recipe(folder, command, study.settings.model_copy(update=relocated))
     several = len(study.modes) > 1
     write_csv(folder / "data.csv", with_named_units(_data_rows(study, several), ["stress"], unit))
-    summaries = {"population": population.summary(), "specimens": population.specimen_summary()}
+    summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
     tables = {name: _in_units(study, table) for name, table in summaries.items()}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
     bands, not_predicted, drawn = *_bands(study), {}
@@ -169,7 +169,7 @@ def _bands(study: PopulationStudy) -> tuple[dict[LoadingMode, Bands], list[str]]
         stretch = np.linspace(reach.min(), reach.max(), POINTS)
         try:
             band, material_alone = (
-                study.population.new_patient(stretch, mode=mode, discrepancy=with_discrepancy)
+                study.population.new_patient(stretch, mode=mode, discrepancy=with_discrepancy, unit="MPa")
                 for with_discrepancy in (True, False)
             )
         except ModelError as error:  # some of the population's materials lock before the largest stretch
@@ -216,7 +216,7 @@ def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
 def readable_population(study: PopulationStudy) -> list[list[str]]:
     """Return the rows of the summary as text, under `HEADERS`, in the unit of the files."""
     population, rows = study.population, []
-    table = numbers_of(population.summary())
+    table = numbers_of(population.summary(unit="MPa"))
     for symbol, is_log in zip(population.symbols, population.coordinates.is_log, strict=True):
         factor, unit = _scale(study, symbol)
         for quantity, words in QUANTITIES.items():
@@ -227,7 +227,7 @@ def readable_population(study: PopulationStudy) -> list[list[str]]:
 
 
 def _readable_specimens(study: PopulationStudy) -> list[list[str]]:
-    rows, table = [], numbers_of(study.population.specimen_summary())
+    rows, table = [], numbers_of(study.population.specimen_summary(unit="MPa"))
     for name in study.population.names:
         for symbol in study.population.symbols:
             factor, unit = _scale(study, symbol)
@@ -277,7 +277,7 @@ def _lead(study: PopulationStudy) -> str:
     """Return the finding in two sentences."""
     symbol = study.population.symbols[0]
     factor, unit = _scale(study, symbol)
-    table = numbers_of(study.population.summary())
+    table = numbers_of(study.population.summary(unit="MPa"))
     middle = significant(table[symbol, "median"]["median"] / factor)
     new, complete = (
         _text(table[symbol, name], factor)[1].strip("[]").replace(",", " to")

@@ -238,16 +238,20 @@ def versions() -> dict[str, str]:
 def write_data(folder: Path, experiment: Experiment, unit: StressUnit | None = None) -> None:
     """Write the measurements as fitted, in full precision: stretch and engineering stress, in MPa unless said.
 
-    Of several tests with the name of each and its mode.
+    Of several tests with the name of each and its mode, and with direction and condition where these are said.
     """
     stress, to_mpa = ("stress", 1.0) if unit is None else (f"stress [{unit.name}]", unit.to_mpa)
     headers = ["test", "mode", "measured"] if len(experiment.curves) > 1 else []
+    stated = [name for name in ("direction", "condition") if any(getattr(curve, name) for curve in experiment.curves)]
     with (folder / "data.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         has_errors = bool(experiment.standard_error.any())
-        writer.writerow([*headers, "stretch", stress, *[stress.replace("stress", "standard_error")] * has_errors])
+        writer.writerow(
+            [*headers, *stated, "stretch", stress, *[stress.replace("stress", "standard_error")] * has_errors]
+        )
         for curve in experiment.curves:
-            label_columns = map(repeat, (curve.name, curve.mode.name, curve.quantity)[: len(headers)])
+            labels = (curve.name, curve.mode.name, curve.quantity)[: len(headers)]
+            label_columns = map(repeat, (*labels, *(getattr(curve, name) for name in stated)))
             stresses = [curve.stress, *[curve.standard_error] * has_errors]
             values = curve.abscissa.tolist(), *((column / to_mpa).tolist() for column in stresses)
             writer.writerows(zip(*label_columns, *values, strict=False))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from tissuq.assessment.measurements import measurement_warnings
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.model.tolerances import Tolerances
@@ -93,8 +94,11 @@ def run_laws(
     folder: Path = Path(),
     step: Callable[[str], None] = lambda text: None,
     own: Mapping[str, Material] | None = None,
+    found: Sequence[Reading] = (),
 ) -> LawStudy:
     """Read the file, or those of several tests, and fit every chosen law.
+
+    What has been read of every test may be given as ``found``.
 
     Settings may come from a file, so that laws of the user's own which they name are not run; these are given as
     ``own``, by the names in the settings.
@@ -104,7 +108,7 @@ def run_laws(
     InputError, ModelError, ConvergenceError
         When file or settings cannot be used, or a law that was named cannot be fitted.
     """
-    readings = settings.readings(folder)
+    readings = settings.readings(folder, found)
     experiment = Experiment.of([reading.experiment for reading in readings])
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
     is_all = settings.laws == (ALL_LAWS,)

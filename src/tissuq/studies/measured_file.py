@@ -38,6 +38,8 @@ class ReadingSettings(BaseModel):
     dimensions: dict[str, str] = Field(default_factory=dict)
     only: dict[str, str | int] = Field(default_factory=dict)
     compression_positive: bool | None = None
+    turn: str | None = None
+    load_zero: str | None = None
     cycle: str | int | None = None
     branch: str | None = None
     compliance: str | None = None
@@ -61,10 +63,15 @@ class MeasuredFile(ReadingSettings):
     """A file, and how to read it."""
 
     file: str
+    name: str | None = None
 
-    def reading(self, folder: Path = Path()) -> Reading:
-        """Read the file, a relative one in ``folder``, and keep what was done on the way."""
-        return read_file(folder / self.file, **self.reading_options)
+    def reading(self, folder: Path = Path(), found: Reading | None = None) -> Reading:
+        """Return what is read from the file, a relative one in ``folder``, unless that has been found already.
+
+        It is named as the settings say, or as the file.
+        """
+        reading = found or read_file(folder / self.file, **self.reading_options)
+        return replace(reading, experiment=reading.experiment.labelled(name=self.name or Path(self.file).stem))
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements; a relative file lies in ``folder``."""
@@ -74,17 +81,17 @@ class MeasuredFile(ReadingSettings):
 class MeasuredTest(MeasuredFile):
     """One of several files that are fitted together."""
 
-    name: str | None = None
     specimen: str = ""
+    direction: str = ""
+    condition: str = ""
     noise_sd: float | None = Field(None, gt=0)
 
-    def reading(self, folder: Path = Path()) -> Reading:
-        """Read the file, and say which specimen it was."""
-        reading = super().reading(folder)
-        named = reading.experiment.labelled(
-            name=self.name or reading.experiment.name, specimen=self.specimen or reading.experiment.specimen
-        )
-        return replace(reading, experiment=named)
+    def reading(self, folder: Path = Path(), found: Reading | None = None) -> Reading:
+        """Return what is read from the file, with the specimen, the direction and the condition that are stated."""
+        reading = super().reading(folder, found)
+        stated = {"specimen": self.specimen, "direction": self.direction, "condition": self.condition}
+        labels = {name: label for name, label in stated.items() if label}
+        return replace(reading, experiment=reading.experiment.labelled(**labels))
 
 
 class FittedSettings(BaseModel):

@@ -15,6 +15,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.notes import each_once
 from tissuq.experiments.reading.several_files import find_tests, read_column
 from tissuq.experiments.reading.tests_in_file import find_tests_in_file
 from tissuq.experiments.units import StressUnit, stress_unit
@@ -146,14 +147,8 @@ def _unit(tests: Mapping[str, Sequence[Experiment]]) -> StressUnit:
 
 def _data_warnings(readings: Mapping[str, Sequence[Reading]]) -> tuple[str, ...]:
     """Return the warnings about the files, each once with the specimens that it concerns."""
-    concerned: dict[str, list[str]] = {}
-    for name, specimen_readings in readings.items():
-        for text in dict.fromkeys(text for reading in specimen_readings for text in data_warnings(reading)):
-            concerned.setdefault(text, []).append(name)
-    messages = [
-        f"{'all specimens' if len(names) == len(readings) else ', '.join(names)}: {text}"
-        for text, names in concerned.items()
-    ]
+    pairs = ((name, text) for name, of_one in readings.items() for reading in of_one for text in data_warnings(reading))
+    messages = each_once(pairs, len(readings), "all specimens")
     omitted = len(messages) - MAX_DATA_WARNINGS
     return (
         *messages[:MAX_DATA_WARNINGS],

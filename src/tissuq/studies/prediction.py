@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError, ModelError
-from tissuq.experiments.experiment import Experiment, checked_points
+from tissuq.experiments.checked_arrays import checked_points
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.units import StressUnit, headed, in_unit, stress_unit
+from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.tolerances import AS_TESTED, SPECIMEN

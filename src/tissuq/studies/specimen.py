@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Self
@@ -14,9 +15,10 @@ from pydantic import Field, field_validator, model_validator
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
+from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.notes import each_once
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import (
@@ -91,7 +93,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     def _measured(self) -> Self:
         if bool(self.file) == bool(self.tests):
             raise ValueError("give one file, or several tests with a file each")
-        reading = set(ReadingSettings.model_fields)
+        reading = {"name", *ReadingSettings.model_fields}
         if self.tests and self.model_fields_set & reading:
             misplaced = ", ".join(sorted(self.model_fields_set & reading))
             raise ValueError(f"reading options belong in each of the tests, not beside them ({misplaced})")
@@ -102,9 +104,11 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
             raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
         return self
 
-    def readings(self, folder: Path = Path()) -> list[Reading]:
-        """Read the file, or those of all tests; relative ones lie in ``folder``."""
-        return [test.reading(folder) for test in self.tests] or [self.reading(folder)]
+    def readings(self, folder: Path = Path(), found: Sequence[Reading] = ()) -> list[Reading]:
+        """Return what is read from the file, or those of all tests, unless that is found."""
+        tests = self.tests or (self,)
+        of_tests = found or repeat(None, len(tests))
+        return [test.reading(folder, of_test) for test, of_test in zip(tests, of_tests, strict=True)]
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements, of all tests together."""
@@ -191,8 +195,11 @@ def run_specimen(
     folder: Path = Path(),
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
+    found: Sequence[Reading] = (),
 ) -> SpecimenStudy:
     """Read the file, or those of several tests, and fit the material with every chosen discrepancy.
+
+    What has been read of every test may be given as ``found``.
 
     Settings may come from a file, so that a law of the user's own which they name is not run; it is given as ``law``.
 
@@ -202,7 +209,7 @@ def run_specimen(
         When file or settings cannot be used. A discrepancy that cannot be fitted is an error when it was named, and
         is skipped with the reason when all were asked for.
     """
-    readings = settings.readings(folder)
+    readings = settings.readings(folder, found)
     experiment = Experiment.of([reading.experiment for reading in readings])
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
@@ -306,16 +313,15 @@ def _options(
 
 
 def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:
-    """Return the warnings about the files, each with the name of its test if there are several."""
-    named = [(reading.experiment.name, _of_file(text)) for reading in readings for text in data_warnings(reading)]
-    return tuple(warning.of([name]) if len(readings) > 1 else warning for name, warning in named)
+    """Return the warnings about the files, each once, with the names of its tests if there are several.
 
-
-def _of_file(text: str) -> ResultWarning:
-    """Return a warning about a file; a unit that was assumed may make the answer wrong by a factor of 100 or 1000."""
-    is_doubtful = DOUBTFUL_UNIT in text
-    code, severity = ("doubtful-unit", Severity.PROBLEM) if is_doubtful else ("measurements", Severity.CAUTION)
-    return ResultWarning(text, code, severity)
+    A unit that was assumed may make the answer wrong by a factor of 100 or 1000.
+    """
+    messages = ((reading.experiment.name, text) for reading in readings for text in data_warnings(reading))
+    return tuple(
+        ResultWarning(text, "doubtful-reading", Severity.PROBLEM) if is_doubtful(text) else ResultWarning(text)
+        for text in each_once(messages, len(readings), "all tests")
+    )
 
 
 def _every() -> list[str]:

@@ -6,19 +6,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tissuq.experiments.reading.column_units import MPA_ASSUMED
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
-from tissuq.experiments.reading.measures import MPA_ASSUMED
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
 from tissuq.experiments.reading.positions import ZERO_ASSUMED
 from tissuq.experiments.reading.stated_mode import is_torque
 from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 
-__all__ = ["DOUBTFUL_UNIT", "assumptions"]
+__all__ = ["assumptions", "is_doubtful"]
 
-DOUBTFUL_UNIT = "check the unit:"
-"""How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000."""
+DOUBTFUL_UNIT, DOUBTFUL_COLUMN = "check the unit:", "check the column:"
+"""How warnings begin that come before all others: a wrong unit is a factor of 100 or 1000, a wrong column anything."""
+
+
+def is_doubtful(warning: str) -> bool:
+    """Tell whether a warning comes before all others."""
+    return DOUBTFUL_UNIT in warning or DOUBTFUL_COLUMN in warning
 
 
 def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_type: str | None) -> tuple[str, ...]:
@@ -46,11 +51,22 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
             f"{source[: source.index(UNIT_ASSUMED)].split()[-1].lstrip('(')}. If it is another, read one specimen at a "
             'time, and give its sizes: --length "20 mm", --area "10 mm2".'
         )
+    for choice in choices:
+        roles = {choice.deformation: choice.measure, choice.stress: choice.load}
+        found += [_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit]
     if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
         found += [_about_rim(name) for name in measured.table.names if is_torque(name)]
     if ZERO_ASSUMED in source:
         found += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
     return tuple(found)
+
+
+def _about_name(measured: MeasuredRows, column: int, role: str) -> str:
+    label = measured.table.label(column)
+    return (
+        f"{DOUBTFUL_COLUMN} {label} was taken for the {role} by its unit alone, for its name is not known. If it is, "
+        f"say so: --column {role}={label}; if another column is, name that one there."
+    )
 
 
 def _about_zero(measured: MeasuredRows, choice: ColumnChoice) -> str:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from operator import methodcaller
 
+from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.layout import WHITESPACE, joined, split
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.units import NUMBER
 
 __all__ = ["without_statements_beside"]
 

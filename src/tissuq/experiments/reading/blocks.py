@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.experiments.numbers import NUMBER, number_in
 from tissuq.experiments.reading.layout import FEWEST_ROWS, split
 from tissuq.experiments.reading.table import Table, padded
-from tissuq.experiments.units import NUMBER, number_in
 
 __all__ = ["blocks_of"]
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import CYCLE_NAMES, SET_NAMES, heading
+from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 
 __all__ = ["BRANCHES", "Cycle", "find_cycles", "of_cycle"]
 

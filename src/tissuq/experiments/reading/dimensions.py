@@ -10,13 +10,27 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import DIMENSION_NAMES, heading, on_axis
+from tissuq.experiments.reading.headings import heading, on_axis
+from tissuq.experiments.reading.inflation import Tube
+from tissuq.experiments.reading.mean_size import MEAN_OF, statements_of_size
+from tissuq.experiments.reading.repeated_sizes import TestBeside
 from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.units import AREA, LENGTH, Quantity
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
+from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
-__all__ = ["Dimension", "Dimensions", "dimensions_of", "dimensions_of_stresses", "initial_size"]
+__all__ = [
+    "Dimension",
+    "Dimensions",
+    "dimensions_of",
+    "dimensions_of_stresses",
+    "given_size",
+    "in_words",
+    "initial_size",
+    "tube_of",
+]
 
 SHOWN = 3
 """Number of other sizes that a message shows."""
@@ -28,16 +42,20 @@ HOW_TO_GIVE_SECTION = (
 )
 SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("diameter",)}
 """Forms of cross-sections, by the dimensions that they follow from."""
+EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
+PLURALS = {"thickness": "thicknesses"}
+"""Of names of sizes that do not end in s alone."""
 TURNED = {"length": "width", "width": "length"}
 """What the undeformed sizes along the first and the second axis are to the second one."""
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """One dimension in mm or mm², and the words that tell where it comes from."""
+    """One dimension in mm or mm², or in pixels, and the words that tell where it comes from."""
 
     value: float
     source: str
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -45,7 +63,9 @@ class Dimensions:
     """The dimensions of a specimen.
 
     Those that the user gives, what the file states in two ways, other sizes in it, and where it differs from the user;
-    ``divide_forces`` says that the cross-section is needed, beside whatever else is.
+    ``divide_forces`` says that the cross-section is needed, beside whatever else is; ``averages`` of which measurements
+    a size is the mean, and ``is_one_of_several`` that the table holds several tests;
+    ``open_height`` asks which side is the height.
     """
 
     file: str
@@ -55,6 +75,9 @@ class Dimensions:
     others: tuple[StatedSize, ...] = ()
     contradictions: tuple[str, ...] = ()
     divide_forces: bool = False
+    averages: tuple[str, ...] = ()
+    is_one_of_several: bool = False
+    open_height: str = ""
 
     @property
     def length(self) -> Dimension:
@@ -73,6 +96,23 @@ class Dimensions:
             + area_too
             * (self.divide_forces and not _sections(self.sizes)),
         )
+
+    def distance(self, first: float) -> Dimension:
+        """Return the undeformed distance of marks in pixels: the one that is given, or else the first of the test.
+
+        Raises
+        ------
+        InputError
+            When a length is given that is not in pixels.
+        """
+        if "length" not in self.set_by_user:
+            return Dimension(first, "in its first row", PIXELS.unit)
+        if self.sizes["length"].unit != PIXELS.unit:
+            raise InputError(
+                f"{self.file}: distances are in pixels, and so must be the undeformed one: give it as "
+                f'--length "{first:.4g} px", or leave it out where the test begins undeformed.'
+            )
+        return self.sizes["length"]
 
     @property
     def radius(self) -> Dimension:
@@ -124,6 +164,7 @@ class Dimensions:
             When it is not known, or follows in two ways that contradict each other.
         """
         areas = _sections(self.sizes)
+        self._refuse_open_height("area", "width", "thickness", "diameter")
         areas_of_user = {name: area for name, area in areas.items() if self.set_by_user & set(SECTIONS[name])}
         if not areas_of_user:
             self._refuse_ambiguous("area", "width", "thickness", "diameter")
@@ -142,19 +183,44 @@ class Dimensions:
             )
         return area
 
+    @property
+    def thickness(self) -> Dimension:
+        """The undeformed thickness.
+
+        Raises
+        ------
+        InputError
+            When it is not known, or sizes are given that a force per width does not need.
+        """
+        if others := sorted(self.set_by_user & {"area", "width", "diameter"}):
+            raise InputError(
+                f"{self.file} holds a force per width, which over the thickness is a stress: leave {others[0]} out, "
+                'and give the undeformed thickness (--thickness "2 mm").'
+            )
+        return self._size(
+            "thickness", 'to turn a force per width into a stress give the undeformed thickness (--thickness "2 mm").'
+        )
+
     def _size(self, name: str, advice: str) -> Dimension:
         """Return a size that must be known, and be stated once."""
+        self._refuse_open_height(name)
         self._refuse_ambiguous(name)
-        if name not in self.sizes:
+        if name not in self.sizes or self.sizes[name].unit == PIXELS.unit:
             raise InputError(f"{self.file}: {advice} {self._others(LENGTH, name)}")
         return self.sizes[name]
+
+    def _refuse_open_height(self, *names: str) -> None:
+        if self.open_height and not self.set_by_user & set(names):
+            raise InputError(f"{self.file}: {self.open_height}")
 
     def _refuse_ambiguous(self, *names: str) -> None:
         for name in names:
             if name in self.ambiguous:
+                count = "two" if self.ambiguous[name].count(" and ") == 1 else "several"
+                sizes = f"{count} {PLURALS.get(name, f'{name}s')}"
                 raise InputError(
-                    f"{self.file}: the file states two {name}s: {self.ambiguous[name]}. Say which: --{name} "
-                    f'"NUMBER {_quantity(name).unit}".'
+                    f"{self.file}: the file states {sizes}: {self.ambiguous[name]}. Say which: --{name} "
+                    f'"NUMBER {_quantity(name).unit}".{EACH_ALONE * self.is_one_of_several}'
                 )
 
     def _partly_known(self) -> str:
@@ -174,13 +240,20 @@ class Dimensions:
         which = "that" if len(sizes) == 1 else "one of these"
         number = f"{sizes[0].value:g}" if len(sizes) == 1 else "NUMBER"
         options = " or ".join(f'--{name} "{number} {kind.unit}"' for name in names)
-        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}."
+        each_alone = EACH_ALONE * self.is_one_of_several
+        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}.{each_alone}"
 
 
-def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None, specimens: Collection[str]) -> Dimensions:
+def dimensions_of(
+    table: Table,
+    set_by_user: Mapping[str, str] | None,
+    specimens: Collection[str],
+    test: TestBeside | None = None,
+) -> Dimensions:
     """Return the dimensions that the user gives, and those of the file where the user gives none.
 
-    The file may state those of several specimens; that in the table is the one which it calls by some names.
+    The file may state those of several specimens; that in the table is the one which it calls by some names, or over
+    whose columns they stand.
 
     Raises
     ------
@@ -193,19 +266,29 @@ def dimensions_of(table: Table, set_by_user: Mapping[str, str] | None, specimens
         raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
     if len([name for name in ("area", "diameter", "width") if name in texts]) > 1:
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    every_size = stated_sizes(table, specimens)
+    every_size = stated_sizes(table, specimens, test)
     is_cylinder = "diameter" in texts or any(size.is_of("diameter", is_cylinder=False) for size in every_size)
-    stated, ambiguous, others = dict[str, Dimension](), dict[str, str](), every_size
+    stated, ambiguous, others, averages = dict[str, Dimension](), dict[str, str](), every_size, list[str]()
     for name in DIMENSION_NAMES:
         of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
         others = [size for size in others if size not in of_name]
-        sizes = [Dimension(size.value, size.source) for size in of_name]
+        sizes = [Dimension(*statement) for statement in statements_of_size(of_name)]
+        means = [size for size in sizes if size.source.startswith(MEAN_OF) and name not in texts]
+        averages += [f"the {name} is the {mean.source}: {mean.value:.4g} {_quantity(name).unit}." for mean in means]
         if name not in texts and any(not _agree(size, sizes[0]) for size in sizes):
             ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
         elif sizes:
             stated[name] = sizes[0]
-    of_user = {name: Dimension(_quantity(name).value(str(text)), "as given") for name, text in texts.items()}
-    dimensions = Dimensions(table.file, stated | of_user, frozenset(texts), ambiguous, tuple(others))
+    of_user = {name: given_size(name, str(text)) for name, text in texts.items()}
+    dimensions = Dimensions(
+        table.file,
+        stated | of_user,
+        frozenset(texts),
+        ambiguous,
+        tuple(others),
+        averages=tuple(averages),
+        is_one_of_several=test is not None,
+    )
     return replace(dimensions, contradictions=tuple(_contradictions(dimensions, stated)))
 
 
@@ -301,7 +384,8 @@ def _sections(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:
 def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> Iterator[str]:
     """Yield a sentence where the file states another length or cross-section than the user."""
     pairs = []
-    if "length" in dimensions.set_by_user and "length" in stated:
+    is_length = "length" in dimensions.set_by_user and not dimensions.sizes["length"].unit
+    if is_length and "length" in stated:
         pairs.append(("length", "mm", dimensions.length, stated["length"]))
     is_set_by_user = any(dimensions.set_by_user & set(SECTIONS[form]) for form in _sections(dimensions.sizes))
     if is_set_by_user and _sections(stated):
@@ -314,5 +398,25 @@ def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> 
             )
 
 
+def given_size(name: str, text: str) -> Dimension:
+    """Return a dimension that the user gives with its unit; a length may be in pixels."""
+    if name == "length" and PIXELS.factor_or_none(number_and_unit(text)[1]):
+        return Dimension(PIXELS.value(text), "as given", PIXELS.unit)
+    return Dimension(_quantity(name).value(text), "as given")
+
+
 def _quantity(name: str) -> Quantity:
     return AREA if name == "area" else LENGTH
+
+
+def in_words(dimension: Dimension) -> str:
+    """Return a length and where it comes from."""
+    return f"{dimension.value:g} mm ({dimension.source})"
+
+
+def tube_of(dimensions: Dimensions) -> tuple[Tube, str]:
+    """Return the undeformed tube, and its radii in words."""
+    diameter, thickness = dimensions.wall_of_tube
+    tube = Tube(diameter.value / 2 - thickness.value, diameter.value / 2)
+    words = f"A = {tube.inner:g} mm and B = {tube.outer:g} mm (undeformed radii; diameter {diameter.source}, "
+    return tube, f"{words}thickness {thickness.source})"

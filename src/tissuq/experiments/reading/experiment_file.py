@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Unpack, cast
@@ -14,17 +14,23 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.columns import ColumnChoice, about_stress, choose_columns, mapping_of_each_stress
+from tissuq.experiments.reading.columns import ColumnChoice, choose_columns
+from tissuq.experiments.reading.conversion import (
+    columns_of_stresses,
+    measured_rows,
+    points_of,
+    stress_measure_of,
+    threshold_of,
+    with_engineering_stress,
+)
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
 from tissuq.experiments.reading.data_frame import is_data_frame
-from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
-from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
-from tissuq.experiments.reading.measures import Load, stress_of, stretch_of, without_machine
+from tissuq.experiments.reading.labels import check_labels, columns_only, labels_of
+from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.plausibility import check_signs, check_stretches, with_compression_negative
+from tissuq.experiments.reading.plausibility import check_signs, check_stretches
 from tissuq.experiments.reading.regions import (
     AUTO,
     Region,
@@ -36,11 +42,11 @@ from tissuq.experiments.reading.regions import (
 )
 from tissuq.experiments.reading.several_specimens import (
     SeveralSpecimens,
-    check_one_specimen,
     only_rows,
     specimen_of,
 )
-from tissuq.experiments.reading.spread import Spread, spread_of
+from tissuq.experiments.reading.signs import with_signs
+from tissuq.experiments.reading.spread import Spread
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,
     about_mode,
@@ -49,9 +55,7 @@ from tissuq.experiments.reading.stated_mode import (
     direction_of,
     mode_of,
 )
-from tissuq.experiments.reading.stated_sizes import names_of_specimen
-from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
-from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
 
 __all__ = [
@@ -188,6 +192,12 @@ def read(path: Any, **options: Unpack[PythonOptions]) -> Experiment:
         Whether the file counts compression as positive: flips stresses at stretches below 1, and strains and
         displacements that are positive, too. Without it compression is negative, and asked about where a name says
         compression and the numbers are positive.
+    turn : str, optional
+        ``load``, ``deformation`` or ``both``: which signs are changed, as of a load cell that counts tension as
+        negative. For all loading modes.
+    load_zero : str, optional
+        The reading of the load cell without load, which is taken off: a force or stress with its unit, or ``first`` for
+        that of the first row.
     cycle : str or int, optional
         ``first``, ``last`` or the number (from 1) of the only cycle to use; all unless given.
     branch : str, optional
@@ -263,7 +273,10 @@ def read_file(path: Any, **options: Unpack[PythonOptions]) -> Reading:
     if (mode := plain.get("mode")) is not None:
         checked_mode(mode, plain)
     table = table_of(path, plain)
-    return read_rows(only_rows(table, plain.get("only")), table.file if is_data_frame(path) else path, **plain)
+    rows = only_rows(table, columns_only(table, plain.get("only")))
+    reading = read_rows(rows, table.file if is_data_frame(path) else path, **plain)
+    check_labels(table, reading.experiment, plain.get("only"))
+    return reading
 
 
 def table_of(path: Any, options: ReadingOptions) -> Table:
@@ -289,7 +302,7 @@ def read_rows(
         check_not_sheared(table)
     absent = set[int]()
     try:
-        measured, loads, spreads, dimensions = _measured(table, mode, labelled_choices, options)
+        measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
     except SeveralSpecimens:
         raise
     except InputError:
@@ -298,9 +311,9 @@ def read_rows(
         if readable is table:
             raise
         absent, table = set(table.lines) - set(readable.lines), readable
-        measured, loads, spreads, dimensions = _measured(table, mode, labelled_choices, options)
+        measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
-    recorded = with_compression_negative(measured, choices, is_positive, direction_of(*names))
+    recorded = with_signs(measured, choices, is_positive, options.get("turn"), direction_of(*names))
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
@@ -311,18 +324,18 @@ def read_rows(
         used = used.loaded(slacks, reference)
         errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
     elif preload is not None:
-        thresholds = [_threshold(preload, load) for load in loads]
+        thresholds = [threshold_of(preload, load) for load in loads]
         used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference)
     if (stretch_range := options.get("stretch_range")) is not None:
         used = used.within(*stretch_range)
     if options.get("until_peak"):
         used = used.until_peak()
     check_stretches(used, choices)
-    stress_measure = loads[0].measure or _stress_measure(table, choices)
+    stress_measure = loads[0].measure or stress_measure_of(table, choices)
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
         recorded, used = (
-            _converted(mode, stress_measure, measured, _points(mode, stretch))
+            with_engineering_stress(mode, stress_measure, measured, points_of(mode, stretch))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
         )
         if mode.controls != (SHEAR,) or stress_measure.name != "cauchy":
@@ -330,112 +343,22 @@ def read_rows(
     if (every := options.get("every", 1)) > 1:
         rows = np.arange(0, len(used), every)
         used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
-    check_signs(used, choices, bool(is_positive))
+    check_signs(used, choices, bool(is_positive), options.get("turn"))
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(
         mode=mode,
-        stretch=_points(mode, used.stretch),
-        stress=_of_stresses(used.stress),
-        standard_error=_of_stresses(used.standard_error),
+        stretch=points_of(mode, used.stretch),
+        stress=columns_of_stresses(used.stress),
+        standard_error=columns_of_stresses(used.standard_error),
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
         least_errors=errors | least_errors(tested),
-    ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table))
+    ).labelled(stress_unit=shown.name, specimen=specimen_of(used.table), **labels_of(used.table, [*names, *words]))
     problems = (spread.problem for spread in spreads if spread.problem)
-    doubts = *assumptions(used, choices, types[1]), *dimensions.contradictions
+    doubts = *assumptions(used, choices, types[1]), *dimensions.averages, *dimensions.contradictions
     about_loads = filter(None, (load.note for load in loads))
     notes = *table.notes, *problems, *about_loads
     return Reading(
         experiment, table, choices, recorded, used, tuple(cycles), notes, tested, mode_source, spreads, doubts
     )
-
-
-def _measured(
-    table: Table,
-    mode: LoadingMode,
-    choices: Mapping[str, ColumnChoice],
-    options: ReadingOptions,
-) -> tuple[MeasuredRows, list[Load], tuple[Spread, ...], Dimensions]:
-    """Return every row as stretch and stress of the kind that the file gives.
-
-    With each stress, its standard errors, and the dimensions of the specimen, of which there must be one.
-    """
-    labels, columns = tuple(choices), list(choices.values())
-    numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
-    check_one_specimen(table, columns, np.mean([deformation for deformation, _ in numbers], axis=0))
-    specimens = names_of_specimen(table, columns, options.get("only"))
-    dimensions = dimensions_of(table, options.get("dimensions"), specimens)
-    sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
-    units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
-    compliance = options.get("compliance"), options.get("force_unit")
-    stretches, loads, stretch_steps, spreads = [], [], [], []
-    mappings = mapping_of_each_stress(mode, options.get("columns"))
-    for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
-        size = replace(size, divide_forces=choice.load == "force")
-        with about_stress(number, labels, mode):
-            deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
-            stretch, step = stretch_of(table, choice, deformation, load, size, *units)
-            stress = stress_of(table, choice, load, size, options.get("stress_unit"), options.get("force_unit"))
-            spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
-        stretches.append(stretch)
-        stretch_steps.append(f"{step}{given_way}")
-        loads.append(stress)
-    measured = MeasuredRows(
-        table=table,
-        rows=np.arange(len(table.rows)),
-        stretch=np.stack(stretches),
-        stress=np.stack([load.stress for load in loads]),
-        standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
-        labels=labels,
-    )
-    for name, value in (options.get("only") or {}).items():
-        measured = measured.with_step(f"only rows with '{value}' in column '{name}'")
-    measured = measured.with_step(*stretch_steps).with_step(*(load.source for load in loads))
-    if any(spread.source for spread in spreads):
-        measured = measured.with_step(*(spread.source for spread in spreads))
-    return measured, loads, tuple(spreads), dimensions
-
-
-def _threshold(preload: str, load: Load) -> float:
-    """Return a preload as a stress in MPa."""
-    if load.measure is not None:
-        raise InputError(
-            f"preload '{preload}' (--preload) does not go with the pressure in a tube. Give the outer diameter that it "
-            "has without pressure as --diameter, and leave rows out with --stretch or --leave-out."
-        )
-    return preload_stress(preload, load.area)
-
-
-def _of_stresses(columns: Column) -> Column:
-    """Return columns (k, n) of the stresses as an experiment takes them."""
-    return np.ascontiguousarray(columns.T) if len(columns) > 1 else columns[0]
-
-
-def _points(mode: LoadingMode, stretch: Column) -> Column:
-    """Return the points of the mode for stretches (k, n): the stretch, or a column for each control."""
-    return np.ascontiguousarray(stretch.T) if len(mode.controls) > 1 else stretch[0]
-
-
-def _converted(mode: LoadingMode, measure: StressMeasure, measured: MeasuredRows, points: Column) -> MeasuredRows:
-    """Return rows whose stresses of a measure, and their standard errors, are engineering ones."""
-    if measure.engineering is None:
-        return measured
-    try:
-        stress, error = measure.engineering(mode, points, measured.stress), measured.standard_error
-    except InputError as refusal:
-        raise InputError(f"{measured.table.file}: {refusal}") from refusal
-    if error.any():
-        error = np.abs(measure.engineering(mode, points, error))
-    return replace(measured, stress=stress, standard_error=error)
-
-
-def _stress_measure(table: Table, choices: Sequence[ColumnChoice]) -> StressMeasure:
-    """Return the measure of the stresses, which is one."""
-    types = list(dict.fromkeys(choice.stress_type for choice in choices))
-    if len(types) > 1:
-        raise InputError(
-            f"{table.file}: the stresses are of different types ({' and '.join(types)}). Give columns of one type "
-            "(--column stress=NAME --column stress2=NAME)."
-        )
-    return STRESS_MEASURES[types[0]]

@@ -9,10 +9,11 @@ import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.headings import ROLES, heading, on_axis
+from tissuq.experiments.reading.headings import heading, on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
+from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["data_warnings"]
@@ -105,9 +106,18 @@ def _reference(reading: Reading, number: int) -> str:
         return ""
     return (
         f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
-        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell. "
-        f"A hyperelastic material has no stress at {control.name} {control.reference:g}."
+        f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which --load-zero "
+        f"{_load_zero(reading, number, nearest)} takes off. A hyperelastic material has no stress at {control.name} "
+        f"{control.reference:g}."
     )
+
+
+def _load_zero(reading: Reading, number: int, row: int) -> str:
+    """Return what takes off the load in a row, as the file has it."""
+    table, column = reading.used.table, reading.choices[number].stress
+    (values,) = table.taken(np.array([row])).numbers([column])
+    unit = table.unit(column)
+    return f'"{values[0]:.4g} {unit}"' if unit and reading.used.rows[row] else "first"
 
 
 def _diameter(reading: Reading, number: int) -> str:

@@ -9,13 +9,14 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tissuq.experiments.reading.assumptions import DOUBTFUL_UNIT
+from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading, read_file
 from tissuq.experiments.reading.findings import data_warnings
-from tissuq.experiments.reading.headings import SPREADS
 from tissuq.experiments.reading.measured_rows import labelled
+from tissuq.experiments.reading.notes import concerned
 from tissuq.experiments.reading.options import PythonOptions
 from tissuq.experiments.reading.table import Column
+from tissuq.experiments.reading.vocabulary import SPREADS
 from tissuq.experiments.units import stress_unit
 
 __all__ = ["Inspection", "inspect", "lines_of_tests", "noise_between_neighbours", "overview"]
@@ -74,7 +75,7 @@ class Inspection:
         return data_warnings(self.reading)
 
     def __str__(self) -> str:
-        doubts = [text for text in self.warnings if DOUBTFUL_UNIT in text]
+        doubts = [text for text in self.warnings if is_doubtful(text)]
         notes = [text for text in self.warnings if text not in doubts]
         lines = [*(_wrapped("ATTENTION", text) for text in doubts), *[""] * bool(doubts)]
         lines += [f"{self.reading.table.file}: what was understood", ""]
@@ -88,12 +89,15 @@ class Inspection:
         table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
         cells = f", separated by {SEPARATORS[table.separator]}; rows in lines {_span(table.lines)}, {head}"
-        in_memory = f"; rows {_span(table.lines)}, counted from 0"
-        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else in_memory}"
+        other = f"; {table.counted}s {_span(table.lines)}, counted from {int(table.counted != 'row')}"
+        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else other}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])
         yield "mode", f"{self.reading.experiment.mode.name} ({self.reading.mode_source})"
+        labels = {name: getattr(self.reading.experiment, name) for name in ("specimen", "direction", "condition")}
+        if any(labels.values()):
+            yield "test", ", ".join(f"{name} {label}" for name, label in labels.items() if label)
         spans = dict(self._spans())
         repeated = len(used) - len(np.unique(self.reading.experiment.stretch, axis=0))
         again = f"; {repeated} rows repeat a stretch" if repeated else ""
@@ -183,12 +187,9 @@ def lines_of_tests(inspections: Sequence[Inspection]) -> list[str]:
 
 def overview(inspections: Sequence[Inspection]) -> str:
     """Return what was understood of several tests: a line and the warnings of each."""
-    noted: dict[str, list[str]] = {}
-    for number, inspection in enumerate(inspections, start=1):
-        for text in inspection.warnings:
-            noted.setdefault(text, []).append(str(number))
+    pairs = [(str(number), text) for number, test in enumerate(inspections, start=1) for text in test.warnings]
     lines = [f"{len(inspections)} tests were understood", "", *lines_of_tests(inspections)]
-    for text, numbers in noted.items():
+    for text, numbers in concerned(pairs).items():
         of_tests = "all tests" if len(numbers) == len(inspections) else f"test {', '.join(numbers)}"
         lines += ["", _wrapped("Note", f"{of_tests}: {text}")]
     return "\n".join([*lines, "", "To see one of them: tissuq inspect 'FILE#NAME', with its name or number."])

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from tissuq.experiments.units import GROUPED, MEAN_WITH_SPREAD, NUMBER, looks_like_unit
+from tissuq.experiments.numbers import GROUPED, MEAN_WITH_SPREAD, NUMBER
+from tissuq.experiments.units import looks_like_unit
 
 __all__ = [
     "LENGTH_RATIO",
@@ -23,6 +24,7 @@ __all__ = [
     "is_units_row",
     "joined",
     "later_tables",
+    "likely_separator",
     "split",
 ]
 
@@ -81,7 +83,7 @@ def find_layout(lines: Sequence[str], separator: str | None = None) -> Layout | 
     A table of a few rows, such as a machine's table of results, is passed over for a far longer one beneath it with
     other names.
     """
-    separator = separator or _likely_separator(lines[:LINES_FOR_SEPARATOR])
+    separator = separator or likely_separator(lines[:LINES_FOR_SEPARATOR])
     cells = partial(split, separator=separator)
     confirmed = _main_row(lines, cells)
     if confirmed is None:
@@ -180,7 +182,9 @@ def _with_units_joined(names: Sequence[str]) -> list[str]:
     return joined
 
 
-def _likely_separator(lines: Sequence[str]) -> str:
+def likely_separator(lines: Sequence[str]) -> str:
+    """Return the separator between which most cells are numbers."""
+
     def share_of_numbers(line: str, separator: str) -> float:
         cells = [cell for cell in split(line, separator) if cell]
         numbers = _count_numbers(cells)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from tissuq.experiments.reading.headings import SPREADS, heading, of_spread, plain
+from tissuq.experiments.numbers import MEAN_WITH_SPREAD
+from tissuq.experiments.reading.headings import heading, of_spread, plain
 from tissuq.experiments.reading.layout import MISSING, joined, split
 from tissuq.experiments.reading.table import Table, padded
-from tissuq.experiments.units import MEAN_WITH_SPREAD
+from tissuq.experiments.reading.vocabulary import SPREADS
 
 __all__ = ["with_spreads_apart"]
 

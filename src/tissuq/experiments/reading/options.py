@@ -10,15 +10,17 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
-from tissuq.experiments.reading.headings import DIMENSION_NAMES, ROLES_OF_TUBE
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
 from tissuq.experiments.units import is_quantity, unit_of
 
-__all__ = ["READING_OPTIONS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
+__all__ = ["READING_OPTIONS", "TURNS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
 
 AXES = ("x", "y")
 """Of a biaxial machine."""
+TURNS = {"load": ("load",), "deformation": ("deformation",), "both": ("deformation", "load")}
+"""What signs may be changed of, by what asks for it."""
 
 
 class ReadingOptions(TypedDict, total=False):
@@ -37,6 +39,8 @@ class ReadingOptions(TypedDict, total=False):
     dimensions: Mapping[str, str] | None
     only: Mapping[str, str | int] | None
     compression_positive: bool | None
+    turn: str | None
+    load_zero: str | None
     cycle: str | int | None
     branch: str | None
     compliance: str | None
@@ -168,7 +172,15 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
     if len(mode.stresses) > 1 and options.get("compression_positive"):
         raise InputError(
             f"compression_positive=True (--compression-positive) is for loading modes with one stress, not for "
-            f"'{mode.name}'. Change the signs in the file, tension positive."
+            f"'{mode.name}'. Turn all loads: turn='load' (--turn load), or all deformations, or both."
+        )
+    turn = options.get("turn")
+    if turn is not None and turn not in TURNS:
+        raise InputError(f"turn (--turn) must be one of {', '.join(TURNS)}, not '{turn}'.")
+    if turn is not None and options.get("compression_positive") is not None:
+        raise InputError(
+            "turn (--turn) says which signs are changed, and compression_positive (--compression-positive, "
+            "--tension-positive) leaves it to the rows: give one of them."
         )
     if not (len(mode.stresses) == 1 or mode.machine_axes) and options.get("preload") is not None:
         raise InputError(

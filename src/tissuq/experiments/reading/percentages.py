@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.layout import MISSING, joined, split
 from tissuq.experiments.reading.table import Table, padded
-from tissuq.experiments.units import NUMBER
 
 __all__ = ["without_percent_signs"]
 

@@ -8,7 +8,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["FIRST_ROW", "ZERO_ASSUMED", "check_lengths", "check_positions"]
+__all__ = ["FIRST_ROW", "LITTLE_LOAD", "ZERO_ASSUMED", "check_lengths", "check_positions"]
 
 FIRST_ROW = "first"
 """What is given for a zero at the first row."""
@@ -69,16 +69,16 @@ def _begins_unloaded(displacement: Column, load: Column) -> bool:
     return bool(abs(start) + start_error < 0.5 * (abs(slope) - slope_error) * abs(displacement[0]))
 
 
-def check_lengths(table: Table, choice: ColumnChoice, length: Column) -> None:
+def check_lengths(table: Table, choice: ColumnChoice, length: Column, unit: str = "mm") -> None:
     """Refuse current lengths that are not positive, or do not change."""
     row = int(np.argmin(length))
     if length[row] <= 0:
         raise InputError(
-            f"{table.place(choice.deformation, row)}: a specimen cannot be {length[row]:g} mm long. If these are "
+            f"{table.place(choice.deformation, row)}: a specimen cannot be {length[row]:g} {unit} long. If these are "
             "displacements, give the column so: --column displacement=NAME."
         )
     if np.ptp(length) < LEAST_CHANGE * length.max():
         raise InputError(
-            f"{table.place(choice.deformation)}: the specimen stays {length[0]:g} mm long, so this is no test of "
+            f"{table.place(choice.deformation)}: the specimen stays {length[0]:g} {unit} long, so this is no test of "
             "tension or compression. Give the columns of the deformation and of its load, and --mode."
         )

@@ -7,18 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import (
-    COMPONENTS,
-    CYCLE_NAMES,
-    STRESS_NOUNS,
-    dimensions_named,
-    heading,
-    role_names,
-)
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, heading, role_names
+from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES
 from tissuq.experiments.units import measured_in
 
 __all__ = [
@@ -40,18 +35,18 @@ LENGTHENINGS = ("stretch", "strain", "displacement", "length")
 SHEARS = ("shear", "twist", "rate", "sliding")
 DEFORMATIONS = (*LENGTHENINGS, *SHEARS, *DIAMETERS)
 LOADS = ("stress", "torque", "force", PRESSURE)
-DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist"}
+DEFORMATIONS_OF_UNITS = {"strain": "strain", "length": "displacement", "angle": "twist", "pixels": "length"}
 """What a column is that alone has such a unit."""
 OTHER_MEASURE = (
     r"true|cauchy|piola|kirchhoff|pk|log|hencky|green|almansi|lagrang|euler|wahr|vrai|r[ée]elle|verdader|real\b|"
-    r"真|对数|対数"
+    r"真|对数|対数|истинн|логарифм|грина|альманси|коши|пиол"
 )
 """Within names of a strain or stress that is, or may be, another one than the engineering one."""
 NOT_ENGINEERING = re.compile(rf"^(sigma|σ|[st]( ?([1-3xyzrθ]|theta){{2}})?$)|{OTHER_MEASURE}")
 """Names of a stress that is, or may be, over another area than the undeformed one."""
-IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력")
+IS_PRESSURE = re.compile(r"pressure|druck$|pression|presi[oó]n|press[aã]o|压力|壓力|圧力|압력|давлени")
 NEITHER_LOAD_NOR_DEFORMATION = re.compile(
-    r"modul|time|zeit|temp|tijd|时间|時間|시간|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
+    r"modul|time|zeit|temp|tijd|时间|時間|시간|время|температур|модул|энерги|скорост|温度|模量|cycle|energy|rate|index|^(no|nr|n|point|punkt|step)\.?$|"
     + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
@@ -116,7 +111,8 @@ def _by_unit(table: Table, quantities: Sequence[str]) -> dict[str, list[int]]:
     """Return the columns that vary, and that no name says are of something else, by the kind of their unit."""
     columns_of: dict[str, list[int]] = {}
     for column, quantity in enumerate(quantities):
-        if not _is_of_something_else(quantity) and not table.is_constant(column):
+        is_other = _is_of_something_else(quantity) or other_quantity(quantity, table.unit(column))
+        if not is_other and not table.is_constant(column):
             columns_of.setdefault(measured_in(table.unit(column)), []).append(column)
     return columns_of
 
@@ -141,7 +137,8 @@ def recognise(
     if len(columns) > 1:
         raise ambiguous(table, candidates, columns)
     if not columns:
-        hint = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
+        by_role = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
+        hint = by_role or _of_other_quantities(table, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         quantities = [heading(name).quantity for name in table.names]
         of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
@@ -157,6 +154,20 @@ def recognise(
     return columns[0]
 
 
+def _of_other_quantities(table: Table, roles: Sequence[str]) -> str:
+    """Return which columns have a unit of one of the roles, but the name of another quantity, and how to read them."""
+    role_of_kind = {kind: DEFORMATIONS_OF_UNITS.get(kind, kind) for kind in (*LOADS, *DEFORMATIONS_OF_UNITS)}
+    texts = []
+    for column, name in enumerate(table.names):
+        role = role_of_kind.get(measured_in(table.unit(column)), "")
+        if role in roles and (what := other_quantity(heading(name).quantity, table.unit(column))):
+            texts.append(
+                f" Column {table.label(column)} is {what}, by its name. If it is the {role} all the same, "
+                f'give --column {role}="{name}".'
+            )
+    return "".join(texts)
+
+
 def _stress_hint(table: Table, contents: Contents) -> str:
     for column, quantity in enumerate(contents.quantities):
         if quantity in role_names("torque"):
@@ -164,7 +175,9 @@ def _stress_hint(table: Table, contents: Contents) -> str:
         if IS_PRESSURE.search(quantity):
             return f" Column {table.label(column)} is a pressure. For a tube, give --column outer_diameter=NAME, too."
         is_symbol = quantity in COMPONENTS["stress"]
-        if measured_in(table.unit(column)) == "stress" and (is_symbol or NOT_ENGINEERING.search(quantity)):
+        is_other = other_quantity(quantity, table.unit(column))
+        is_stress = measured_in(table.unit(column)) == "stress" and not is_other
+        if is_stress and (is_symbol or NOT_ENGINEERING.search(quantity)):
             return f" Column {table.label(column)} may be a stress of several types. {say_which('stress')}"
     return ""
 

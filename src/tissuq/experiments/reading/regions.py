@@ -98,7 +98,9 @@ class TestedStress:
         """Where the stress falls by a few per cent while the test goes on, before any rupture or hold."""
         end = min(event.start for event in (self.rupture, *self.holds, Event(len(self.stress), 0, 0.0)) if event)
         found = []
+        saturated = find_saturation(self.stress)  # equal loads hide the scatter of the others
         for rows in self._away_from_reference(end):
+            rows = np.setdiff1d(rows, saturated)
             slips = find_slips(self.course[rows], self.stress[rows], self.load_step or 0.0)
             found += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
         return found

@@ -9,17 +9,11 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import (
-    CYCLE_NAMES,
-    SET_NAMES,
-    dimensions_named,
-    heading,
-    is_of_specimens,
-    plain,
-)
+from tissuq.experiments.reading.headings import dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.units import NUMBER
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 
 __all__ = [
     "SeveralSpecimens",

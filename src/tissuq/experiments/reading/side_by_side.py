@@ -6,8 +6,10 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.headings import (
     AXES,
+    dimensions_named,
     heading,
     is_of_mean,
     is_of_specimens,
@@ -19,6 +21,7 @@ from tissuq.experiments.reading.headings import (
     without_mean,
 )
 from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
@@ -111,6 +114,7 @@ def _told_by_unit(table: Table, column: int) -> _Role:
     quantity = heading(table.names[column]).quantity
     load, test = measured_in(table.unit(column)), without_mean(quantity)
     is_of_test = bool(test) and (_is_test(quantity) or is_of_mean(quantity)) and not of_spread(quantity)[0]
+    is_of_test = is_of_test and not other_quantity(quantity, table.unit(column))
     return _Role(load, test) if load in LOADS and is_of_test else _Role("", "")
 
 
@@ -135,15 +139,24 @@ def _is_test(text: str) -> bool:
     )
 
 
+def _states_size(cell: str) -> bool:
+    """Tell whether a cell names a size, or holds one with its unit."""
+    name, unit = re.split("[:=]", cell)[0], number_and_unit(cell)[1].removesuffix("2").removesuffix("²")
+    is_length = measured_in(unit) == "length" and len(unit) > 1  # one letter may be of months or minutes
+    return bool(dimensions_named(heading(name).quantity, is_cylinder=True)) or is_length
+
+
 def names_above(table: Table, columns: Sequence[int]) -> list[str]:
     """Return what the last line above the names of columns says over each of some; nothing where it says no names.
 
-    What stands over the first of neighbouring columns goes for them all.
+    What stands over the first of neighbouring columns goes for them all. A line of sizes says no names.
     """
     names = [heading(name).quantity for name in table.names]
     for _, text in reversed(table.head):
         cells = split(text, table.separator)[: len(names)]
         if [heading(cell).quantity for cell in cells] == names[: len(cells)] or not any(cells):
+            continue
+        if any(map(_states_size, cells)):
             continue
         above = filled_on(cells + [""] * (len(names) - len(cells)))
         over = [above[column] for column in columns]

@@ -10,17 +10,10 @@ from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import (
-    SPREADS,
-    heading,
-    is_of_count,
-    is_of_mean,
-    of_spread,
-    role_names,
-    without_mean,
-)
-from tissuq.experiments.reading.measures import Load
+from tissuq.experiments.reading.headings import heading, is_of_count, is_of_mean, of_spread, role_names, without_mean
+from tissuq.experiments.reading.loads import Load
 from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.vocabulary import SPREADS
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
 
 __all__ = ["Spread", "spread_of"]
@@ -191,6 +184,6 @@ def _scale(table: Table, choice: ColumnChoice, column: int, load: Load) -> tuple
     unit = table.unit(column)
     if measured_in(unit) != choice.load:
         return load.scale, f"the unit of {table.label(choice.stress)}"
-    if load.area is not None:
-        return FORCE.factor(unit) / load.area, f"{unit} / {load.area:g} mm2"
+    if load.divided is not None:
+        return load.divided.factor(unit) / load.by, f"{unit} / {load.by:g} {'mm2' if load.divided is FORCE else 'mm'}"
     return stress_unit(unit).to_mpa, f"{unit} (from the file)"

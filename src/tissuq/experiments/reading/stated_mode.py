@@ -46,11 +46,18 @@ NAMES_OF_MODES = {"pure-shear": "planar"}
 """Further names of loading modes."""
 CONFINED = re.compile(r"(^|-)confined($|-)")
 """Words for compression between walls, which no loading mode is."""
-RHEOMETER = re.compile(r"parallel[ -]plate|plate[ -/]plate|platte[ -/]platte|cone|kegel|geometry name|rheomet")
+RHEOMETER = re.compile(
+    r"parallel[ -]plate|plate[ -/]plate|platte[ -/]platte|cone|kegel|geometry name|rheomet|interval and data points|"
+    r"interval data|rheocompass|\btrios\b"
+)
 """Words above a table of a rheometer."""
+OF_RHEOMETER = re.compile(
+    r"normal ?(force|stress|kraft|spannung)|force normale|\bgap\b|spalt|нормальн|法向力|法線力|^step time$"
+)
+"""Names of columns that a rheometer writes beside strain and stress."""
 DIRECTIONS_OF_LOAD = {
-    "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축"),
-    "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장"),
+    "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축|сжати"),
+    "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени"),
 }
 """Words for the direction of a load."""
 HEAD_LINES = 20
@@ -128,13 +135,13 @@ def is_torque(name: str) -> bool:
 
 def check_not_sheared(table: Table) -> None:
     """Refuse strains and stresses of which nothing says the mode, and that a rheometer seems to have measured."""
-    torque = [name for name in table.names if is_torque(name)]
+    columns = [f"column '{name}' is a torque" for name in table.names if is_torque(name)]
+    columns += [f"it has a column '{name}'" for name in table.names if OF_RHEOMETER.search(heading(name).quantity)]
     lines = [f"line {line} says '{text.strip()}'" for line, text in table.head if RHEOMETER.search(text.lower())]
-    signs = lines or [f"column '{name}' is a torque" for name in torque]
-    if signs:
+    if signs := lines or columns:
         raise InputError(
-            f"{table.file}: {signs[0]}: if a rheometer sheared the specimen, give --mode simple-shear, if it pulled or "
-            "pressed it, --mode uniaxial."
+            f"{table.file}: {signs[0]}, as rheometers write it: if one sheared the specimen, give --mode simple-shear, "
+            "if it was pulled or pressed, --mode uniaxial."
         )
 
 

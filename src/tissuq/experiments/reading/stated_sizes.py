@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import prod
 
+from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
 from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import (
-    CYCLE_NAMES,
-    SET_NAMES,
-    Heading,
-    dimensions_named,
-    heading,
-    is_of_specimens,
-    plain,
-)
+from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
+from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, are_named, numbered, sizes_in_line
 from tissuq.experiments.reading.side_by_side import names_above
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.units import AREA, LENGTH, NUMBER, Quantity, number_and_unit, number_in
+from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
+from tissuq.experiments.units import AREA, LENGTH, Quantity
 
 __all__ = ["UNIT_ASSUMED", "StatedSize", "names_of_specimen", "stated_sizes"]
 
 UNIT_ASSUMED = "as of displacements)"
 """What follows the unit of a size that a table of specimens states without one."""
-UNITS = r"(?P<unit>(?:mm|cm|um|µm)[2²]?)"
+UNIT = r"(?:mm|cm|um|µm|мм|см|мкм|毫米|厘米)[2²]?"
+UNITS = rf"(?P<unit>{UNIT})"
 """Of sizes, where they stand among other words."""
-BETWEEN_STATEMENTS = re.compile(r";|,\s+(?=[^\W\d])")
-"""As in ``Width 5 mm; thickness 2 mm``."""
+BETWEEN_STATEMENTS = re.compile(rf";|,\s+(?=[^\W\d])(?!{UNIT}\s*[:=])")
+"""As in ``Width 5 mm; thickness 2 mm``, but not in ``Width, mm: 5``."""
+ASSIGNMENT = r"[:=\t]"
 BETWEEN_WORDS = re.compile(
-    rf"[:=\t]|\s{{2,}}|(?<=\w)(?<! x)\s+(?={NUMBER.pattern}\s*[\[(]?{UNITS})".replace("?P<unit>", "?:")
+    rf"{ASSIGNMENT}|\s{{2,}}|(?<=\w)(?<! x)\s+(?={NUMBER.pattern}\s*[\[(]?{UNIT}|{PRODUCT.pattern}\s*(?:{UNIT}|$))"
 )
 """What stands between the name of a size and its value, as in ``Width : 5 mm`` and ``Width 5 mm``."""
 DEVIATION = re.compile(rf"\s*(?:±|\+/?-)\s*{NUMBER.pattern}")
@@ -40,6 +38,9 @@ UNCLEAR = (
     re.compile(rf"[\[(]{UNITS}[\])]\W*(?P<number>{NUMBER.pattern})"),
 )
 """Numbers with a unit of a size among other words, but for products such as ``5 x 2 mm``."""
+CROSS_OF_NAMES = re.compile(r"\s+[x*]\s+|\s*×\s*")
+NAMES_OF_SIDES = {"l": "length", "b": "width", "w": "width", "h": "thickness", "t": "thickness"}
+"""Symbols of the sides of a specimen in a product, as in ``b x h: 5 x 2 mm``."""
 LONGEST_QUOTE = 60
 """Characters of a line that a message shows."""
 
@@ -59,6 +60,8 @@ class StatedSize:
         Words that tell where it stands.
     text : str
         What stands there.
+    measurement : str
+        Which of several measurements of it this is, by its number; empty where it is the only one.
     """
 
     name: str
@@ -66,6 +69,7 @@ class StatedSize:
     value: float
     source: str
     text: str
+    measurement: str = ""
 
     def is_of(self, dimension: str, *, is_cylinder: bool) -> bool:
         """Tell whether it is a dimension of the specimen; a height is the length of a cylinder."""
@@ -73,12 +77,37 @@ class StatedSize:
         return is_kind and dimension in dimensions_named(self.name, is_cylinder=is_cylinder)
 
 
-def stated_sizes(table: Table, specimens: Collection[str]) -> list[StatedSize]:
-    """Return the lengths and areas that a file states of the specimen in a table, which it calls by some names."""
-    sizes = [*_in_lines(table), *_in_columns(table), *_of_specimens(table, "", table.head, specimens)]
+def stated_sizes(table: Table, specimens: Collection[str], test: TestBeside | None = None) -> list[StatedSize]:
+    """Return the lengths and areas that a file states of the specimen in a table, which it calls by some names.
+
+    Of several tests side by side in it they are those over the columns of one, or that have its number.
+    """
+    if test is None and not table.number:
+        specimens = {*specimens, *_only_specimen(table)}
+    sizes = [*_in_lines(table, test), *_in_columns(table), *_of_specimens(table, "", table.head, specimens)]
     for sheet, lines in table.other_lines.items():
         sizes += _of_specimens(table, sheet, lines, specimens)
-    return sizes
+    if test is None:
+        return sizes
+    return [size for size in (_of_test(size, sizes, test) for size in sizes) if size]
+
+
+def _of_test(size: StatedSize, sizes: Sequence[StatedSize], test: TestBeside) -> StatedSize | None:
+    """Return a size that may be that of one of several tests, by its number or name; None where it is that of another.
+
+    As many as there are tests are no measurements of one specimen, whatever their numbers.
+    """
+    if not dimensions_named(size.name, is_cylinder=True):
+        for name in test.names:
+            alone = plain(re.sub(rf"(?<!\w){re.escape(plain(name))}(?!\w)", " ", size.name))
+            if alone != size.name and dimensions_named(alone, is_cylinder=True):
+                return replace(size, name=alone) if name == test.name else None
+    numbers = {other.measurement for other in sizes if (other.name, other.kind) == (size.name, size.kind)}
+    if not size.measurement or len(numbers) < len(test.loads):
+        return size
+    if numbers == set(test.numbers) and size.measurement != test.number:
+        return None
+    return replace(size, measurement="")
 
 
 def names_of_specimen(
@@ -95,48 +124,95 @@ def names_of_specimen(
     return frozenset(filter(None, map(plain, names)))
 
 
-def _in_lines(table: Table) -> Iterator[StatedSize]:
+def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     """Yield what lines above the table state: ``Width : 5 mm``, ``"Probendicke";1,55;"mm"``, or less clear ones."""
+    is_of_one = not table.number and not any(is_of_specimens(heading(name).quantity) for name in table.names)
     for line, text in table.head:
-        text = text.lstrip("# ")
+        text, source = text.lstrip("# "), f"in line {line}"
+        if several := sizes_in_line(text, table.separator):
+            for sizes in several:
+                is_measured_again = is_of_one and not are_named(sizes, table)
+                yield from _of_several(sizes, test, source, is_measured_again=is_measured_again)
+            continue
         cells = [text] if table.separator == WHITESPACE else split(text, table.separator)
         statements = [statement for cell in cells for statement in BETWEEN_STATEMENTS.split(cell)]
-        words = [word.strip(' "') for statement in statements for word in BETWEEN_WORDS.split(statement)]
-        words = [word for word in words if word]
-        pairs = list(zip(words, words[1:], [*words[2:], ""], strict=False))
-        clear = [sizes for pair in pairs if (sizes := _of_words(*pair, f"in line {line}"))]
-        yield from clear if clear else _among_words(text, f"in line {line}")
+        words = list(_words(statements))
+        pairs = zip(words, words[1:], [*words[2:], ("", "")], strict=False)
+        clear = [
+            replace(size, measurement=measurement if is_of_one or test else "")
+            for (name, measurement), (number, _), (unit, _) in pairs
+            for size in _of_words(name, number, unit, source)
+        ]
+        yield from clear if clear else _among_words(text, source)
 
 
-def _of_words(name: str, number: str, unit: str, source: str) -> StatedSize | None:
-    """Return the size that a name, and a number after it, state; the unit is with one of them, or comes next."""
+def _words(statements: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield names and values in statements; names of sizes without the number of their measurement, and that number."""
+    parts = [part.strip(' "') for statement in statements for part in re.split(ASSIGNMENT, statement)]
+    parts = [part for part in parts if part]
+    for part, after in zip(parts, [*parts[1:], ""], strict=True):
+        name, measurement = numbered(part)
+        if measurement and NUMBER.match(after):
+            yield name, measurement
+        else:
+            yield from ((word.strip(' "'), "") for word in BETWEEN_WORDS.split(part) if word.strip(' "'))
+
+
+def _of_several(
+    sizes: SizesInLine, test: TestBeside | None, source: str, *, is_measured_again: bool
+) -> Iterator[StatedSize]:
+    """Yield the value of a test of several that a line states, or all: of one specimen they are its measurements."""
+    if test and (text := sizes.over(test)) is not None:
+        yield from _sizes(heading(sizes.name), text, f"{source}, over its columns", f"{sizes.name}: {text}")
+        return
+    for number, place in enumerate(sizes.places, 1):
+        for size in _sizes(heading(sizes.name), place.text, source, f"{sizes.name}: {place.text}"):
+            yield replace(size, measurement=str(number) if is_measured_again and not test else "")
+
+
+def _of_words(name: str, number: str, unit: str, source: str) -> list[StatedSize]:
+    """Return the sizes that a name, and what follows it, state; the unit is with one of them, or comes next."""
     for text in (f"{number} {unit}", number):
         value = DEVIATION.sub("", text)
-        if (size := _size(heading(name), value, source, f"{name}: {text.strip()}")) is not None:
-            return size
-    return None
+        if sizes := _sizes(heading(name), value, source, f"{name}: {text.strip()}"):
+            return sizes
+    return []
 
 
 def _among_words(text: str, source: str) -> Iterator[StatedSize]:
     """Yield a length or an area among other words, which is a size without a name."""
     for match in filter(None, (pattern.search(text) for pattern in UNCLEAR)):
         shown = " ".join(text.split())[:LONGEST_QUOTE]
-        if (size := _size(Heading("", match["unit"]), match["number"], source, shown)) is not None:
-            yield size
+        if sizes := _sizes(Heading("", match["unit"]), match["number"], source, shown):
+            yield from sizes
             return
 
 
 def _in_columns(table: Table) -> Iterator[StatedSize]:
     """Yield the sizes in columns of them that hold one number all along."""
     for column, name in enumerate(table.names):
-        if not dimensions_named(heading(name).quantity, is_cylinder=True):
+        quantity, measurement = numbered(heading(name).quantity)
+        if not dimensions_named(quantity, is_cylinder=True):
             continue
         cells = {cell for cell in table.texts(column) if cell.lower() not in MISSING}
         if not all(map(NUMBER.fullmatch, cells)) or len(set(map(number_in, cells))) != 1:
             continue
         value, source = next(iter(cells)), f"in column {table.label(column)}"
-        named = (Heading(heading(name).quantity, unit) for unit in table.stated_units(column))
-        yield from filter(None, (_size(of_unit, value, source, f"{name}: {value}") for of_unit in named))
+        for unit in table.stated_units(column):
+            sizes = _sizes(Heading(quantity, unit), value, source, f"{name}: {value}")
+            yield from (replace(size, measurement=measurement) for size in sizes)
+
+
+def _only_specimen(table: Table) -> set[str]:
+    """Return the name of the specimen in a table of one row above the measurements; nothing where there are more."""
+    is_beneath, names = False, set[str]()
+    for _, text in table.head:
+        cells = split(text.lstrip("# "), table.separator)
+        if any(map(NUMBER.fullmatch, cells)):
+            names |= {plain(cells[0])} if is_beneath else set()
+        elif any(dimensions_named(heading(cell).quantity) for cell in cells[1:]):
+            is_beneath = True
+    return names if len(names) == 1 else set()
 
 
 def _of_specimens(
@@ -151,7 +227,8 @@ def _of_specimens(
     for line, text in lines:
         cells = split(text.lstrip("# "), table.separator)
         if not any(map(NUMBER.fullmatch, cells)):
-            found = {k: heading(cell) for k, cell in enumerate(cells) if k and dimensions_named(heading(cell).quantity)}
+            named = {k: heading(cell) for k, cell in enumerate(cells) if k}
+            found = {k: name for k, name in named.items() if dimensions_named(numbered(name.quantity)[0])}
             units = {k: cells[k].strip("[]()") for k in names if k < len(cells)}
             if not found and any(kind.factor_or_none(unit) for unit in units.values() for kind in (LENGTH, AREA)):
                 names = {k: Heading(name.quantity, units.get(k) or name.unit) for k, name in names.items()}
@@ -164,15 +241,27 @@ def _of_specimens(
                 if not name.unit and len(in_table) == 1:
                     name = Heading(name.quantity, *in_table)
                     where = f"{place} ({name.unit} {UNIT_ASSUMED}"
-                if (size := _size(name, cells[column], where, f"{name.quantity}: {cells[column]}")) is not None:
-                    yield size
+                quantity, measurement = numbered(name.quantity)
+                sizes = _sizes(Heading(quantity, name.unit), cells[column], where, f"{name.quantity}: {cells[column]}")
+                yield from (replace(size, measurement=measurement) for size in sizes)
 
 
-def _size(name: Heading, text: str, source: str, shown: str) -> StatedSize | None:
-    """Return the length or the area that a text states, in the unit there or beside the name; None for others."""
+def _sizes(name: Heading, text: str, source: str, shown: str) -> list[StatedSize]:
+    """Return the length or the area that a text states, in the unit there or beside the name; nothing for others.
+
+    Of a product such as ``5 x 2 mm`` they are the sizes that the name has for its factors, or else the area of two.
+    """
+    sides, unit = sides_and_unit(text)
+    if sides and min(sides) > 0 and (factor := LENGTH.factor_or_none(unit or name.unit)):
+        names = [NAMES_OF_SIDES.get(side, side) for side in re.split(CROSS_OF_NAMES, name.quantity)]
+        if len(names) == len(sides):
+            pairs = zip(names, sides, strict=True)
+            return [StatedSize(side, LENGTH, number * factor, source, shown) for side, number in pairs]
+        is_area = len(sides) == 2
+        return [StatedSize(name.quantity, AREA, prod(sides) * factor**2, source, shown)] if is_area else []
     number, unit = number_and_unit(text)
     for kind in (LENGTH, AREA):
         factor = kind.factor_or_none(unit or name.unit)
         if number and number > 0 and factor:
-            return StatedSize(name.quantity, kind, number * factor, source, shown)
-    return None
+            return [StatedSize(name.quantity, kind, number * factor, source, shown)]
+    return []

@@ -87,7 +87,7 @@ STRAIN_MEASURES = {
         StrainMeasure(
             name="engineering",
             words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|unitari[ao]|"
-            r"unitaire|relative|工程|公称",
+            r"unitaire|relative|工程|公称|инженерн\w+|номинальн\w+|условн\w+|относительн\w+",
             stretch=lambda strain: 1 + strain,
             strain=lambda stretch: stretch - 1,
             formula="1 + {}",
@@ -97,14 +97,14 @@ STRAIN_MEASURES = {
         StrainMeasure(
             name="true",
             words=r"true|log\.?|logar\w*|ln|hencky|natural|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|"
-            r"verdadeir[ao]|werkelijke|真实|真實|真|对数|對數|対数",
+            r"verdadeir[ao]|werkelijke|真实|真實|真|对数|對數|対数|истинн\w+|логарифмическ\w+",
             stretch=np.exp,
             strain=np.log,
             formula="exp({})",
         ),
         StrainMeasure(
             name="green",
-            words=r"green( ?(lagrange|lagrangian|(de )?(st\.?|saint) venant))?",
+            words=r"green( ?(lagrange|lagrangian|(de )?(st\.?|saint) venant))?|грина( лагранжа)?",
             stretch=lambda strain: np.sqrt(1 + 2 * strain),
             strain=lambda stretch: (stretch**2 - 1) / 2,
             formula="sqrt(1 + 2 x {})",
@@ -114,7 +114,7 @@ STRAIN_MEASURES = {
         ),
         StrainMeasure(
             name="almansi",
-            words=r"(euler(ian)? )?almansi",
+            words=r"(euler(ian)? )?almansi|альманси",
             stretch=lambda strain: 1 / np.sqrt(1 - 2 * strain),
             strain=lambda stretch: (1 - stretch**-2) / 2,
             formula="1 / sqrt(1 - 2 x {})",
@@ -126,7 +126,7 @@ STRAIN_MEASURES = {
             name="angle",
             words=r"shear(ing)? angle|angle of shear|(scher|schub|scherungs|gleit)winkel|"
             r"angle de (cisaillement|glissement)|[áa]ngulo de (corte|cizallamiento|cizalladura|cisalhamento)|"
-            r"angolo di (taglio|scorrimento)|afschuifhoek|剪切角|せん断角",
+            r"angolo di (taglio|scorrimento)|afschuifhoek|剪切角|せん断角|угол сдвига",
             shear=np.tan,
             shear_formula="tan({})",
             limits=(-pi / 2, pi / 2),

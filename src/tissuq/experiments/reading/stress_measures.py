@@ -62,13 +62,13 @@ STRESS_MEASURES = {
     for measure in (
         StressMeasure(
             name="engineering",
-            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|"
+            words=r"engineering|eng\.?|nominal\w*|nominell\w*|technisch\w*|conventionnelle|ingenieril|工程|公称|инженерн\w+|номинальн\w+|условн\w+|"
             r"pk ?1|(1st|first|1\.) (pk|piola( kirchhoff)?)",
         ),
         StressMeasure(
             name="cauchy",
             words=r"cauchy|true|kirchhoff|wahre?[rs]?|vraie?|r[ée]elle|verdader[ao]|real|ver[ao]|verdadeir[ao]|"
-            r"werkelijke|真实|真實|真",
+            r"werkelijke|真实|真實|真|истинн\w+|коши",
             engineering=_from_cauchy,
             step="Cauchy stress divided by stretch to engineering stress",
         ),

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.experiments.numbers import NUMBER, number_in
 from tissuq.experiments.reading.layout import MISSING
-from tissuq.experiments.units import NUMBER, number_in
 
 __all__ = ["Summary", "find_summary"]
 

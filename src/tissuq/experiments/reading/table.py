@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import (
     MISSING,
@@ -16,7 +17,7 @@ from tissuq.experiments.reading.layout import (
     WHITESPACE,
     split,
 )
-from tissuq.experiments.units import BRACKETS, NUMBER
+from tissuq.experiments.units import BRACKETS
 
 __all__ = ["Column", "Lines", "Table", "padded", "rows_in"]
 

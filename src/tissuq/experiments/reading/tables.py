@@ -19,7 +19,7 @@ from tissuq.experiments.reading.beside import without_statements_beside
 from tissuq.experiments.reading.blocks import blocks_of
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
-from tissuq.experiments.reading.headings import heading, is_of_specimens
+from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import (
     WHITESPACE,
     column_names,
@@ -36,7 +36,8 @@ from tissuq.experiments.reading.summary import find_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
 from tissuq.experiments.reading.thousands import without_thousands
-from tissuq.experiments.units import NUMBER, number_and_unit
+from tissuq.experiments.reading.titles import number_before, title_of
+from tissuq.experiments.reading.transposed import transposed_table
 
 __all__ = ["read_table", "read_tables"]
 
@@ -52,7 +53,7 @@ MOST_COLUMNS = 1000
 """Columns of a table that is read in seconds."""
 CACHED_FILES = 2
 """Files whose tables are remembered: tests of one file are read one after another."""
-TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo)|(zeit|time)$")
+TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
 """Names of a column of times."""
 
 
@@ -217,6 +218,8 @@ def _read_every_line(
     every_line = list(enumerate(lines, start=1))[skip_rows:]
     filled = [(line, text) for line, text in every_line if text.strip(' \t;,"')]
     content = _without_comments(filled)
+    if (on_its_side := transposed_table(file, content, separator, sheet)) is not None:
+        return [on_its_side]
     layout = find_layout([text for _, text in content], separator)
     if layout is None:
         raise _no_table(file, content)
@@ -274,7 +277,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         lines=[line for line, _ in content[layout.first_row :]],
         head=[(line, text) for line, text in filled if line < first_line],
         sheet=sheet,
-        title=_number_before(names) or _title(texts[: layout.names or 0], separator),
+        title=number_before(names) or title_of(texts[: layout.names or 0], separator),
     )
     table = without_statements_beside(table)
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
@@ -282,38 +285,6 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
         table = with_names_above(table, texts[layout.names - 1])
     table = with_spreads_apart(without_percent_signs(without_thousands(table)))
     return _without_summary(table)
-
-
-def _number_before(names: Sequence[str]) -> str:
-    """Return the number of a table that stands before the names of its columns; an empty text where none does."""
-    return names[0] if names and NUMBER.fullmatch(names[0]) else ""
-
-
-def _title(above: Sequence[str], separator: str) -> str:
-    """Return what the lines above the names call the table; an empty text where they do not.
-
-    That is the specimen that they state, or else what stands alone in the last of them that states no size; sizes may
-    stand beneath it.
-    """
-    lines = [[cell for cell in split(line, separator) if cell] for line in above]
-    if separator == WHITESPACE:
-        lines = [[" ".join(cells)] for cells in lines]
-    last = lines[-1] if lines else []
-    while lines and (statement := _statement(lines[-1])):
-        name, value = statement
-        if is_of_specimens(heading(name).quantity):
-            return value
-        if number_and_unit(value)[0] is None:
-            break
-        lines.pop()
-    cells = lines[-1] if lines else last
-    return cells[0] if len(cells) == 1 and not NUMBER.fullmatch(cells[0].split()[0]) else ""
-
-
-def _statement(cells: Sequence[str]) -> tuple[str, str] | None:
-    """Return the name and the value in a line such as ``Width: 5 mm``, in one cell or in several; None in others."""
-    name, *values = [word.strip() for cell in cells for word in re.split(r"[:=]", cell)]
-    return (name, " ".join(filter(None, values))) if any(values) and not NUMBER.fullmatch(name) else None
 
 
 def _joined(tables: Sequence[Table]) -> list[Table]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,9 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.experiment_file import Reading, read_rows
+from tissuq.experiments.reading.labels import check_labels, columns_only
 from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
+from tissuq.experiments.reading.notes import concerned
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows, row_names
 from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
@@ -82,10 +84,7 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     """
     plain = cast(ReadingOptions, spelled_out(options, READING_OPTIONS))
     tests = find_tests_in_file(path, **plain)
-    noted: dict[str, list[str]] = {}
-    for test in tests:
-        for text in test.reading.notes:
-            noted.setdefault(text, []).append(test.name)
+    noted = concerned((test.name, text) for test in tests for text in test.reading.notes)
     for text, names in noted.items():
         warnings.warn(text if len(names) == len(tests) else f"{', '.join(names)}: {text}", stacklevel=2)
     return [test.reading.experiment for test in tests]
@@ -155,7 +154,7 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
             selection["table"] = table.number
             names.append(table.title or str(table.number))
         try:
-            rows = only_rows(table, options.get("only"))
+            rows = only_rows(table, columns_only(table, options.get("only")))
             of_table = _side_by_side(rows, path, selection, names)
         except InputError as error:
             unrecognised.append((table, error))
@@ -172,11 +171,32 @@ def find_tests_in_file(path: Any, **options: Unpack[ReadingOptions]) -> list[Tes
     longest = max((len(test.reading.recorded) for test in tests), default=0)
     of_few_rows = [test.name for test in tests if _are_few(len(test.reading.recorded), longest)]
     tests = [test for test in tests if not _are_few(len(test.reading.recorded), longest)]
+    tests = _of_labels(tests, options.get("only"))
     _check_modes(path, tests)
     notes = [f"'{name}' is left out: of {SHORT_TABLE} rows or fewer, and no test." for name in of_few_rows]
     notes += [f"{table.file} is left out: no columns of a test are recognised in it." for table, _ in unrecognised]
     notes += [f"{table.file} is left out: it is short, and cannot be read as a test." for table, _ in unreadable]
     return [test._replace(reading=replace(test.reading, warnings=(*test.reading.warnings, *notes))) for test in tests]
+
+
+def _of_labels(tests: list[TestInFile], only: Mapping[str, str | int] | None) -> list[TestInFile]:
+    """Return the tests whose direction and condition are those asked for.
+
+    Raises
+    ------
+    InputError
+        When there is none: why the first is not.
+    """
+    refusals, chosen = list[InputError](), list[TestInFile]()
+    for test in tests:
+        try:
+            check_labels(test.reading.table, test.reading.experiment, only)
+            chosen.append(test)
+        except InputError as refusal:
+            refusals.append(refusal)
+    if refusals and not chosen:
+        raise refusals[0]
+    return chosen
 
 
 def _are_few(rows: int, longest: int) -> bool:

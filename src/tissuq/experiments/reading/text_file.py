@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from tissuq.errors import InputError
+from tissuq.experiments.numbers import without_marks
 
 __all__ = ["read_lines"]
 
@@ -16,11 +17,25 @@ NOT_TEXT = {
     b"%PDF": "a PDF document",
     b"\x89HDF": "an HDF5 file",
 }
-JAPANESE = "cp932"
-"""Windows' form of Shift-JIS."""
+CHINESE_WORD = re.compile(r"[\u4e00-\u9fff]{2,}")
 JAPANESE_WORD = re.compile(r"[\u3040-\u30fa\u30fc\u4e00-\u9fff]{2,}")
-JAPANESE_SHARE = 0.25
-"""Bytes that begin characters of Shift-JIS, and characters in words of it, over the bytes beyond ASCII, at least."""
+RUSSIAN_WORD = re.compile(r"(?<!\w)(?:[А-ЯЁ]?[а-яё]{2,}|[А-ЯЁ]{2,}|[кмМГ]?(?:Н|Па))(?!\w)")
+"""One in capitals, in small letters, or with a capital first, as letters of another alphabet hardly make one."""
+LANGUAGES = {
+    "cp932": (JAPANESE_WORD, range(0x81, 0x99)),
+    "gb18030": (CHINESE_WORD, range(0xB0, 0xD8)),
+    "big5": (CHINESE_WORD, range(0xA4, 0xC7)),
+    "cp1251": (RUSSIAN_WORD, range(0xA8, 0x100)),
+    "cp866": (RUSSIAN_WORD, range(0x80, 0xF2)),
+    "koi8-r": (RUSSIAN_WORD, range(0xA3, 0x100)),
+}
+"""Encodings of other alphabets than Western Europe's: their words, and the first bytes of their usual characters."""
+SHARE_OF_WORDS = 0.25
+"""Usual characters in such words over those beyond ASCII, at least."""
+LINES_FOR_ENCODING = 200
+"""Lines with bytes beyond ASCII that show an encoding."""
+FORTRAN_EXPONENT = re.compile(r"(\d\.\d*|\.\d+)[dD]([+-]\d{2,3})\b")
+"""As in ``1.234D+02``."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
 
@@ -28,7 +43,8 @@ LONGEST_LINE = 100_000
 def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """Return the lines of a text file, numbered as an editor shows them, without their ends.
 
-    UTF-8 (with or without byte order mark), UTF-16, Shift-JIS and Windows/Latin-1 are told apart by their bytes.
+    UTF-8 (with or without byte order mark), UTF-16, Shift-JIS, GB18030, Big5, Cyrillic and Windows/Latin-1 are
+    told apart by their bytes.
 
     Raises
     ------
@@ -36,7 +52,8 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
         When there is no such file, it cannot be read, is empty, or is not text.
     """
     text = _decoded(path, _content(Path(path)))
-    lines = text.replace("\u2212", "-").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    text = FORTRAN_EXPONENT.sub(r"\1e\2", text) if any(sign in text for sign in ("D+", "D-", "d+", "d-")) else text
+    lines = without_marks(text.replace("\u2212", "-")).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines
@@ -85,14 +102,20 @@ def _encodings(content: bytes) -> list[str]:
             return [encoding]
     if b"\0" in content[:2]:
         return ["utf-16-be" if content[0] == 0 else "utf-16-le"]
-    return ["utf-8", *([JAPANESE] if _may_be_japanese(content) else []), "cp1252", "latin-1"]
+    lines = [line for line in content.splitlines() if not line.isascii()]
+    sample = b"\n".join(lines[:LINES_FOR_ENCODING])
+    shares = {encoding: _share_of_words(sample, encoding) for encoding in LANGUAGES}
+    likely = max(shares, key=lambda encoding: shares[encoding])
+    return ["utf-8", *([likely] if shares[likely] > SHARE_OF_WORDS else []), "cp1252", "latin-1"]
 
 
-def _may_be_japanese(content: bytes) -> bool:
-    """Tell whether bytes are words of Shift-JIS: bytes that begin its characters are no letters in Western Europe."""
-    non_ascii = content.translate(None, bytes(range(0x80)))
-    beyond_ascii, leading = len(non_ascii), len(non_ascii.translate(None, bytes([0x80, *range(0xA0, 0x100)])))
-    if leading <= JAPANESE_SHARE * beyond_ascii:
-        return False
-    words = JAPANESE_WORD.findall(content.decode(JAPANESE, errors="replace"))
-    return sum(map(len, words)) > JAPANESE_SHARE * beyond_ascii
+def _share_of_words(content: bytes, encoding: str) -> float:
+    """Return the usual characters of an encoding in words of its languages, over those beyond ASCII.
+
+    Bytes that begin these characters are no letters in Western Europe, or hardly stand there beside one another.
+    """
+    words, first_bytes = LANGUAGES[encoding]
+    text = content.decode(encoding, errors="replace")
+    characters = "".join(words.findall(text))
+    usual = sum(letter.encode(encoding)[0] in first_bytes for letter in characters)
+    return usual / max(1, sum(not letter.isascii() for letter in text))

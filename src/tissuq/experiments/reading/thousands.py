@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from tissuq.experiments.numbers import GROUPED, NUMBER
 from tissuq.experiments.reading.layout import joined, split
 from tissuq.experiments.reading.table import Table
-from tissuq.experiments.units import GROUPED, NUMBER
 
 __all__ = ["without_thousands"]
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Planar
-from tissuq.experiments.reading.headings import ROLES_OF_TUBE, heading, role_names
+from tissuq.experiments.reading.headings import heading, role_names
 from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.vocabulary import ROLES_OF_TUBE
 from tissuq.experiments.units import measured_in
 
 __all__ = ["DIAMETERS", "PRESSURE", "with_columns_of_tube"]

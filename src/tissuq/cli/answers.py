@@ -1,0 +1,162 @@
+"""What a message proposes to type, as answers: options in its text, and the columns that they may name."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tissuq.cli.reading import DIMENSIONS, OPTIONS, settings_of
+from tissuq.errors import InputError
+
+__all__ = ["Answer", "answers_in", "options_in", "with_options"]
+
+SWITCHES = {"compression-positive": True, "tension-positive": False, "until-peak": True}
+"""Options without a value, and what they say."""
+SETTINGS = {"compression-positive": "compression_positive", "tension-positive": "compression_positive"}
+SETTINGS |= {"stretch": "stretch_range", "mode": "mode"}
+"""Names of settings that are not those of their options."""
+NUMBERS = ("table", "every", "mean_of", "skip_rows")
+"""Settings that are whole numbers."""
+OPTION = re.compile(r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+)))?""")
+OTHER_ROLES = re.compile(r"\(or ((?:\w+=(?:, | or )?)+)\)")
+"""As in ``--column stress=NAME (or force=)``."""
+PLACEHOLDERS = ("NAME", "NUMBER")
+TYPES = ("strain-type", "stress-type")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Options that a person may choose, as they are typed: with their values, or without where these are asked for.
+
+    ``leaves_out`` is the setting that the answer takes away.
+    """
+
+    options: tuple[tuple[str, str], ...]
+    leaves_out: str = ""
+
+    @property
+    def asked_for(self) -> tuple[str, ...]:
+        """The options whose values a person must type: sizes, of which messages show examples."""
+        return tuple(name for name, _ in self.options if name in DIMENSIONS)
+
+    @property
+    def text(self) -> str:
+        """The options as they are typed."""
+        if self.leaves_out:
+            return f"leave {self.options[0][0]} out"
+        words = [f"--{name}" if name in DIMENSIONS or not value else f"--{name} {shlex.quote(value)}"
+                 for name, value in self.options]  # fmt: skip
+        return " ".join(words)
+
+
+def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]) -> list[Answer]:
+    """Return what a message proposes, in its order, each once.
+
+    Parameters
+    ----------
+    message : str
+    columns : sequence of str
+        Names of the columns of the file, which stand for the placeholder NAME.
+    settings : mapping
+        Those that are given already, which a message may propose to leave out.
+
+    Examples
+    --------
+    >>> found = answers_in("Say which: --stress-unit kPa, or --stress-unit MPa.", [], {})
+    >>> [answer.text for answer in found]
+    ['--stress-unit kPa', '--stress-unit MPa']
+    """
+    found: list[Answer] = []
+    end = -1
+    for match in OPTION.finditer(message):
+        name, value = match["name"], (match["value"] or "").rstrip(".:")
+        if _setting(name) not in {*OPTIONS, "mode"}:
+            continue
+        value = "" if name in SWITCHES else "".join(shlex.split(value)) if value.count("'") % 2 == 0 else value
+        is_joined = match.start() == end + 1 and found and not found[-1].leaves_out
+        end = match.start() + len(f"--{name}") if name in SWITCHES else match.end()
+        if not value and settings.get(_setting(name)) is not None:
+            found.append(Answer(((f"--{name}", ""),), _setting(name)))
+        elif name == "column":
+            roles = [value.partition("=")[0], *_other_roles(message[match.end() :])]
+            names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
+            pairs = [f"{role}={column}" for role in roles for column in names] if names else [value]
+            found += [Answer((("column", pair),)) for pair in pairs]
+        elif name in TYPES and not value:
+            found += [Answer(((name, measure),)) for measure in _measures(name)]
+        elif value or name in SWITCHES:
+            if is_joined:
+                found[-1] = Answer((*found[-1].options, (name, value)))
+            else:
+                found.append(Answer(((name, value),)))
+    return list(dict.fromkeys(found))
+
+
+def options_in(text: str) -> tuple[tuple[str, str], ...]:
+    """Return the options that a person has typed, with their values.
+
+    Raises
+    ------
+    InputError
+        When there is something else than options of reading, or a value is missing.
+
+    Examples
+    --------
+    >>> options_in("--length '20 mm' --compression-positive")
+    (('length', '20 mm'), ('compression-positive', ''))
+    """
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise InputError(f"'{text}' cannot be understood: {error}.") from error
+    options: list[tuple[str, str]] = []
+    while words:
+        name = words.pop(0)
+        plain = name.removeprefix("--")
+        if plain == name or _setting(plain) not in {*OPTIONS, "mode"}:
+            raise InputError(f"'{name}' is no option of reading; write one such as --length '20 mm'.")
+        if plain not in SWITCHES and not words:
+            raise InputError(f"{name} needs a value.")
+        options.append((plain, "" if plain in SWITCHES else words.pop(0)))
+    return tuple(options)
+
+
+def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
+    """Return settings of reading with those of an answer, added to columns, sizes and rows that are given already."""
+    if answer.leaves_out:
+        return {**settings, answer.leaves_out: None}
+    values: dict[str, Any] = dict.fromkeys(OPTIONS)
+    mode = settings.get("mode")
+    for name, value in answer.options:
+        setting = _setting(name)
+        if setting == "mode":
+            mode = value
+        elif setting in ("column", "only"):
+            values[setting] = [*(values[setting] or []), value]
+        else:
+            values[setting] = SWITCHES.get(name, int(value) if setting in NUMBERS and value.isdecimal() else value)
+    merged = dict(settings) | {"mode": mode}
+    for setting, value in settings_of(values).items():
+        if value is not None:
+            known = merged.get(setting)
+            merged[setting] = {**known, **value} if isinstance(value, dict) and isinstance(known, dict) else value
+    return merged
+
+
+def _setting(name: str) -> str:
+    return SETTINGS.get(name, name.replace("-", "_"))
+
+
+def _other_roles(text: str) -> list[str]:
+    match = OTHER_ROLES.match(text.lstrip())
+    return re.findall(r"(\w+)=", match[1]) if match else []
+
+
+def _measures(name: str) -> list[str]:
+    from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+    from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+
+    return list(STRAIN_MEASURES if name == "strain-type" else STRESS_MEASURES)

@@ -1,0 +1,162 @@
+"""Questions in the terminal where files leave a choice: what messages propose, and what each answer would give."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+from tissuq.cli.answers import Answer, answers_in, options_in, with_options
+from tissuq.cli.reading import find_tests
+from tissuq.errors import InputError
+
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.experiment_file import Reading
+
+__all__ = ["ask_about"]
+
+Tests = list[tuple[dict[str, Any], "Reading"]]
+
+MOST_ANSWERS = 12
+"""That a question lists."""
+REFUSED = "then this is asked"
+"""Before what is said where an answer does not suffice."""
+WIDTH = 100
+"""Characters of a line."""
+MODE = "Nothing in the file says in which loading mode it was measured; uniaxial was assumed. Say which: "
+
+
+def ask_about(file: Path, reading: Mapping[str, Any], *, is_only_file: bool) -> tuple[Tests, dict[str, Any]]:
+    """Return the tests in a file, and the settings that read it, once a person has answered what it leaves open.
+
+    Raises
+    ------
+    InputError
+        When the input ends before all is answered, or a message says of nothing to type that could help.
+    """
+    settings, settled = dict(reading), set[str]()
+    columns = _columns(file, settings)
+    while True:
+        try:
+            tests = find_tests(file, settings, is_only_file=is_only_file)
+        except InputError as refusal:
+            answers = answers_in(str(refusal), columns, settings)
+            if not answers:
+                raise
+            settings = _chosen(file, str(refusal), answers, settings, is_only_file=is_only_file) or settings
+            continue
+        question = next((text for text in _open_questions(tests) if text not in settled), None)
+        if question is None:
+            return tests, settings
+        settled.add(question)
+        answers = answers_in(question, columns, settings)
+        if not answers:
+            continue
+        settings = _chosen(file, question, answers, settings, is_only_file=is_only_file, now=tests) or settings
+
+
+def _columns(file: Path, settings: Mapping[str, Any]) -> list[str]:
+    """Return the names of the columns in the tables of a file, or nothing where it cannot be read."""
+    from tissuq.experiments.reading.tables import read_tables
+
+    path = file if file.exists() else Path(str(file).partition("#")[0])
+    try:
+        tables = read_tables(path, settings.get("skip_rows") or 0, settings.get("sheet"), settings.get("table"))
+    except InputError:
+        return []
+    return list(dict.fromkeys(name for table in tables for name in table.names))
+
+
+def _open_questions(tests: Tests) -> list[str]:
+    """Return what was assumed of the tests: units, zeros, measures and loading modes."""
+    from tissuq.experiments.modes import loading_modes
+    from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
+
+    questions = [doubt for _, reading in tests for doubt in reading.doubts]
+    if any(reading.mode_source == DEFAULT_SOURCE for _, reading in tests):
+        questions.append(MODE + ", ".join(f"--mode {name}" for name in loading_modes()))
+    return list(dict.fromkeys(questions))
+
+
+def _chosen(
+    file: Path,
+    question: str,
+    answers: list[Answer],
+    settings: Mapping[str, Any],
+    *,
+    is_only_file: bool,
+    now: Tests | None = None,
+) -> dict[str, Any] | None:
+    """Return the settings with the answer that a person types; None to leave things as they are ``now``."""
+    print(f"\n{fill(question, WIDTH)}")
+    given = {answer: _what_it_gives(file, answer, settings, question, is_only_file=is_only_file) for answer in answers}
+    if now is not None:
+        is_read = {answer: text for answer, text in given.items() if not text.startswith(REFUSED)}
+        given = is_read or given
+    listed = [answer for answer in given if given[answer]][:MOST_ANSWERS] or answers[:MOST_ANSWERS]
+    if now is not None:
+        print(f"  Enter  leave it: {_in_words(now)}")
+    for number, answer in enumerate(listed, start=1):
+        print(fill(f"{number}  {answer.text}: {given.get(answer, '')}", WIDTH, initial_indent="  ",
+                   subsequent_indent="     "))  # fmt: skip
+    while True:
+        typed = _typed(f"Number{'' if now is None else ', Enter'} or options [1 to {len(listed)}]: ")
+        if not typed and now is not None:
+            return None
+        try:
+            if typed.isdecimal() and 1 <= int(typed) <= len(listed):
+                return with_options(settings, _with_sizes(listed[int(typed) - 1]))
+            if typed.startswith("--"):
+                return with_options(settings, Answer(options_in(typed)))
+            print(f"Type a number from 1 to {len(listed)}, or options such as --length '20 mm'.")
+        except InputError as error:
+            print(error)
+
+
+def _what_it_gives(
+    file: Path, answer: Answer, settings: Mapping[str, Any], question: str, *, is_only_file: bool
+) -> str:
+    """Return in words what an answer would give; nothing where the same would be asked again."""
+    if answer.asked_for:
+        return "a size, to type with its unit"
+    try:
+        return _in_words(find_tests(file, with_options(settings, answer), is_only_file=is_only_file))
+    except InputError as refusal:
+        if str(refusal) == question:
+            return ""
+        words = str(refusal).removeprefix(f"{file}").lstrip(":, ")
+        return f"{REFUSED}: {words[:WIDTH]} ..."
+
+
+def _in_words(tests: Tests) -> str:
+    from tissuq.experiments.reading.inspection import Inspection
+
+    more = f", and {len(tests) - 1} more tests" if len(tests) > 1 else ""
+    return f"{Inspection.of(tests[0][1]).line}{more}"
+
+
+def _with_sizes(answer: Answer) -> Answer:
+    """Return an answer with the sizes that a person types."""
+    options = [(name, _typed_size(name) if name in answer.asked_for else value) for name, value in answer.options]
+    return Answer(tuple(options), answer.leaves_out)
+
+
+def _typed_size(name: str) -> str:
+    from tissuq.experiments.reading.dimensions import given_size
+
+    while True:
+        typed = _typed(f"{name}, with its unit: ")
+        try:
+            given_size(name, typed)
+        except InputError as error:
+            print(error)
+        else:
+            return typed
+
+
+def _typed(prompt: str) -> str:
+    try:
+        return input(prompt).strip()
+    except EOFError as error:
+        raise InputError("the input ended at a question; --ask is for a terminal, where somebody answers.") from error

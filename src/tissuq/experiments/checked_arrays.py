@@ -1,0 +1,78 @@
+"""Arrays of stretches and stresses as people give them: of numbers, with units or not, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.units import is_quantity, unit_of
+from tissuq.experiments.units import stress_unit as stress_unit_of
+
+__all__ = ["checked", "checked_points", "in_mpa"]
+
+FloatArray = NDArray[np.float64]
+
+
+def checked_points(mode: LoadingMode, points: ArrayLike) -> FloatArray:
+    """Return points of a mode as an array (n,), or (n, c) where the mode has c controls.
+
+    Raises
+    ------
+    InputError
+        When it is not of this shape, or holds what is no value of a control.
+    """
+    values = checked("stretch", _magnitude(points, "dimensionless"), [control.name for control in mode.controls])
+    for control, column in zip(mode.controls, values.reshape(len(values), -1).T, strict=True):
+        low = np.flatnonzero(column <= control.above)
+        if len(low):
+            raise InputError(
+                f"{control.name} {column[low[0]]:g} at position {low[0]} is not positive. "
+                "A stretch is deformed over undeformed length; if this is a strain, add 1."
+            )
+    return values
+
+
+def in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
+    """Return stresses in MPa, and the unit in which people want to read them."""
+    if is_quantity(stress):
+        return _magnitude(stress, "megapascal"), stress_unit_of(unit or unit_of(stress)).name
+    given = stress_unit_of(unit or "MPa")
+    return _numbers("stress", stress) * given.to_mpa, given.name
+
+
+def _magnitude(values: Any, unit: str) -> Any:
+    """Return a quantity of pint as numbers in a unit; anything else as it is."""
+    if not is_quantity(values):
+        return values
+    if not values.is_compatible_with(unit):
+        raise InputError(f"values in '{values.units}' were given where {unit} was expected.")
+    return values.to(unit).magnitude
+
+
+def _numbers(name: str, values: Any) -> FloatArray:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be an array of numbers: {error}.") from error
+
+
+def checked(name: str, values: Any, columns: Sequence[str]) -> FloatArray:
+    """Return an array of finite numbers, (n,) or with several columns (n, k), that cannot be changed."""
+    array = _numbers(name, values)
+    count = len(columns)
+    if array.ndim != min(count, 2) or not array.size or array.shape[1:] != (count,)[: array.ndim - 1]:
+        form = f"an array with {count} columns ({', '.join(columns)})" if count > 1 else "a one-dimensional array"
+        raise InputError(f"{name} must be {form} with values, not of shape {array.shape}.")
+    for column, numbers in zip(columns, array.reshape(len(array), -1).T, strict=True):
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if len(bad):
+            raise InputError(
+                f"{column} is {numbers[bad[0]]} at position {bad[0]}; every value must be a finite number."
+            )
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,221 @@
+"""Whether columns can be what they are chosen as: their roles, their measures, and what else the table holds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.reading.headings import (
+    heading,
+)
+from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.recognition import (
+    DEFORMATIONS,
+    LENGTHENINGS,
+    LOADS,
+    OTHER_MEASURE,
+    SHEARS,
+    Contents,
+    say_which,
+)
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.tube_columns import PRESSURE
+from tissuq.experiments.units import measured_in
+
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.columns import ColumnChoice
+
+__all__ = ["SPREAD_ROLES", "check_machine", "check_roles", "check_test", "check_together", "with_types"]
+
+SPREAD_ROLES = ("sem", "sd", "n")
+"""Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
+NO_MEASURE = re.compile(r"rate|modul|speed|control|max|yield|break|ultimate|peak|end of")
+"""In a line above the table that speaks of strain or stress without saying what the columns hold."""
+NOT_ENGINEERING_STRAIN = re.compile(rf"^e( ?([1-3xyzrθ]|theta){{2}})?$|^e ?gl?$|^ε ?t$|^ln|{OTHER_MEASURE}")
+"""Names of a strain that is, or may be, Green's, Almansi's or another one than the engineering strain."""
+SHEAR_STRESS = re.compile(
+    r"shear|lateral|horizontal|schub|scher|quer|cisaillement|cort[ae]|taglio|cisalhamento|τ|tau|"
+    r"сдвиг|касательн|剪切|剪应|せん断"
+)
+ON_SPECIMEN = re.compile(
+    r"exten[sz]om|estensim|aufnehmer|video|opti[ck]|[oó]ptic|ottic|camera|kamera|laser|marker|clip|gau?ge|lvdt|\bdic\b|"
+    r"伸び計|引伸[计計]|экстензометр|видео|оптич|камер|лазер|датчик деформ"
+)
+"""Names of a deformation that is measured on the specimen itself, not by the displacement of the machine."""
+NORMAL = re.compile(r"normal|axial|^f ?[nz]$|нормальн|осев")
+OSCILLATION = re.compile(
+    r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
+)
+"""Names of what is measured in oscillations."""
+
+
+def check_machine(table: Table, quantities: Sequence[str], displacement: int) -> None:
+    """Ask which is read where an extensometer or a camera measures the specimen beside the machine's displacement."""
+    roles = {"length": "displacement", "strain": "strain", "pixels": "length"}
+    seen = {column: roles.get(measured_in(table.unit(column))) for column in _columns_on_specimen(table, quantities)}
+    seen = {column: role for column, role in seen.items() if role}
+    if displacement in _columns_on_specimen(table, quantities) or not seen:
+        return
+    labels = " and ".join(map(table.label, seen))
+    choices = [("displacement", displacement), *((str(role), column) for column, role in seen.items())]
+    flags = " or ".join(f'--column {role}="{table.names[column]}"' for role, column in choices)
+    raise InputError(
+        f"{table.file}: column {table.label(displacement)} is the displacement of the machine, and {labels} was "
+        "measured on the specimen, by an extensometer or a camera. They give different stretches. Say which is read: "
+        f"{flags}."
+    )
+
+
+def _columns_on_specimen(table: Table, quantities: Sequence[str]) -> list[int]:
+    return [
+        column
+        for column, quantity in enumerate(quantities)
+        if ON_SPECIMEN.search(quantity) and not table.is_constant(column)
+    ]
+
+
+def check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) -> None:
+    """Refuse roles that do not exist, do not go together, or that the loading mode does not have."""
+    unknown = [role for role in mapping if role not in DEFORMATIONS + LOADS + SPREAD_ROLES]
+    if unknown:
+        raise InputError(
+            f"{table.file}: a column cannot be given as '{unknown[0]}'. Give stretch, strain, displacement or length, "
+            'and stress or force, as in columns={"strain": "Strain"} or --column strain=Strain.'
+        )
+    for roles in (DEFORMATIONS, LOADS):
+        chosen_roles = [role for role in roles if role in mapping]
+        if len(chosen_roles) > 1:
+            raise InputError(
+                f"{table.file}: columns are given for both {' and '.join(chosen_roles)}; give only one of them."
+            )
+    unfit = (set(LENGTHENINGS) if is_shear else {*SHEARS, "torque"}) & set(mapping)
+    if unfit:
+        deformation = (
+            "an amount of shear, its rate, a displacement along the planes (sliding), or the twist and torque of a disc"
+            if is_shear
+            else "a stretch, strain, displacement or length"
+        )
+        raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
+
+
+def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> ColumnChoice:
+    """Return a choice with the measures of its strain and stress: those asked for, or that the columns' names say.
+
+    Raises
+    ------
+    InputError
+        When a name contradicts what its column is read as, or it is open which measure it is.
+    """
+    strain_type = _type_of(table, choice.deformation, contents, "strain", contents.strain_type)
+    stress_type = _type_of(table, choice.stress, contents, "stress", contents.stress_type)
+    name, is_strain = contents.quantities[choice.deformation], choice.measure == "strain"
+    is_percent = "%" in table.stated_units(choice.deformation)
+    if is_strain and not is_percent and set(name.split()) & {"stretch", "lambda", "λ"}:
+        raise InputError(
+            f"{table.place(choice.deformation)} is named a stretch but read as a strain. Give it as stretch "
+            "(--column stretch=NAME), or rename the column."
+        )
+    if choice.load in ("torque", PRESSURE):
+        if stress_type:
+            raise InputError(
+                f"{table.place(choice.stress)} is read as a {choice.load}, which is no {stress_type} stress. Leave "
+                "stress_type (--stress-type) out, or give the column as stress (--column stress=NAME)."
+            )
+        stress_type = "torsion" if choice.load == "torque" else ""
+    if strain_type and not is_strain and choice.measure != "shear":
+        raise InputError(
+            f"{table.place(choice.deformation)} is a {strain_type} strain, as its name or strain_type (--strain-type) "
+            f"says, but read as {choice.measure}. Leave strain_type out, or give the column as strain "
+            "(--column strain=NAME)."
+        )
+    if is_strain and not strain_type and NOT_ENGINEERING_STRAIN.search(name):
+        raise InputError(f"{table.place(choice.deformation)} may be a strain of several types. {say_which('strain')}")
+    if choice.load == "stress" and not stress_type and re.search(OTHER_MEASURE, contents.quantities[choice.stress]):
+        raise InputError(f"{table.place(choice.stress)} may be a stress of several types. {say_which('stress')}")
+    if is_strain and not strain_type:
+        _check_lines_above(table, choice.deformation, "strain")
+    if choice.load == "stress" and not stress_type:
+        _check_lines_above(table, choice.stress, "stress")
+    is_told = contents.strain_type or contents.stress_type
+    if is_strain and choice.load == "stress" and not is_told and (strain_type == "") != (stress_type == ""):
+        stated, unstated = ("strain", "stress") if strain_type else ("stress", "strain")
+        column, other = choice.stress, choice.deformation
+        if unstated == "strain":
+            column, other = other, column
+        if (strain_type or stress_type) != "engineering":
+            raise InputError(
+                f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
+                f"{table.label(other)} is {strain_type or stress_type}. {say_which(unstated)}"
+            )
+    return replace(choice, strain_type=strain_type or "engineering", stress_type=stress_type or "engineering")
+
+
+def _type_of(table: Table, column: int, contents: Contents, kind: str, wanted: str | None) -> str:
+    """Return the measure that a column is read as: the one asked for, which its name must not contradict."""
+    by_name = contents.measures[column]
+    if wanted and by_name and wanted != by_name:
+        raise InputError(
+            f"{table.place(column)} is named a {kind} of type '{by_name}' but read as '{wanted}'. Leave {kind}_type "
+            f"(--{kind}-type) out, or rename the column."
+        )
+    return wanted or by_name
+
+
+def _check_lines_above(table: Table, column: int, kind: str) -> None:
+    """Refuse a column of open measure where a line above the table names one that is not the engineering one."""
+    for line, text in table.head:
+        if set(table.names) & {*split(text, table.separator)} - {""}:
+            continue
+        words = text.lower()
+        if kind in words and not NO_MEASURE.search(words) and re.search(OTHER_MEASURE, words):
+            raise InputError(
+                f"{table.place(column)} does not say which type of {kind} it is, and line {line} says "
+                f"'{text.strip()}'. {say_which(kind)}"
+            )
+
+
+def check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_shear: bool) -> None:
+    """Refuse a shear stress where nothing is sheared, and amplitudes of oscillations, which are no curve."""
+    quantities = [heading(name).quantity for name in table.names]
+    if is_shear and not mapping.keys() & LOADS and NORMAL.search(quantities[stress]):
+        raise InputError(
+            f"{table.place(stress)} is normal to the sheared planes, and no column is recognised as a shear stress, a "
+            "shear force or a torque. Say which it is: --column stress=NAME, force=NAME or torque=NAME."
+        )
+    if not is_shear and "stress" not in mapping and SHEAR_STRESS.search(quantities[stress]):
+        raise InputError(
+            f"{table.place(stress)} is a load in shear. If the specimen was sheared, give --mode simple-shear and the "
+            "column of the amount of shear (--column shear=NAME), or of the displacement (sliding=NAME)."
+        )
+    moduli = [k for k, name in enumerate(quantities) if OSCILLATION.search(name) and not table.is_constant(k)]
+    if moduli and not (mapping.keys() & LOADS and mapping.keys() & DEFORMATIONS):
+        raise InputError(
+            f"{table.file}: column {table.label(moduli[0])} is of oscillations, whose strains and stresses are "
+            "amplitudes and no curve of one test. If there is a curve all the same, say which columns it is in: "
+            "--column shear=NAME --column stress=NAME."
+        )
+
+
+def check_together(table: Table, mode: LoadingMode, choices: Sequence[ColumnChoice]) -> None:
+    """Refuse one column for two stresses, and forces and displacements where the mode does not say what they do."""
+    columns = [[choice.stress for choice in choices]]
+    columns += [[choice.deformation for choice in choices]] * (len(mode.controls) > 1)
+    for column, *later in columns:
+        if column in later:
+            raise InputError(
+                f"{table.file}: column {table.label(column)} cannot be that of both {' and '.join(mode.stresses)}. Say "
+                "which is the second one's: --column stretch2=NAME, --column stress2=NAME."
+            )
+    if mode.machine_axes:
+        return
+    for choice in choices:
+        for column, content in ((choice.deformation, choice.measure), (choice.stress, choice.load)):
+            if content in ("displacement", "length", "twist", "rate", "sliding", "force", "torque"):
+                raise InputError(
+                    f"{table.place(column)} holds a {content}, and in loading mode '{mode.name}' columns are read as "
+                    "stretch, strain or shear, and as stress. Convert it, and give its column as one of them."
+                )

@@ -1,0 +1,128 @@
+"""Units of columns: what the file states, what is given, and what may not be assumed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments import units
+from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.units import FORCE, Quantity
+
+__all__ = ["MPA_ASSUMED", "declared_unit", "factor_of", "strain_factor_of", "stress_unit_of"]
+
+MPA_ASSUMED = "MPa (assumed: the file states no unit)"
+LARGEST_ASSUMED_STRESS = 100.0
+"""Largest stress, MPa, of a soft material: numbers beyond it that have no unit are not taken as MPa."""
+
+
+def declared_unit(table: Table, column: int) -> str:
+    """Return the unit that the heading or the units row states for a column; empty when neither does.
+
+    Raises
+    ------
+    InputError
+        When both state one and they differ.
+    """
+    in_heading, beneath = table.stated_units(column)
+    if in_heading and beneath and in_heading != beneath and units.looks_like_unit(in_heading):
+        raise InputError(
+            f"{table.place(column)}: the name says '{in_heading}' but the row of units beneath it says "
+            f"'{beneath}'. Correct the file."
+        )
+    return table.unit(column)
+
+
+def factor_of(table: Table, column: int, quantity: Quantity, option: str, unit: str | None) -> tuple[float, str]:
+    """Return the factor from a column's unit of force or length, and the words for where it comes from."""
+    declared = declared_unit(table, column)
+    proposed = f"{declared}f" if quantity is FORCE and declared in units.MASSES else quantity.unit
+    hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
+    if unit is None:
+        if not declared:
+            raise InputError(f"{table.place(column)}: the file states no unit of {quantity.name}; {hint}.")
+        try:
+            return quantity.factor(declared), f"{declared} (from the file)"
+        except InputError as error:
+            raise InputError(f"{table.place(column)}: {error} To say it yourself, {hint}.") from error
+    factor = quantity.factor(unit)
+    in_file = quantity.factor_or_none(declared)
+    if in_file is not None and in_file != factor:
+        raise InputError(
+            f"{table.place(column)}: {option}='{unit}' is given, but the file says '{declared}'. Leave {option} out, "
+            "or correct the file."
+        )
+    return factor, f"{unit} (as given)"
+
+
+def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, strain_unit: str | None) -> float:
+    """Return what one unit of a column of strains is as a plain ratio."""
+    column = table.place(choice.deformation)
+    try:
+        in_file = units.strain_factor(declared)
+    except InputError as error:
+        if strain_unit is None:
+            hint = " To say it yourself, give strain_unit (--strain-unit)." if choice.measure == "strain" else ""
+            raise InputError(f"{column}: {error}{hint}") from error
+        declared, in_file = "", 1.0
+    if strain_unit is None:
+        return in_file
+    factor = units.strain_factor(strain_unit)
+    if declared and in_file != factor:
+        raise InputError(
+            f"{column}: strain_unit='{strain_unit}' is given, but the file says '{declared}'. Leave strain_unit "
+            "(--strain-unit) out, or correct the file."
+        )
+    return factor
+
+
+def stress_unit_of(
+    table: Table, choice: ColumnChoice, stress_unit: str | None, largest: float
+) -> tuple[units.StressUnit, str]:
+    """Return the unit of the stresses, the largest of which is given, and the words for where it comes from."""
+    declared = declared_unit(table, choice.stress)
+    if stress_unit is not None:
+        unit = units.stress_unit(stress_unit)
+        in_file = _unit_or_none(declared)
+        if in_file and not np.isclose(in_file.to_mpa, unit.to_mpa, rtol=1e-9, atol=0):
+            raise InputError(
+                f"{table.place(choice.stress)}: stress_unit='{stress_unit}' is given, but the file says "
+                f"'{declared}'. Leave stress_unit (--stress-unit) out, or correct the file."
+            )
+        return unit, f"{unit.name} (as given)"
+    if not declared:
+        _check_assumed_mpa(table, choice, largest)
+        return units.StressUnit("MPa", 1.0), MPA_ASSUMED
+    try:
+        unit = units.stress_unit(declared)
+    except InputError as error:
+        raise InputError(
+            f"{table.place(choice.stress)}: {error} To say it yourself, give stress_unit (--stress-unit)."
+        ) from error
+    return unit, f"{unit.name} (from the file)"
+
+
+def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> None:
+    """Refuse to take stresses without a unit as MPa where the file speaks of another one, or by their size."""
+    texts = {"the name": table.names[choice.stress], "the row of units": " ".join(table.units)}
+    texts |= {f"line {line}": text for line, text in table.head}
+    mentions = ((where, unit) for where, text in texts.items() for unit in units.stress_units_in(text))
+    where, unit = next((mention for mention in mentions if units.stress_unit(mention[1]).to_mpa != 1.0), ("", ""))
+    if unit:
+        found, likely = f"but {where} speaks of {unit}", unit
+    elif largest > LARGEST_ASSUMED_STRESS:
+        found, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
+    else:
+        return
+    raise InputError(
+        f"{table.place(choice.stress)}: no unit of stress is stated for it, {found}. Give stress_unit={likely!r} "
+        f"(--stress-unit {likely}), or whichever it is."
+    )
+
+
+def _unit_or_none(text: str) -> units.StressUnit | None:
+    try:
+        return units.stress_unit(text) if text else None
+    except InputError:
+        return None

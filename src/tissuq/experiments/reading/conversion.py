@@ -1,0 +1,140 @@
+"""From the chosen columns to rows of stretch and stress, and from a measure of stress to the engineering one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.experiments.modes.mode import SHEAR
+from tissuq.experiments.reading.columns import ColumnChoice, about_stress, mapping_of_each_stress
+from tissuq.experiments.reading.deformations import stretch_of, without_machine
+from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
+from tissuq.experiments.reading.height_of_block import of_block
+from tissuq.experiments.reading.labels import columns_only
+from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
+from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
+from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.repeated_sizes import test_beside
+from tissuq.experiments.reading.several_specimens import check_one_specimen
+from tissuq.experiments.reading.spread import Spread, spread_of
+from tissuq.experiments.reading.stated_sizes import names_of_specimen
+from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.units import FORCE
+
+__all__ = [
+    "columns_of_stresses",
+    "measured_rows",
+    "points_of",
+    "stress_measure_of",
+    "threshold_of",
+    "with_engineering_stress",
+]
+
+
+def measured_rows(
+    table: Table,
+    mode: LoadingMode,
+    choices: Mapping[str, ColumnChoice],
+    options: ReadingOptions,
+) -> tuple[MeasuredRows, list[Load], tuple[Spread, ...], Dimensions]:
+    """Return every row as stretch and stress of the kind that the file gives.
+
+    With each stress, its standard errors, and the dimensions of the specimen, of which there must be one.
+    """
+    labels, columns = tuple(choices), list(choices.values())
+    numbers = [table.numbers([choice.deformation, choice.stress]) for choice in columns]
+    check_one_specimen(table, columns, np.mean([deformation for deformation, _ in numbers], axis=0))
+    specimens = names_of_specimen(table, columns, options.get("only"))
+    test = None
+    if len(columns) == 1:
+        is_shear = mode.controls == (SHEAR,)
+        test = test_beside(table, columns[0].stress, options.get("stress_type"), is_shear=is_shear)
+    dimensions = dimensions_of(table, options.get("dimensions"), specimens, test)
+    if len(columns) == 1:
+        words = [Path(table.file).name, table.sheet, table.title, options.get("name") or ""]
+        words += ["compression"] if options.get("compression_positive") else []
+        dimensions = of_block(table, columns[0], (numbers[0][0], numbers[0][1]), dimensions, words)
+    sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
+    units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
+    compliance = options.get("compliance"), options.get("force_unit")
+    units_of_load = options.get("stress_unit"), options.get("force_unit")
+    stretches, loads, stretch_steps, spreads = [], [], [], []
+    mappings = mapping_of_each_stress(mode, options.get("columns"))
+    for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
+        is_force = choice.load == "force" and force_in(table, choice.stress, compliance[1]) is FORCE
+        size = replace(size, divide_forces=is_force)
+        with about_stress(number, labels, mode):
+            load, counted = without_zero(table, choice, load, options.get("load_zero"), *units_of_load)
+            deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
+            stretch, step = stretch_of(table, choice, deformation, load, size, *units)
+            stress = stress_of(table, choice, load, size, *units_of_load)
+            spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
+        stretches.append(stretch)
+        stretch_steps.append(f"{step}{given_way}")
+        loads.append(replace(stress, source=f"{stress.source}{counted}"))
+    measured = MeasuredRows(
+        table=table,
+        rows=np.arange(len(table.rows)),
+        stretch=np.stack(stretches),
+        stress=np.stack([load.stress for load in loads]),
+        standard_error=np.stack([spread.standard_errors(len(table.rows)) for spread in spreads]),
+        labels=labels,
+    )
+    for name, value in columns_only(table, options.get("only")).items():
+        measured = measured.with_step(f"only rows with '{value}' in column '{name}'")
+    measured = measured.with_step(*stretch_steps).with_step(*(load.source for load in loads))
+    if any(spread.source for spread in spreads):
+        measured = measured.with_step(*(spread.source for spread in spreads))
+    return measured, loads, tuple(spreads), dimensions
+
+
+def threshold_of(preload: str, load: Load) -> float:
+    """Return a preload as a stress in MPa."""
+    if load.measure is not None:
+        raise InputError(
+            f"preload '{preload}' (--preload) does not go with the pressure in a tube. Give the outer diameter that it "
+            "has without pressure as --diameter, and leave rows out with --stretch or --leave-out."
+        )
+    return preload_stress(preload, load.divided, load.by)
+
+
+def with_engineering_stress(
+    mode: LoadingMode, measure: StressMeasure, measured: MeasuredRows, points: Column
+) -> MeasuredRows:
+    """Return rows whose stresses of a measure, and their standard errors, are engineering ones."""
+    if measure.engineering is None:
+        return measured
+    try:
+        stress, error = measure.engineering(mode, points, measured.stress), measured.standard_error
+    except InputError as refusal:
+        raise InputError(f"{measured.table.file}: {refusal}") from refusal
+    if error.any():
+        error = np.abs(measure.engineering(mode, points, error))
+    return replace(measured, stress=stress, standard_error=error)
+
+
+def stress_measure_of(table: Table, choices: Sequence[ColumnChoice]) -> StressMeasure:
+    """Return the measure of the stresses, which is one."""
+    types = list(dict.fromkeys(choice.stress_type for choice in choices))
+    if len(types) > 1:
+        raise InputError(
+            f"{table.file}: the stresses are of different types ({' and '.join(types)}). Give columns of one type "
+            "(--column stress=NAME --column stress2=NAME)."
+        )
+    return STRESS_MEASURES[types[0]]
+
+
+def points_of(mode: LoadingMode, stretch: Column) -> Column:
+    """Return the points of the mode for stretches (k, n): the stretch, or a column for each control."""
+    return np.ascontiguousarray(stretch.T) if len(mode.controls) > 1 else stretch[0]
+
+
+def columns_of_stresses(columns: Column) -> Column:
+    """Return columns (k, n) of the stresses as an experiment takes them."""
+    return np.ascontiguousarray(columns.T) if len(columns) > 1 else columns[0]

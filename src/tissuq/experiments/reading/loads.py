@@ -1,0 +1,137 @@
+"""From the numbers of a column to stress: of stresses, forces, torques and pressures, with their units and sizes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments import units
+from tissuq.experiments.numbers import number_and_unit
+from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
+from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
+from tissuq.experiments.reading.positions import FIRST_ROW
+from tissuq.experiments.reading.stress_measures import StressMeasure, measure_of_tube
+from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.torsion import apparent_stress
+from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
+
+__all__ = ["Load", "force_in", "stress_of", "without_zero"]
+
+UNIT_OF_STRESSES_FROM_FORCES = "kPa"
+"""The unit in which stresses from forces are shown unless another is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """The stress (MPa), the unit in which people want to read it, and how it was obtained.
+
+    ``divided`` is what was divided by a size of the specimen, ``by`` (mm² for forces, mm for those per width); None
+    where the file gives stresses. ``scale`` is what one unit of the column is in MPa. ``measure`` is that of stresses
+    whose conversion needs more than their columns, and ``note`` what to know of them.
+    """
+
+    stress: Column
+    unit: units.StressUnit
+    source: str
+    divided: Quantity | None = None
+    by: float = 1.0
+    scale: float = 1.0
+    measure: StressMeasure | None = None
+    note: str = ""
+
+
+def stress_of(
+    table: Table,
+    choice: ColumnChoice,
+    values: Column,
+    dimensions: Dimensions,
+    stress_unit: str | None,
+    force_unit: str | None,
+) -> Load:
+    """Return the stresses, of the kind that the file gives, and how they were obtained.
+
+    Raises
+    ------
+    InputError
+        When units contradict each other or are missing, or the cross-section of the specimen is not known.
+    """
+    label = table.label(choice.stress)
+    if choice.load == "torque":
+        factor, unit_source = factor_of(table, choice.stress, TORQUE, "force_unit", force_unit)
+        radius = dimensions.radius
+        source = f"apparent stress 2 T / (pi R^3): T = column {label} in {unit_source}, R = {in_words(radius)}"
+        scale = float(apparent_stress(np.array(factor), radius.value))
+        return Load(values * scale, units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), source, scale=scale)
+    if choice.load == "pressure":
+        factor, unit_source = factor_of(table, choice.stress, PRESSURE, "force_unit", force_unit)
+        tube, _ = tube_of(dimensions)
+        source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
+        shown, scale = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), factor / tube.log_ratio
+        return Load(values * scale, shown, source, scale=scale, measure=measure_of_tube(tube), note=tube.note)
+    if choice.load == "force":
+        if choice.stress_type != "engineering":
+            raise InputError(
+                f"{table.place(choice.stress)} holds forces, which over the undeformed cross-section are engineering "
+                "stress. Leave stress_type (--stress-type) out."
+            )
+        divided = force_in(table, choice.stress, force_unit)
+        factor, unit_source = factor_of(table, choice.stress, divided, "force_unit", force_unit)
+        size, of_size = (dimensions.area, "mm2") if divided is FORCE else (dimensions.thickness, "mm")
+        source = f"engineering stress = column {label} in {unit_source} / {size.value:g} {of_size} ({size.source})"
+        shown = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES)
+        return Load(values * factor / size.value, shown, source, divided, size.value, factor / size.value)
+    sections = sorted(dimensions.set_by_user - {"length"})
+    if sections or force_unit is not None:
+        unneeded = sections[0] if sections else "force_unit"
+        raise InputError(
+            f"{table.place(choice.stress)} is read as stress, which needs no {unneeded}. "
+            "Leave it out, or name the column of forces: --column force=NAME."
+        )
+    unit, unit_source = stress_unit_of(table, choice, stress_unit, float(np.abs(values).max()))
+    source = f"{choice.stress_type} stress from column {label} in {unit_source}"
+    return Load(values * unit.to_mpa, unit, source, scale=unit.to_mpa)
+
+
+def force_in(table: Table, column: int, force_unit: str | None) -> Quantity:
+    """Return what a column of forces holds by its unit, or the one that is given: forces, or forces per width."""
+    is_per_width = FORCE_PER_WIDTH.factor_or_none(force_unit or table.unit(column)) is not None
+    return FORCE_PER_WIDTH if is_per_width else FORCE
+
+
+def without_zero(
+    table: Table,
+    choice: ColumnChoice,
+    values: Column,
+    load_zero: str | None,
+    stress_unit: str | None,
+    force_unit: str | None,
+) -> tuple[Column, str]:
+    """Return the loads of a column, in its unit, less what the load cell reads without load, and words that say so.
+
+    Raises
+    ------
+    InputError
+        When that is not ``first``, or a number with a unit of what the column holds.
+    """
+    if load_zero is None:
+        return values, ""
+    if load_zero == FIRST_ROW:
+        return values - values[0], f", counted from {values[0]:g} (its first row)"
+    number, unit = number_and_unit(str(load_zero))
+    quantities = {"force": force_in(table, choice.stress, force_unit), "torque": TORQUE, "pressure": PRESSURE}
+    quantity = quantities.get(choice.load)
+    example = f"0.05 {quantity.unit if quantity else 'kPa'}"
+    if number is None or not unit or measured_in(unit) not in (choice.load, "stress", "pressure", "force per width"):
+        raise InputError(
+            f"load_zero (--load-zero) must be 'first', or a {choice.load} with its unit such as '{example}', not "
+            f"'{load_zero}'."
+        )
+    if quantity is None:
+        of_column, _ = stress_unit_of(table, choice, stress_unit, float(np.abs(values).max()))
+        offset = number * units.stress_unit(unit).to_mpa / of_column.to_mpa
+    else:
+        offset = number * quantity.factor(unit) / factor_of(table, choice.stress, quantity, "force_unit", force_unit)[0]
+    return values - offset, f", counted from {number:g} {unit} (as given)"

@@ -1,0 +1,236 @@
+"""What laboratories and testing machines call columns and sizes of specimens, in many languages."""
+
+from __future__ import annotations
+
+import re
+from unicodedata import normalize
+
+__all__ = [
+    "COUNT_NAMES",
+    "CYCLE_NAMES",
+    "DEFORMATION_NOUNS",
+    "DIMENSION_NAMES",
+    "HEIGHT_NAMES",
+    "MEAN_WORDS",
+    "NOUNS",
+    "OF_SPECIMEN",
+    "OPEN_WITHOUT_UNIT",
+    "ROLES",
+    "ROLES_OF_TUBE",
+    "SET_NAMES",
+    "SPECIMEN_NAME",
+    "SPREADS",
+    "SPREAD_WORDS",
+    "names_of",
+    "without_accents",
+]
+
+ACCENTS = re.compile(r"(?<=[A-Za-z])[\u0300-\u036f]+")
+"""Accents of Latin letters, where these are written apart from them."""
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ø": "oe", "ё": "е"})
+"""How keyboards without them write umlauts and their like."""
+
+
+def without_accents(text: str) -> str:
+    """Return a text without the accents of Latin letters, and with plain digits for lowered ones."""
+    return normalize("NFKC", ACCENTS.sub("", normalize("NFKD", text)))
+
+
+def names_of(text: str) -> frozenset[str]:
+    """Return names, as they are and as keyboards without accents and umlauts write them."""
+    names = [*text.split(", "), *text.translate(UMLAUTS).split(", ")]
+    return frozenset(names).union(map(without_accents, names))
+
+
+ROLES = {
+    "stretch": names_of(
+        "stretch, stretch ratio, extension ratio, lambda, λ, streckung, étirement, estiramiento, stiramento, "
+        "степень растяжения, степень удлинения, кратность растяжения, кратность удлинения, коэффициент растяжения, "
+        "拉伸比, 伸长比, 伸張比"
+    ),
+    "strain": names_of(
+        "strain, engineering strain, nominal strain, tensile strain, nominelle dehnung, gerinim, birim uzama, "
+        "compressive strain, dehnung, stauchung, eps, "
+        "epsilon, ε, déformation, deformación, deformação, deformazione, rek, töjning, tøyning, 应变, 應變, ひずみ, "
+        "歪み, 歪, 변형률, деформация, деформация растяжения, деформация сжатия, осевая деформация, "
+        "продольная деформация, "
+        "удлинение при растяжении, 延伸率, 伸长率"
+    ),
+    "shear": names_of(
+        "shear, amount of shear, shear strain, gamma, γ, scherung, schiebung, scherdeformation, cisaillement, "
+        "сдвиг, деформация сдвига, сдвиговая деформация, величина сдвига, 剪切应变, 剪应变, せん断ひずみ"
+    ),
+    "twist": names_of(
+        "twist, twist angle, angle of twist, torsion angle, rotation, rotation angle, angle, angular displacement, "
+        "angular position, deflection angle, encoder, drehwinkel, verdrehwinkel, torsionswinkel, auslenkwinkel, "
+        "angle de torsion, ángulo de torsión, angolo di torsione, ângulo de torção, 扭转角, ねじり角, "
+        "угол закручивания, угол кручения, угол поворота, закручивание"
+    ),
+    "rate": names_of(
+        "shear rate, shear strain rate, rate of shear, scherrate, schergeschwindigkeit, taux de cisaillement, "
+        "vitesse de cisaillement, velocidad de corte, tasa de corte, velocità di taglio, γ̇, "
+        "скорость сдвига, скорость деформации сдвига, 剪切速率, せん断速度"
+    ),
+    "sliding": names_of(
+        "shear displacement, lateral displacement, horizontal displacement, sliding, sliding displacement, schubweg, "
+        "scherweg, déplacement de cisaillement, desplazamiento de corte, spostamento di taglio, "
+        "перемещение сдвига, сдвиговое перемещение, 剪切位移, せん断変位"
+    ),
+    "displacement": names_of(
+        "displacement, disp, compression, uzama, yer değiştirme, "
+        "axial displacement, compressive displacement, extension, tensile extension, "
+        "compressive extension, crosshead, crosshead displacement, weg, standardweg, traversenweg, position, "
+        "axial position, crosshead position, stroke, travel, traverse, déplacement, allongement, desplazamiento, "
+        "alargamiento, deslocamento, alongamento, spostamento, allungamento, corsa, verplaatsing, verlenging, "
+        "位移, 變位, 変位, 伸び, 伸长, 변위, 變形量, 变形, 变形量, 伸长量, 拉伸位移, 横梁位移, 夹头位移, "
+        "перемещение, смещение, удлинение, абсолютное удлинение, укорочение, осадка, ход, ход траверсы, ход поршня, "
+        "перемещение траверсы, перемещение захвата, положение, положение траверсы, позиция"
+    ),
+    "length": names_of(
+        "marker distance, marker separation, distance between markers, distance of markers, markerabstand, "
+        "distance entre marqueurs, distancia entre marcadores, 标记间距, gap, gap width, gap height, height, "
+        "sample height, specimen height, current length, current height, spalt, "
+        "spaltweite, höhe, probenhöhe, зазор, высота, высота образца, текущая длина, текущая высота, 间隙, 間隙, すき間"
+    ),
+    "force": names_of(
+        "force, axial force, tensile force, compressive force, load, axial load, tensile load, compressive load, "
+        "kuvvet, yük, "
+        "kraft, standardkraft, prüfkraft, druckkraft, normal force, normalkraft, shear force, lateral force, "
+        "horizontal force, force per width, force per unit width, line load, membrane force, "
+        "kraft pro breite, schubkraft, scherkraft, querkraft, effort de cisaillement, fuerza de corte, "
+        "forza di taglio, effort, charge, fuerza, carga, força, forza, carico, kracht, belasting, "
+        "力, 载荷, 荷重, 试验力, 試験力, 하중, 负荷, 負荷, 負載, 负载, 拉力, 拉伸力, 力值, "
+        "сила, усилие, нагрузка, осевая сила, осевое усилие, осевая нагрузка, растягивающая сила, сжимающая сила, "
+        "растягивающее усилие, сжимающее усилие, нормальная сила, сила сдвига, сдвиговая сила, поперечная сила, "
+        "剪切力, せん断力"
+    ),
+    "torque": names_of(
+        "torque, axial torque, drehmoment, moment, torsionsmoment, couple, couple de torsion, par, par de torsión, "
+        "momento torsor, momento torcente, coppia, torque de torção, 扭矩, トルク, "
+        "момент, крутящий момент, вращающий момент, момент кручения"
+    ),
+    "stress": names_of(
+        "stress, wall stress, tensile stress, compressive stress, shear stress, gerilme, "
+        "spannung, zugspannung, druckspannung, schubspannung, "
+        "contrainte, tensión, esfuerzo, tensão, tensione, sforzo, spanning, spänning, 应力, 應力, 応力, 응력, "
+        "напряжение, осевое напряжение, напряжение растяжения, растягивающее напряжение, напряжение сжатия, "
+        "сжимающее напряжение, напряжение сдвига, касательное напряжение, 拉应力, 拉伸应力, 压应力, 剪切应力, 剪应力, "
+        "引張応力, 圧縮応力, せん断応力"
+    ),
+    "outer_diameter": names_of(
+        "diameter, outer diameter, outside diameter, external diameter, vessel diameter, artery diameter, od, o.d., "
+        "durchmesser, außendurchmesser, gefäßdurchmesser, diamètre, diamètre externe, "
+        "diamètre extérieur, diámetro, diámetro externo, diámetro exterior, diametro, diametro esterno, diâmetro, "
+        "diâmetro externo, 外径, 直径, 外徑, 直徑, 외경, 직경, "
+        "диаметр, наружный диаметр, внешний диаметр"
+    ),
+    "inner_diameter": names_of(
+        "inner diameter, inside diameter, internal diameter, lumen diameter, luminal diameter, i.d., innendurchmesser, "
+        "lumendurchmesser, diamètre interne, diamètre intérieur, diámetro interno, diámetro interior, "
+        "diametro interno, diâmetro interno, 内径, 內徑, 내경, внутренний диаметр, диаметр просвета"
+    ),
+    "pressure": names_of(
+        "pressure, internal pressure, inner pressure, luminal pressure, intraluminal pressure, lumen pressure, "
+        "transmural pressure, distending pressure, inflation pressure, druck, innendruck, transmuraler druck, "
+        "pression, pression interne, pression intraluminale, pression transmurale, presión, presión interna, "
+        "presión intraluminal, presión transmural, pressione, pressione interna, pressione transmurale, pressão, "
+        "pressão interna, pressão transmural, 压力, 内压, 壓力, 圧力, 内圧, 압력, 내압, "
+        "давление, внутреннее давление, внутрипросветное давление, трансмуральное давление"
+    ),
+}
+"""Names of columns by their role, as :func:`plain` writes them, without the words for a measure of strain or stress."""
+
+ROLES_OF_TUBE = ("outer_diameter", "inner_diameter", "pressure")
+NOUNS = {
+    "strain": names_of("axial strain, longitudinal strain, e, λ, lambda"),
+    "stress": names_of("axial stress, longitudinal stress, s, sigma, σ"),
+}
+"""Further names of strain and stress that are known as such beside a word for a measure of them."""
+SPREADS = {"sem": "standard error", "sd": "standard deviation"}
+"""What columns beside a mean may hold, by their roles."""
+SPREAD_WORDS = {
+    "sem": r"sem|s\.e\.m\.?|se|std\.? ?err(or)?|stderr|standard error|standardfehler|erreur type|error est[áa]ndar|"
+    r"errore standard|erro padr[ãa]o|标准误差?|標準誤差?|"
+    r"стандартная ошибка( среднего)?|ошибка среднего",
+    "sd": r"sd|s\.d\.?|std\.? ?dev(iation)?\.?|std\.?|stdev\.?|st\.? ?dev\.?|standard deviation|standardabweichung|"
+    r"stabw\.?|[ée]cart type|desviaci[óo]n (est[áa]ndar|t[íi]pica)|deviazione standard|desvio padr[ãa]o|标准差|"
+    r"標準偏差|標準差|стандартное отклонение|ско",
+    "open": r"±|\+/|^\+$|error|err|fehler|uncertainty",
+}
+"""Words for them, and those that leave open which it is."""
+OPEN_WITHOUT_UNIT = names_of("elongation, relative elongation, относительное удлинение")
+"""Names of strains or displacements, as their unit says."""
+DEFORMATION_NOUNS = names_of("déformation, deformación, deformação, deformazione, деформация")
+"""Names of strains that are displacements where their unit is a length."""
+MEAN_WORDS = (
+    r"mean|average|avg\.?|averaged|mittelwert|mittlere[rs]?|moyenne?|media|medio|promedio|m[ée]dia|平均|"
+    r"средн(ее|яя|ий)"
+)
+COUNT_NAMES = re.compile(
+    r"n|count|sample size|(number|no\.?|#) of (specimens|samples|tests)|specimens|samples|anzahl( proben)?|"
+    r"число образцов|количество образцов|试样数"
+)
+"""Names of a column that tells of how many specimens a mean is."""
+CYCLE_NAMES = names_of(
+    "cycle, cycles, cycle count, cycle number, total cycles, total cycle count, "
+    "zyklus, zyklen, цикл, циклы, номер цикла, 循环, 循环次数, 周期, サイクル"
+)
+SET_NAMES = names_of("setname, set name, set")
+"""Names of the column in which parts of a test are named."""
+
+SPECIMEN_NAME = re.compile(
+    r"(specimen|sample|probe|proben?körper|replicate|replikat|donor|subject|patient|animal|tier|éprouvette|échantillon|"
+    r"probeta|muestra|provino|campione|образ[её]ц|проба|пациент|试样|試験片|样品|样本)s?"
+    r"( ?(id|no\.?|nr\.?|n°|#|№|number|nummer|name|label|bezeichnung|编号|番号))?|"
+    r"номер (образца|пробы)|№ образца"
+)
+"""Names of a column that tells which specimen a row is of."""
+
+DIMENSION_NAMES = {
+    "area": names_of(
+        "area, cross section, cross sectional area, cross section area, s0, a0, querschnitt, querschnittsfläche, "
+        "fläche, probenfläche, "
+        "probenquerschnitt, anfangsquerschnitt, section, section transversale, section droite, aire, "
+        "aire de la section, sección, sección transversal, área, área de la sección, "
+        "área de la sección transversal, seção, secção, seção transversal, secção transversal, área da seção, "
+        "área da secção, área da seção transversal, área da secção transversal, sezione, sezione trasversale, "
+        "area della sezione, area della sezione trasversale, doorsnede, dwarsdoorsnede, "
+        "oppervlakte van de doorsnede, 横截面积, 截面积, 橫截面積, 截面積, 面积, 面積, 断面積, 原断面積, "
+        "площадь, сечение, поперечное сечение, площадь сечения, площадь поперечного сечения"
+    ),
+    "width": names_of(
+        "width, b0, breite, probenbreite, largeur, anchura, ancho, largura, larghezza, breedte, 宽度, 寬度, 幅, 板幅, "
+        "ширина"
+    ),
+    "thickness": names_of(
+        "thickness, a0, dicke, probendicke, épaisseur, espesor, grosor, espessura, spessore, dikte, 厚度, 厚さ, 板厚, "
+        "толщина"
+    ),
+    "diameter": names_of(
+        "diameter, d0, durchmesser, probendurchmesser, diamètre, diámetro, diâmetro, diametro, 直径, 直徑, диаметр"
+    ),
+    "length": names_of(
+        "length, gauge length, gage length, l0, grip separation, grip to grip separation, distance between grips, "
+        "messlänge, anfangsmesslänge, anfangslänge, einspannlänge, probenlänge, longueur, longueur de référence, "
+        "longueur entre repères, longueur entre mors, distance entre mors, longitud, longitud de referencia, "
+        "longitud entre puntos, longitud entre mordazas, distancia entre mordazas, comprimento, "
+        "comprimento de referência, comprimento de medida, distância entre garras, lunghezza, "
+        "lunghezza di riferimento, lunghezza tra i riferimenti, distanza tra gli afferraggi, lengte, "
+        "meetlengte, beginlengte, inklemlengte, 标距, 标距长度, 標距, 长度, 長度, 夹具间距, "
+        "標点距離, 標点間距離, 原標点距離, 長さ, つかみ具間距離, チャック間距離, ゲージ長, "
+        "длина, рабочая длина, расчётная длина, измерительная длина, зажимная длина, база, измерительная база, "
+        "база экстензометра, расстояние между захватами, расстояние между зажимами"
+    ),
+}
+"""What the sizes of specimens are called, in the words of testing standards, without those in `OF_SPECIMEN`."""
+HEIGHT_NAMES = names_of("height, h0, höhe, probenhöhe, hauteur, altura, altezza, hoogte, 高度, 高さ, высота")
+"""What the length of a cylinder or a disc is called; of other specimens it may be the thickness."""
+OF_SPECIMEN = re.compile(
+    r"\b((de|del|della|di|du|da|do|van) )*(la |het |l'|d')?(specimen|sample|test piece|disc|disk|eprouvette|"
+    r"echantillon|probeta|muestra|provino|campione|corpo de prova|amostra|proefstuk|monster)('s)?\b|"
+    r"\b(bei startposition|zu beginn|at (the )?(start|beginning)|before (the )?test)\b|"
+    r"\b(initiale?|initieel|inicial|iniziale|original|undeformed|(mean|average)(?! diameter))\b|"
+    r"原始|初始|初期|试样|試樣|試験片|样品|の|"
+    r"\b(перво)?начальн(ая|ый|ое)\b|\bисходн(ая|ый|ое)\b|\b(образца|пробы)\b"
+)
+"""Words beside the name of a size that leave it what it is, without accents; a mean diameter is that of a tube."""

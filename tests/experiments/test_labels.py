@@ -1,0 +1,95 @@
+"""Direction and condition of tests: said by a column, a sheet or a file, shown, written, and asked for."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from machine_files import neo_hookean
+from tissuq.errors import InputError
+from tissuq.report.run_folder import write_data
+
+STRETCH = np.linspace(1, 1.3, 20)
+FACTORS = {"longitudinal": 1.0, "transverse": 1.5}
+
+
+def rows(factor, *cells):
+    return [",".join([f"{x:.9f}", f"{1e3 * factor * neo_hookean(x):.9f}", *cells]) for x in STRETCH]
+
+
+def written(path, names, *lines):
+    path.write_text("\n".join([names, *lines]), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def by_column(tmp_path):
+    lines = [line for name, factor in FACTORS.items() for line in rows(factor, name, "frozen")]
+    return written(tmp_path / "aorta.csv", "stretch,stress [kPa],Fibre direction,Treatment", *lines)
+
+
+@pytest.fixture
+def by_sheet(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, factor in FACTORS.items():
+        sheet = book.create_sheet(f"S1 {name.title()}")
+        sheet.append(["stretch", "stress [kPa]"])
+        for x in STRETCH:
+            sheet.append([x, 1e3 * factor * neo_hookean(x)])
+    book.save(tmp_path / "aorta-frozen.xlsx")
+    return tmp_path / "aorta-frozen.xlsx"
+
+
+@pytest.mark.parametrize("source", ["by_column", "by_sheet"])
+def test_direction_and_condition_are_fields_that_choose_tests(request, source):
+    path = request.getfixturevalue(source)
+    tests = tq.read_tests(path)
+    assert [(test.direction, test.condition) for test in tests] == [(name, "frozen") for name in FACTORS]
+    for direction, factor in FACTORS.items():
+        (test,) = tq.read_tests(path, only={"direction": direction, "condition": "Frozen"})
+        np.testing.assert_allclose(test.stress, factor * neo_hookean(STRETCH), atol=1e-11)
+    with pytest.raises(InputError, match="the direction of the test is 'longitudinal', not 'radial'"):
+        tq.read_tests(path, only={"direction": "radial"})
+
+
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("aorta_circumferential_fresh.csv", ("circumferential", "fresh")),
+        ("LongitudinalDry.csv", ("longitudinal", "dry")),
+        ("0deg and 90deg.csv", ("", "")),
+        ("biaxial rewetted.csv", ("", "")),
+    ],
+)
+def test_words_in_the_name_of_a_file_say_them(tmp_path, name, labels):
+    path = written(tmp_path / name, "stretch,stress [kPa]", *rows(1.0))
+    data = tq.read(path, mode="uniaxial")
+    assert (data.direction, data.condition) == labels
+    if labels[0]:
+        assert len(tq.read(path, only={"direction": labels[0].upper()})) == len(STRETCH)
+        assert f"direction {labels[0]}, condition {labels[1]}" in str(tq.inspect(path))
+    with pytest.raises(InputError, match="direction of the test is"):
+        tq.read(path, mode="uniaxial", only={"direction": "radial"})
+
+
+def test_they_are_written_with_the_data_and_kept_in_a_posterior(by_column, tmp_path):
+    tests = tq.read_tests(by_column)
+    write_data(tmp_path, tq.Experiment.of(tests))
+    with (tmp_path / "data.csv").open(newline="") as lines:
+        cells = [(row["direction"], row["condition"]) for row in csv.DictReader(lines)]
+    assert cells == [(name, "frozen") for name in FACTORS for _ in STRETCH]
+    posterior = tq.fit(tests, discrepancy="none", noise_sd=1e-3)
+    posterior.save(tmp_path / "fit.nc")
+    loaded = tq.load(tmp_path / "fit.nc").model.experiment.tests
+    assert [test.direction for test in loaded] == list(FACTORS)
+
+
+def test_they_may_be_said_of_what_is_measured():
+    data = tq.Experiment("uniaxial", [1.0, 1.1], [0.0, 0.2], direction="radial", condition="wet")
+    assert (data.direction, data.condition) == ("radial", "wet")
+    assert data.labelled(direction="axial").direction == "axial"
