@@ -18,8 +18,8 @@ from tissuq.registry import variants
 ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "parameters", "experiments", "mechanics", "model", "inference", "prediction", "assessment",
-    "next_test", "posterior", "population", "export", "finite_elements", "emulation", "studies", "validation", "report",
-    "cli", "__main__",
+    "next_test", "posterior", "population", "export", "finite_elements", "decks", "emulation", "studies", "validation",
+    "report", "cli", "__main__",
 ]  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import typer
 from tissuq.cli import (
     calibrate,
     catalogue,
+    ensemble,
     fit,
     inspect,
     runs,
@@ -63,6 +64,7 @@ app.command("compare")(runs.compare)
 app.command("design")(runs.design)
 app.command("export")(runs.export)
 app.command("structure")(structure.structure)
+app.command("ensemble")(ensemble.ensemble)
 app.command("simulate", hidden=True, deprecated=True)(structure.structure)
 app.command("show")(runs.show)
 app.command("materials")(catalogue.materials)
