@@ -176,6 +176,7 @@ def prepare_ensemble(
     deck = Deck.read(beside / settings.model, settings.deck)
     solver = solver_for(deck.format.name, settings.solver, settings.command)
     solver.check_installed()
+    _extra_files(deck, settings, beside)
     quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
     found = {name: deck.material(name) for name in settings.materials}
     if len(set(found.values())) < len(found):
@@ -268,15 +269,10 @@ def copy_model(prepared: PreparedEnsemble, beside: Path, folder: Path) -> None:
     Raises
     ------
     InputError
-        When the folder holds another model, or a file that goes with the deck is missing.
+        When the folder holds another model.
     """
     deck, stored = prepared.deck, folder / MODEL
-    extra = {deck_folder(deck) + Path(name).name: beside / name for name in prepared.settings.also}
-    for name, file in extra.items():
-        if not file.is_file():
-            raise InputError(f"there is no file '{file}' to go with the model (--also).")
-        if name in deck.files:
-            raise InputError(f"'{file}' would take the place of a file of the model (--also).")
+    extra = _extra_files(deck, prepared.settings, beside)
     if stored.is_dir():
         stored_files = {name: (stored / name).read_bytes() for name in deck.files if (stored / name).is_file()}
         if stored_files != deck.files or not all(
@@ -312,6 +308,17 @@ def forget_failures(folder: Path) -> int:
         scratch.write_text("".join(lines), encoding="utf-8")
         scratch.replace(path)
     return len(failed)
+
+
+def _extra_files(deck: Deck, settings: EnsembleSettings, beside: Path) -> dict[str, Path]:
+    """Return the files that go with the deck, by their places in its folder."""
+    extra = {deck_folder(deck) + Path(name).name: beside / name for name in settings.also}
+    for name, file in extra.items():
+        if not file.is_file():
+            raise InputError(f"there is no file '{file}' to go with the model (--also).")
+        if name in deck.files:
+            raise InputError(f"'{file}' would take the place of a file of the model (--also).")
+    return extra
 
 
 def _quantity(name: str, text: str, beside: Path) -> Quantity:
