@@ -91,19 +91,17 @@ def _states(
         color = (BAND, TRUTH, BASE)[place % 3]
         is_ours = fields[0].materials == name
         states = np.concatenate([each.invariants[is_ours] for each in fields])
-        axis.plot(*np.maximum(states, 1e-7).T, ".", ms=2, color=color, alpha=0.3, label=name, rasterized=True)
+        axis.plot(*states.T, ".", ms=2, color=color, alpha=0.3, label=name, rasterized=True)
         axis.add_patch(Rectangle((0, 0), max_1, max_2, fill=False, ec=color, lw=1.5))
-    axis.set_xscale("log")
-    axis.set_yscale("log")
     axis.set_xlabel("I1 - 3")
     axis.set_ylabel("I2 - 3")
-    axis.set_title("Elements at the end; frames: measured")
+    axis.set_title("Elements at the end; within the frame: measured")
     axis.legend(fontsize=9, markerscale=5)
     if ensemble.beyond is not None:
         times, shares = ensemble.beyond
         shown = np.isfinite(shares).any(axis=0)
         share_axis.plot(times[shown], 100 * np.nanmean(shares[:, shown], axis=0), color=INK)
-        share_axis.set_title("Elements beyond what was measured [%]")
+        share_axis.set_title("Elements beyond it [%]")
         share_axis.set_xlabel("time")
         share_axis.set_ylim(0, 103)
     return figure
