@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from difflib import SequenceMatcher
+from difflib import SequenceMatcher, unified_diff
 
 import pytest
 
@@ -220,3 +220,16 @@ def test_a_material_without_elasticity_gets_the_card_below_its_name(tmp_path, bl
     content = b"*MATERIAL, NAME=T\n*DENSITY\n1.\n*STEP\n"
     (after,) = written(tmp_path, "abaqus", content).with_materials({"t": block("calculix")}).values()
     assert after == b"*MATERIAL, NAME=T\n" + block("calculix").partition("\n")[2].encode() + content.partition(b"\n")[2]
+
+
+def test_the_diff_is_that_of_the_whole_files(tmp_path, block):
+    """Against difflib on all lines, with the material at the start, in the middle and at the end."""
+    block_of = block("calculix")
+    lines = [f"** line {number}\n" for number in range(40)]
+    for at in (0, 1, 20, 39, 40):
+        text = "".join([*lines[:at], "*MATERIAL, NAME=T\n*ELASTIC\n1., 0.3\n", *lines[at:]]).encode()
+        deck = written(tmp_path, "abaqus", text)
+        changed = deck.with_materials({"T": block_of})
+        before, after = (content.decode().splitlines() for content in (text, changed["model.inp"]))
+        wanted = unified_diff(before, after, "model.inp (the model)", "model.inp (a draw)", lineterm="")
+        assert deck.diff(changed).splitlines() == list(wanted)

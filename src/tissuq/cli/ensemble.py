@@ -127,7 +127,7 @@ def ensemble(
         for source in sources:
             check_apart(folder, beside / source)
     with progress() as step:
-        prepared = prepare_ensemble(settings, beside, own_law(fitted_law), step)
+        prepared = prepare_ensemble(settings, beside, own_law(fitted_law), step, runs_here=not (dry_run or scheduler))
     if dry_run:
         print(prepared.diff())
         print_explanations(prepared.card_warnings)

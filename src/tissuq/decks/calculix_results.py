@@ -141,10 +141,11 @@ def _read(lines: list[bytes], last_time: float) -> Frd:
 
 def _numbers(lines: list[bytes], count: int) -> tuple[NDArray[np.int64], FloatArray]:
     """Return the nodes and the numbers (n, count) of lines with fixed columns, of which as many as there are."""
-    nodes = np.array([int(line[3:LEADING]) for line in lines], dtype=np.int64)
-    ends = [(LEADING + NUMBER * column, LEADING + NUMBER * (column + 1)) for column in range(count)]
-    values = np.array([[float(line[start:end]) for start, end in ends] for line in lines])
-    return nodes, values.reshape(len(lines), count)
+    width = LEADING + NUMBER * count
+    text = np.frombuffer(b"".join(line[:width].ljust(width) for line in lines), dtype="S1").reshape(-1, width)
+    nodes = np.ascontiguousarray(text[:, 3:LEADING]).view(f"S{LEADING - 3}").astype(np.int64).ravel()
+    values = np.ascontiguousarray(text[:, LEADING:]).view(f"S{NUMBER}").astype(np.float64)
+    return nodes, values
 
 
 def _read_elements(lines: list[bytes], at: int, count: int, elements: dict[int, list[tuple[list[int], int]]]) -> int:

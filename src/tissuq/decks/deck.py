@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,11 @@ from tissuq.errors import InputError
 from tissuq.registry import find, variants
 
 __all__ = ["Deck", "DeckFormat", "DeckMaterial", "Line", "deck_formats", "decoded", "encoded", "lines_of"]
+
+CONTEXT = 3
+"""Lines around a difference that are shown."""
+HUNK = re.compile(r"( [-+])(\d+)")
+"""The number of a line where a difference starts."""
 
 
 def decoded(content: bytes) -> str:
@@ -218,8 +224,9 @@ class Deck:
         """Return the difference of the files that change, as ``diff -u`` shows it."""
         lines: list[str] = []
         for file, content in changed.items():
-            before, after = (decoded(text).splitlines() for text in (self.files[file], content))
-            lines += unified_diff(before, after, f"{file} (the model)", f"{file} (a draw)", lineterm="")
+            lines += _difference(
+                file, *([line.text for line in lines_of(text)] for text in (self.files[file], content))
+            )
         return "\n".join(lines)
 
     def _placed(self, wanted: str) -> tuple[str, DeckMaterial]:
@@ -251,6 +258,21 @@ def _recognised(file: Path, content: bytes) -> DeckFormat:
         if kind.recognises(content):
             return kind
     raise InputError(f"'{file.name}' looks like no known deck: say which it is with --deck {'|'.join(deck_formats())}.")
+
+
+def _difference(file: str, before: list[str], after: list[str]) -> list[str]:
+    """Return the difference of the lines of a file, of which the equal ones at its start and end are not compared."""
+    pairs = enumerate(zip(before, after, strict=False))
+    equal = next((place for place, (old, new) in pairs if old != new), min(len(before), len(after)))
+    backwards = enumerate(zip(before[:equal:-1], after[:equal:-1], strict=False))
+    tail = next((place for place, (old, new) in backwards if old != new), min(len(before), len(after)) - equal)
+    start, end = max(0, equal - CONTEXT), max(0, tail - CONTEXT)
+    parts = before[start : len(before) - end], after[start : len(after) - end]
+    found = unified_diff(*parts, f"{file} (the model)", f"{file} (a draw)", n=CONTEXT, lineterm="")
+    return [
+        HUNK.sub(lambda match: f"{match[1]}{int(match[2]) + start}", line) if line[:2] == "@@" else line
+        for line in found
+    ]
 
 
 def _edited(content: bytes, edits: list[tuple[int, int, bytes]]) -> bytes:

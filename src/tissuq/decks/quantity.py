@@ -188,6 +188,8 @@ class Component(Quantity):
             known = ", ".join(sorted(results.node_sets)) or "none"
             raise InputError(f"{self.text}: the deck has no set of nodes '{self.set_name}'; its sets are {known}.")
         rows = np.isin(nodes, sorted(members)) if members is not None else np.ones(len(nodes), dtype=bool)
+        if not rows.any():
+            raise InputError(f"{self.text}: no node of the set is in '{results.job}.frd'.")
         names = [name if len(name) == 3 else name[-1] for name in steps[0][1]]
         values = [np.array([fields[key][rows] for _, fields in steps]) for key in steps[0][1]]
         return Curve(np.array([time for time, _ in steps]), self._over_set(dict(zip(names, values, strict=True))))

@@ -153,6 +153,8 @@ def prepare_ensemble(
     beside: Path = Path(),
     law: Material | None = None,
     step: Callable[[str], None] = lambda text: None,
+    *,
+    runs_here: bool = True,
 ) -> PreparedEnsemble:
     """Return deck, solver, quantities and cards of an ensemble; nothing is run.
 
@@ -165,6 +167,8 @@ def prepare_ensemble(
         The material of the runs, where it is a law in a file.
     step : callable
         Told what is being done.
+    runs_here : bool
+        Whether the solver is to be run by this machine.
 
     Raises
     ------
@@ -175,7 +179,8 @@ def prepare_ensemble(
     settings.card_settings()
     deck = Deck.read(beside / settings.model, settings.deck)
     solver = solver_for(deck.format.name, settings.solver, settings.command)
-    solver.check_installed()
+    if runs_here:
+        solver.check_installed()
     _extra_files(deck, settings, beside)
     quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
     found = {name: deck.material(name) for name in settings.materials}
