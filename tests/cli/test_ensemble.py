@@ -101,6 +101,12 @@ def test_the_decks_differ_from_the_model_in_the_material_alone(cli, here, model)
         assert text.count("*HYPERELASTIC") == 1
 
 
+def test_every_material_may_name_its_run(cli, here, model):
+    words = ["model.inp", "--material", "TISSUE=run", *model[4:]]
+    assert cli("ensemble", *words, "--no-figures").status == 0
+    assert len(rows_of(here / "out" / "draws.csv")) == 6
+
+
 def test_a_dry_run_shows_the_diff_and_leaves_nothing(cli, here, model):
     said = cli("ensemble", *model, "--dry-run")
     assert said.status == 0, said.err
@@ -257,6 +263,7 @@ def test_what_cannot_be_used_gets_one_message_and_leaves_nothing(cli, here, mode
         (["--material", "Tissue"], ["one material of the model twice"]),
         (["--material", "TISSUE"], ["given twice for 'TISSUE'"]),
         (["--also", "umat.f"], ["umat.f"]),
+        (["--qoi", "C10=RF1@TOP"], ["cannot be called 'C10'"]),
         (["--command", "no-such-program {job}"], ["no program 'no-such-program'"]),
         (["--format", "table"], ["do not go into a deck"]),
     ],
@@ -271,5 +278,6 @@ def test_options_that_cannot_be_used_get_one_message(cli, here, model, more, wor
 
 def test_without_a_model_or_a_question_it_says_what_to_give(cli, here, model):
     assert "RUN folder of a fit and your MODEL" in cli("ensemble", "run").err
+    assert "has no run" in cli("ensemble", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP").err
     assert "give --material NAME" in cli("ensemble", "run", "model.inp").err
     assert "give --qoi" in cli("ensemble", "run", "model.inp", "--material", "TISSUE").err

@@ -77,7 +77,7 @@ def test_a_run_that_takes_too_long_is_ended_with_all_that_it_started(tmp_path):
 
 
 def test_results_are_trusted_up_to_the_last_increment_that_converged(tmp_path):
-    rows = " 1  1  1   7  0.2   0.2   0.2\n 1  2  1U  4  0.2   0.2   0.2\n 1  2  2   3  0.25  0.25  0.05\n"
+    rows = " 1  1  1   7  0.2   0.2   0.2\n 1  2  2   3  0.25  0.25  0.05\n 1  3  1U  4  0.25  0.25  0.05\n"
     (tmp_path / "job.sta").write_text("SUMMARY OF JOB INFORMATION\n  STEP  INC  ATT ITRS  TOT  STEP  INC\n" + rows)
     assert CalculiXSolver().last_time(tmp_path, "job") == 0.25
     assert CalculiXSolver().last_time(tmp_path, "other") == float("inf")

@@ -106,7 +106,9 @@ def ensemble(
     from tissuq.studies.ensemble import EnsembleSettings, forget_failures, prepare_ensemble, run_ensemble
     from tissuq.studies.stream import open_pool
 
-    if bool(run and model) == bool(config) or bool(run) != bool(model):
+    if run is not None and model is None and run.is_file():
+        run, model = None, run  # every material has its own run
+    if bool(model) == bool(config) or (run and not model):
         raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
     options: dict[str, Any] = {
         "model": str(model) if model else None, "materials": _materials(material or [], run) or None,
@@ -121,8 +123,9 @@ def ensemble(
             raise InputError(f"give {option}: what the model is asked for.")
     settings = load_settings(EnsembleSettings, config, options)
     beside = config.parent if config else Path()
-    folder = out or Path("runs") / f"{(run or beside).resolve().name}-{Path(settings.model).stem}"
     sources = list(dict.fromkeys(settings.materials.values()))
+    named = beside if config else Path(sources[0])
+    folder = out or Path("runs") / f"{named.resolve().name}-{Path(settings.model).stem}"
     if not config and not dry_run:
         for source in sources:
             check_apart(folder, beside / source)
@@ -190,6 +193,8 @@ def _materials(texts: list[str], run: Path | None) -> dict[str, str]:
         name, equals, source = (word.strip() for word in text.partition("="))
         if not name or (equals and not source):
             raise InputError(f"'{text}' is not a material of the model; write NAME, or NAME=RUN.")
+        if not source and run is None:
+            raise InputError(f"material '{name}' has no run: give its RUN before the model, or write {name}=RUN.")
         pairs.append((name, source or str(run)))
     return once_each("--material", pairs)
 

@@ -154,12 +154,15 @@ class CalculiXSolver(Solver):
         return errors[-1].strip() if errors else f"it ended with status {status} and did not finish"
 
     def last_time(self, folder: Path, job: str) -> float:
-        """Return the last total time in the .sta file: CalculiX writes the increment that failed into the .frd, too."""
+        """Return the last total time in the .sta file: CalculiX writes the increment that failed into the .frd, too.
+
+        A row of an attempt that failed has the time that was reached before.
+        """
         status = folder / f"{job}.sta"
         if not status.is_file():
             return float("inf")
         rows = [line.split() for line in status.read_text(encoding="utf-8", errors="replace").splitlines()]
-        ended = [row for row in rows if len(row) == 7 and row[0].isdigit() and not row[2].endswith("U")]
+        ended = [row for row in rows if len(row) == 7 and row[0].isdigit()]
         return float(ended[-1][4]) if ended else 0.0
 
 

@@ -33,7 +33,7 @@ def ensemble_figures(
     from matplotlib import rc_context
 
     with rc_context(STYLE):
-        figures = {name: _quantity(ensemble, name) for name in ensemble.curves}
+        figures = {f"quantity-{name}": _quantity(ensemble, name) for name in ensemble.curves}
         if fields and len(fields[0].invariants):
             figures["states"] = _states(ensemble, fields, limits)
     return figures

@@ -209,6 +209,7 @@ def prepare_ensemble(
             raise InputError(f"cards of the format '{settings.card_format}' do not go into a deck.")
         if is_shared:
             cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
+    _check_names(quantities, ensembles)
     prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards)
     for quantity in quantities:
         quantity.check()
@@ -259,7 +260,7 @@ def run_ensemble(
     unique = list({task.key: task for task in tasks}.values())
     with progress(len(unique)) as step:
         if unique[0].key not in read_results(folder / RESULTS):
-            run_tasks(unique[:1], carried_out, folder)
+            run_tasks(unique[:1], carried_out, folder, pool=pool)
         first = read_results(folder / RESULTS)[unique[0].key]
         if first["misread"] and not first["problem"]:
             raise InputError(first["misread"])
@@ -313,6 +314,14 @@ def forget_failures(folder: Path) -> int:
         scratch.write_text("".join(lines), encoding="utf-8")
         scratch.replace(path)
     return len(failed)
+
+
+def _check_names(quantities: tuple[Quantity, ...], ensembles: Mapping[str, Ensemble]) -> None:
+    """Refuse quantities that are called as another column of the table of draws."""
+    symbols = [symbol for ensemble in ensembles.values() for symbol in ensemble[0].values]
+    for quantity in quantities:
+        if quantity.name in ("draw", "problem", *symbols):
+            raise InputError(f"a quantity cannot be called '{quantity.name}', as a column of the draws: rename it.")
 
 
 def _extra_files(deck: Deck, settings: EnsembleSettings, beside: Path) -> dict[str, Path]:
