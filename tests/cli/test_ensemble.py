@@ -101,6 +101,46 @@ def test_the_decks_differ_from_the_model_in_the_material_alone(cli, here, model)
         assert text.count("*HYPERELASTIC") == 1
 
 
+OTHERS = {
+    "febio": (
+        "model.feb",
+        '<febio_spec version="4.0"><Material><material id="1" name="Fat" type="neo-Hookean"><E>1</E></material>'
+        '<material id="2" name="Tissue" type="neo-Hookean"><E>1</E></material></Material></febio_spec>',
+        "Tissue",
+        r"id=.2. name=.Tissue. type=.Mooney-Rivlin.>\s*<c1>(.*?)</c1>",
+        "card_c1",
+    ),
+    "ls-dyna": (
+        "model.k",
+        "*KEYWORD\n*MAT_ELASTIC\n         7   1.1e-9        1.       0.3\n*END\n",
+        "7",
+        r"\n +7 +1\.1e-9.*\n.*\n +(\S+)",
+        "card_C10",
+    ),
+    "ansys": ("model.cdb", "/PREP7\nMP,EX,3,1.0\n/SOLU\n", "3", r"TB,HYPER,3,1,,NEO\nTBDATA,1,([^,]+)", "card_mu"),
+}
+"""Of each format a deck, its material, where a draw's first constant stands then, and its name in the index."""
+
+
+@pytest.mark.parametrize("code", OTHERS)
+def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli, here, model, code):
+    name, deck, wanted, pattern, column = OTHERS[code]
+    (here / name).write_text(deck, encoding="utf-8")
+    body = (
+        f"import re\ndef first(folder):\n    return float(re.search({pattern!r}, (folder / {name!r}).read_text())[1])\n"
+    )
+    (here / "mine.py").write_text(body, encoding="utf-8")
+    says = "N O R M A L   T E R M I N A T I O N"
+    command = f'"{Path(sys.executable).as_posix()}" -c "print(\'{says}\')"'
+    solver = ["--solver", "febio4"] if code == "febio" else []
+    options = ["--qoi", "first=mine.py:first", *solver, "--command", command, "--draws", 3, "--max-jobs", 1]
+    said = cli("ensemble", "run", name, "--material", wanted, *options, "--no-figures", "--out", "out")
+    assert said.status == 0, said.err
+    assert cli("export", "run", "--format", code, "--draws", 3, "--out", "cards").status == 0
+    constants = [float(row[column]) for row in rows_of(here / "cards" / "index.csv")]
+    assert [float(row["first"]) for row in rows_of(here / "out" / "draws.csv")] == pytest.approx(constants, rel=1e-9)
+
+
 def test_every_material_may_name_its_run(cli, here, model):
     words = ["model.inp", "--material", "TISSUE=run", *model[4:]]
     assert cli("ensemble", *words, "--no-figures").status == 0

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+
 import numpy as np
 import pytest
 
-from tissuq.decks.calculix_results import read_dat, read_frd
+from tissuq.decks.calculix_results import CELL_TYPES, read_dat, read_frd
 from tissuq.errors import InputError
 
+CCX = shutil.which("ccx")
 DAT = """
  displacements (vx,vy,vz) for set TOP and time  0.5000000E+00
 
@@ -98,3 +102,44 @@ def test_a_damaged_file_is_told(tmp_path, damage):
     (tmp_path / "job.frd").write_text(damage(FRD))
     with pytest.raises(InputError, match=r"'job\.frd' cannot be read"):
         read_frd(tmp_path / "job.frd")
+
+
+HEXAHEDRON = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+WEDGE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
+TETRAHEDRON = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+EDGES = {
+    "hexahedron20": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
+    "wedge15": [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)],
+    "tetra10": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
+}
+"""The corners between which VTK's nodes on edges lie, in its order, which is that of Abaqus and CalculiX, too."""
+SOLIDS = {
+    "C3D8": ("hexahedron", HEXAHEDRON, []), "C3D20": ("hexahedron20", HEXAHEDRON, EDGES["hexahedron20"]),
+    "C3D6": ("wedge", WEDGE, []), "C3D15": ("wedge15", WEDGE, EDGES["wedge15"]),
+    "C3D4": ("tetra", TETRAHEDRON, []), "C3D10": ("tetra10", TETRAHEDRON, EDGES["tetra10"]),
+}  # fmt: skip
+
+
+def shifted(corners, edges, distance):
+    """Return corners and the middles of edges, moved along x."""
+    points = [*corners, *(np.mean([corners[a], corners[b]], axis=0) for a, b in edges)]
+    return np.array(points) + np.array([distance, 0, 0])
+
+
+@pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed: make system")
+def test_the_nodes_of_every_solid_are_in_the_order_of_vtk(tmp_path):
+    nodes, elements = [], []
+    for place, (kind, (_, corners, edges)) in enumerate(SOLIDS.items()):
+        points = shifted(corners, edges, 5 * place)
+        numbers = list(range(len(nodes) + 1, len(nodes) + len(points) + 1))
+        nodes += [f"{n}, {x}, {y}, {z}" for n, (x, y, z) in zip(numbers, points, strict=True)]
+        elements += [f"*ELEMENT, TYPE={kind}, ELSET=E{place}", ",\n".join(map(str, [place + 1, *numbers]))]
+    sections = [f"*SOLID SECTION, ELSET=E{place}, MATERIAL=A" for place in range(len(SOLIDS))]
+    deck = ["*NODE, NSET=ALL", *nodes, *elements, "*MATERIAL, NAME=A", "*ELASTIC", "1., 0.3", *sections]
+    deck += ["*STEP", "*STATIC", "*BOUNDARY", "ALL, 1, 3", "*NODE FILE", "U", "*END STEP", ""]
+    (tmp_path / "solids.inp").write_text("\n".join(deck))
+    subprocess.run([CCX, "-i", "solids"], cwd=tmp_path, check=True, capture_output=True, timeout=120)
+    found = read_frd(tmp_path / "solids.frd")
+    cells = {CELL_TYPES[kind][0]: found.points[members[0]] for kind, (members, _) in found.cells.items()}
+    for place, (name, corners, edges) in enumerate(SOLIDS.values()):
+        np.testing.assert_allclose(cells[name], shifted(corners, edges, 5 * place), err_msg=name)
