@@ -87,11 +87,11 @@ class AbaqusDeck(DeckFormat):
         return [keyword.parameters.get("INPUT", "") for keyword in keywords_of(content) if keyword.name == "INCLUDE"]
 
     def materials(self, content: bytes) -> list[DeckMaterial]:
-        keywords, found = list(keywords_of(content)), []
-        for place, keyword in enumerate(keywords):
+        keywords, materials = list(keywords_of(content)), []
+        for index, keyword in enumerate(keywords):
             if keyword.name == "MATERIAL":
-                found.append(_material(keyword, keywords[place + 1 :]))
-        return found
+                materials.append(_material(keyword, keywords[index + 1 :]))
+        return materials
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
         return block.partition("\n")[2]

@@ -67,9 +67,9 @@ class AnsysDeck(DeckFormat):
             if in_table:
                 spans[in_table].append((line.start, line.end))
         return [
-            DeckMaterial("", number, tuple(found), (), refused.get(number, ""))
-            for number, found in spans.items()
-            if found
+            DeckMaterial("", number, tuple(lines), (), refused.get(number, ""))
+            for number, lines in spans.items()
+            if lines
         ]
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
@@ -78,16 +78,16 @@ class AnsysDeck(DeckFormat):
 
 def _commands(content: bytes) -> list[tuple[Line, list[str]]]:
     """Return the lines with commands, and the words of each, the command in capitals; comments follow a ``!``."""
-    found = []
+    commands = []
     for line in lines_of(content):
         words = [word.strip() for word in line.text.partition("!")[0].split(",")]
         if words[0]:
-            found.append((line, [words[0].upper(), *words[1:]]))
-    return found
+            commands.append((line, [words[0].upper(), *words[1:]]))
+    return commands
 
 
-def _word(words: list[str], place: int) -> str:
-    return words[place] if len(words) > place else ""
+def _word(words: list[str], index: int) -> str:
+    return words[index] if len(words) > index else ""
 
 
 def _mpdata(words: list[str]) -> tuple[str, str]:

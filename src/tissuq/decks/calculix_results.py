@@ -49,7 +49,7 @@ def read_dat(path: Path) -> dict[tuple[str, str], Table]:
 
     Numbers of nodes, elements and integration points are left out.
     """
-    found: dict[tuple[str, str], tuple[tuple[str, ...], list[float], list[list[list[float]]]]] = {}
+    by_table: dict[tuple[str, str], tuple[tuple[str, ...], list[float], list[list[list[float]]]]] = {}
     rows: list[list[float]] | None = None
     skip = 0
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -59,7 +59,7 @@ def read_dat(path: Path) -> dict[tuple[str, str], Table]:
             skip = 0 if head["what"].startswith("total") else 1
             if names[:2] == ["elem", "integ.pnt."]:
                 names, skip = names[2:], 2
-            _, times, tables = found.setdefault((head["what"], head["set"]), (tuple(names), [], []))
+            _, times, tables = by_table.setdefault((head["what"], head["set"]), (tuple(names), [], []))
             rows = []
             times.append(float(head["time"]))
             tables.append(rows)
@@ -68,7 +68,7 @@ def read_dat(path: Path) -> dict[tuple[str, str], Table]:
                 rows.append([float(word) for word in line.split()[skip:]])
             except ValueError:
                 rows = None
-    return {key: Table(names, np.array(times), np.array(values)) for key, (names, times, values) in found.items()}
+    return {key: Table(names, np.array(times), np.array(values)) for key, (names, times, values) in by_table.items()}
 
 
 @dataclass(frozen=True)
@@ -131,10 +131,10 @@ def _read(lines: list[bytes], last_time: float) -> Frd:
         elif line.startswith(b"  100C"):
             at = _read_field(lines, at, last_time, nodes, fields)
         at += 1
-    place = {int(node): index for index, node in enumerate(nodes)}
+    row_of = {int(node): index for index, node in enumerate(nodes)}
     cells = {}
     for kind, rows in elements.items():
-        corners = np.array([[place[node] for node in members] for members, _ in rows], dtype=np.int64)
+        corners = np.array([[row_of[node] for node in members] for members, _ in rows], dtype=np.int64)
         cells[kind] = corners[:, ORDERS.get(kind, slice(None))], np.array([number for _, number in rows])
     return Frd(nodes, points, cells, materials, fields)
 

@@ -59,7 +59,7 @@ class DeckMaterial:
         What it is called, and its number in the model; empty where the format has no such thing.
     spans : tuple of (int, int)
         The bytes that a card replaces: it stands in the place of the first, the others vanish.
-    kept : tuple of str
+    remains : tuple of str
         What the new text needs of the old one; every format has its meaning for them.
     refused : str
         What stands in the way of another card, in words.
@@ -68,7 +68,7 @@ class DeckMaterial:
     name: str
     number: str
     spans: tuple[tuple[int, int], ...]
-    kept: tuple[str, ...] = ()
+    remains: tuple[str, ...] = ()
     refused: str = ""
 
     @property
@@ -155,8 +155,8 @@ class Deck:
         >>> import tempfile
         >>> from pathlib import Path
         >>> from tissuq.decks import Deck
-        >>> with tempfile.TemporaryDirectory() as place:
-        ...     file = Path(place) / "bar.inp"
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = Path(folder) / "bar.inp"
         ...     _ = file.write_text("*MATERIAL, NAME=Fat\n*ELASTIC\n1., 0.3\n*STEP\n")
         ...     deck = Deck.read(file)
         >>> deck.format.name, [material.name for _, material in deck.materials()]
@@ -230,14 +230,14 @@ class Deck:
         return "\n".join(lines)
 
     def _placed(self, wanted: str) -> tuple[str, DeckMaterial]:
-        found = [(file, material) for file, material in self.materials() if self.format.matches(material, wanted)]
-        if len(found) == 1:
-            if found[0][1].refused:
-                raise InputError(f"material '{wanted}' in '{found[0][0]}': {found[0][1].refused}")
-            return found[0]
-        if found:
-            places = ", ".join(f"'{file}'" for file, _ in found)
-            raise InputError(f"the model '{self.main}' has {len(found)} materials '{wanted}' (in {places}).")
+        matching = [(file, material) for file, material in self.materials() if self.format.matches(material, wanted)]
+        if len(matching) == 1:
+            if matching[0][1].refused:
+                raise InputError(f"material '{wanted}' in '{matching[0][0]}': {matching[0][1].refused}")
+            return matching[0]
+        if matching:
+            places = ", ".join(f"'{file}'" for file, _ in matching)
+            raise InputError(f"the model '{self.main}' has {len(matching)} materials '{wanted}' (in {places}).")
         names = ", ".join(material.label for _, material in self.materials()) or "none that is known"
         outside = f" Files with absolute names were not looked at: {', '.join(self.outside)}." if self.outside else ""
         raise InputError(f"the model '{self.main}' has no material '{wanted}'; its materials are {names}.{outside}")
@@ -263,15 +263,15 @@ def _recognised(file: Path, content: bytes) -> DeckFormat:
 def _difference(file: str, before: list[str], after: list[str]) -> list[str]:
     """Return the difference of the lines of a file, of which the equal ones at its start and end are not compared."""
     pairs = enumerate(zip(before, after, strict=False))
-    equal = next((place for place, (old, new) in pairs if old != new), min(len(before), len(after)))
+    equal = next((index for index, (old, new) in pairs if old != new), min(len(before), len(after)))
     backwards = enumerate(zip(before[:equal:-1], after[:equal:-1], strict=False))
-    tail = next((place for place, (old, new) in backwards if old != new), min(len(before), len(after)) - equal)
+    tail = next((index for index, (old, new) in backwards if old != new), min(len(before), len(after)) - equal)
     start, end = max(0, equal - CONTEXT), max(0, tail - CONTEXT)
     parts = before[start : len(before) - end], after[start : len(after) - end]
-    found = unified_diff(*parts, f"{file} (the model)", f"{file} (a draw)", n=CONTEXT, lineterm="")
+    difference = unified_diff(*parts, f"{file} (the model)", f"{file} (a draw)", n=CONTEXT, lineterm="")
     return [
         HUNK.sub(lambda match: f"{match[1]}{int(match[2]) + start}", line) if line[:2] == "@@" else line
-        for line in found
+        for line in difference
     ]
 
 

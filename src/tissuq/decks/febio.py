@@ -36,7 +36,7 @@ class FEBioDeck(DeckFormat):
         return _Parsed(content).materials
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
-        head, density = material.kept
+        head, density = material.remains
         kind = TYPE.search(block.partition(">")[0])
         assert kind is not None  # noqa: S101 (the writer's)
         start = TYPE.sub(lambda match: match[1] + kind[2], head, count=1)

@@ -34,7 +34,7 @@ class LSDynaDeck(DeckFormat):
         return [name.strip() for name in names if name.strip()]
 
     def materials(self, content: bytes) -> list[DeckMaterial]:
-        found = []
+        materials = []
         for keyword, *data in _blocks(content):
             name = keyword.text.split()[0].upper()
             if name.startswith("*MAT_") and not name.startswith(NOT_ELASTIC) and data:
@@ -43,15 +43,15 @@ class LSDynaDeck(DeckFormat):
                 row = data[1 if is_titled and len(data) > 1 else 0].text
                 number, density = _fields(row, LONG if re.search(r"\s\+\s*$", keyword.text) else WIDTH)
                 span = keyword.start, data[-1].end
-                found.append(DeckMaterial(title.strip(), number, (span,), (title, number, density)))
-        return found
+                materials.append(DeckMaterial(title.strip(), number, (span,), (title, number, density)))
+        return materials
 
     def matches(self, material: DeckMaterial, wanted: str) -> bool:
         same_number = wanted.isdigit() and material.number.isdigit() and int(wanted) == int(material.number)
         return same_number or super().matches(material, wanted)
 
     def fragment(self, material: DeckMaterial, block: str) -> str:
-        title, number, density = material.kept
+        title, number, density = material.remains
         keyword, name, names, row, *others = block.splitlines()
         numbered = f"{number:>{LONG}}{density:>{LONG}}{row[2 * LONG :]}"
         return "\n".join([keyword, title or name, names, numbered, *others, ""])
@@ -60,7 +60,7 @@ class LSDynaDeck(DeckFormat):
 def _blocks(content: bytes) -> list[list[Line]]:
     """Return every keyword with the lines of its data, without comments."""
     lines = [line for line in lines_of(content) if not line.text.startswith("$")]
-    starts = [place for place, line in enumerate(lines) if line.text.startswith("*")]
+    starts = [index for index, line in enumerate(lines) if line.text.startswith("*")]
     return [_trimmed(lines[start:end]) for start, end in pairwise([*starts, len(lines)])]
 
 

@@ -109,9 +109,9 @@ def gathered(tasks: Sequence[ModelRun], results: Sequence[Mapping[str, Any]]) ->
     by_family = {name: [result for task, result in pairs if task.family == name] for name in families}
     times, curves = {}, {}
     for name in (quantity.name for quantity in tasks[0].quantities):
-        found = [result["curves"].get(name) for result in results]
+        pairs_of_draws = [result["curves"].get(name) for result in results]
         _check_any(name, by_family[COMPLETE])
-        times[name], rows = on_common_times(found)
+        times[name], rows = on_common_times(pairs_of_draws)
         members = [np.array([task.family == family for task in tasks]) for family in families]
         curves[name] = {family: rows[is_member] for family, is_member in zip(families, members, strict=True)}
     shares = [result["beyond"] for result in by_family[COMPLETE]]

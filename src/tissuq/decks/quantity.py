@@ -263,8 +263,8 @@ class FunctionQuantity(Quantity):
     def read(self, results: Results) -> Curve:
         function = self._function()
         try:
-            found = function(results.folder)
-            times, values = found if isinstance(found, tuple) else (np.nan, found)
+            returned = function(results.folder)
+            times, values = returned if isinstance(returned, tuple) else (np.nan, returned)
             curve = Curve(*(np.atleast_1d(np.asarray(part, dtype=np.float64)) for part in (times, values)))
         except Exception as error:  # whatever the user's function does
             raise InputError(

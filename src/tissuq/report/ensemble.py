@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,13 +68,14 @@ def write_ensemble(study: EnsembleStudy, folder: Path, *, figures: bool = True) 
     stored = [folder / DRAWS / name / FIELDS for name in result.folders]
     fields = [FinalFields.load(path) for path in stored if path.is_file()]
     (folder / "fields.vtu").unlink(missing_ok=True)
-    if len(fields) > 1:
+    has_fields = len(fields) > 1 and find_spec("meshio") is not None
+    if has_fields:
         write_fields(folder / "fields.vtu", fields)
     shutil.rmtree(folder / "figures", ignore_errors=True)
     if figures:
         limits = study.prepared.tasks(folder)[0].limits
         write_figures(folder, ensemble_figures(result, fields, limits))
-    write_page(folder, "ensemble.html", **_context(study, tables, bool(fields)))
+    write_page(folder, "ensemble.html", **_context(study, tables, has_fields))
 
 
 def readable_quantities(study: EnsembleStudy) -> tuple[list[str], list[list[str]]]:
@@ -105,7 +107,7 @@ def _write_tables(study: EnsembleStudy, tables: dict[str, pd.DataFrame], folder:
         "draws": result.draws,
         "failed": sum(failure.family == COMPLETE for failure in result.failures),
         "quantities": {name: _plain(_last(table)) for name, table in tables.items()},
-        "measured_invariants": {name: list(each.most) for name, each in study.prepared.ensembles.items()},
+        "measured_invariants": {name: list(ensemble.most) for name, ensemble in study.prepared.ensembles.items()},
         "elements_beyond": None if beyond is None else float(np.nanmean(beyond[1][:, -1])),
         "seconds": result.seconds,
         "cards": study.prepared.card_warnings,

@@ -81,16 +81,16 @@ def _draw_shares(axis: object, table: pd.DataFrame) -> None:
 def _states(
     ensemble: ModelEnsemble, fields: Sequence[FinalFields], limits: tuple[tuple[str, tuple[float, float]], ...]
 ) -> Figure:
-    """Draw the states of the elements at the end, draws together, and what was measured of each material."""
+    """Draw the states of the elements at the end, draws together, and what was measured of draw material."""
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
     figure = Figure(figsize=(9.6, 3.7))
     axis, share_axis = figure.subplots(1, 2, width_ratios=(1.4, 1))
-    for place, (name, (max_1, max_2)) in enumerate(limits):
-        color = (BAND, TRUTH, BASE)[place % 3]
+    for index, (name, (max_1, max_2)) in enumerate(limits):
+        color = (BAND, TRUTH, BASE)[index % 3]
         is_ours = fields[0].materials == name
-        states = np.concatenate([each.invariants[is_ours] for each in fields])
+        states = np.concatenate([draw.invariants[is_ours] for draw in fields])
         axis.plot(*states.T, ".", ms=2, color=color, alpha=0.3, label=name, rasterized=True)
         axis.add_patch(Rectangle((0, 0), max_1, max_2, fill=False, ec=color, lw=1.5))
     axis.set_xlabel("I1 - 3")
@@ -112,12 +112,12 @@ def write_fields(path: Path, fields: Sequence[FinalFields]) -> None:
     import meshio
 
     first = fields[0]
-    points = {"displacement": np.stack([each.displacement for each in fields])}
+    points = {"displacement": np.stack([draw.displacement for draw in fields])}
     if len(first.von_mises):
-        points["von Mises stress"] = np.stack([each.von_mises for each in fields])
+        points["von Mises stress"] = np.stack([draw.von_mises for draw in fields])
     cells = {}
     if len(first.invariants):
-        cells["I1 - 3"], cells["I2 - 3"] = (np.stack([each.invariants[:, axis] for each in fields]) for axis in (0, 1))
+        cells["I1 - 3"], cells["I2 - 3"] = (np.stack([draw.invariants[:, axis] for draw in fields]) for axis in (0, 1))
     ends = np.cumsum([len(members) for members in first.cells.values()])[:-1]
     blocks = [(CELL_TYPES[kind][0], members) for kind, members in first.cells.items()]
     of_cells = {name: np.split(values, ends) for name, values in _moments(cells).items()}
@@ -126,8 +126,8 @@ def write_fields(path: Path, fields: Sequence[FinalFields]) -> None:
 
 def _moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:
     """Return mean and standard deviation over the first axis, by labels."""
-    found = {}
+    moments = {}
     for name, values in fields.items():
-        found[f"mean {name}"] = values.mean(axis=0)
-        found[f"sd of {name}"] = values.std(axis=0, ddof=1)
-    return found
+        moments[f"mean {name}"] = values.mean(axis=0)
+        moments[f"sd of {name}"] = values.std(axis=0, ddof=1)
+    return moments

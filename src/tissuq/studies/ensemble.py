@@ -114,7 +114,9 @@ class PreparedEnsemble:
         self, folder: Path, *, timeout: float | None = None, retries: int = 0, keep: bool = True
     ) -> list[ModelRun]:
         """Return the runs: the complete draws first."""
-        limits = tuple((self.deck.material(name).name.upper(), each.most) for name, each in self.ensembles.items())
+        limits = tuple(
+            (self.deck.material(name).name.upper(), ensemble.most) for name, ensemble in self.ensembles.items()
+        )
         width = len(str(self.settings.draws))
         return [
             ModelRun(
@@ -183,9 +185,9 @@ def prepare_ensemble(
         solver.check_installed()
     _extra_files(deck, settings, beside)
     quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
-    found = {name: deck.material(name) for name in settings.materials}
-    if len(set(found.values())) < len(found):
-        raise InputError(f"--material names one material of the model twice: {', '.join(found)}.")
+    replaced = {name: deck.material(name) for name in settings.materials}
+    if len(set(replaced.values())) < len(replaced):
+        raise InputError(f"--material names one material of the model twice: {', '.join(replaced)}.")
     formatting = card_format(settings.card_format or solver.card_format or deck.format.card_format)
     runs = list(dict.fromkeys(settings.materials.values()))
     ensembles: dict[str, Ensemble] = {}
@@ -202,7 +204,7 @@ def prepare_ensemble(
         cards[MATERIAL_ONLY] = {}
     for name, ensemble in ensembles.items():
         step(f"cards of {name}")
-        number = found[name].number
+        number = replaced[name].number
         card_settings = settings.card_settings(number=int(number) if number.isdigit() else 1)
         cards[COMPLETE][name] = formatting.cards(ensemble, card_settings)
         if not cards[COMPLETE][name].blocks:
