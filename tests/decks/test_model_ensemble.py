@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tissuq.decks.model_ensemble import TIMES, on_common_times
+from tissuq.decks.model_ensemble import TIMES, ModelEnsemble, on_common_times
 
 
 def test_curves_with_the_same_times_stay_as_they_are():
@@ -26,3 +26,20 @@ def test_curves_with_other_times_are_interpolated_where_they_are():
     np.testing.assert_allclose(rows[1][times <= 0.5], 1 + 10 * times[times <= 0.5])
     assert np.isnan(rows[1][times > 0.5]).all()
     assert np.isfinite(rows[2]).all()
+
+
+def test_a_draw_that_fails_without_its_discrepancy_stays_in_the_band():
+    generator = np.random.default_rng(0)
+    alone = generator.normal(size=(50, 2))
+    complete = alone + generator.normal(size=(50, 2))
+    alone[:20, 1] = np.nan
+    families = {"complete": complete, "alone": alone}
+    table = ModelEnsemble({"force": np.array([0.5, 1.0])}, {"force": families}, None, (), (), 0.0).table("force")
+    assert table["draws"].tolist() == [50, 50]
+    assert table["shared_draws"].tolist() == [50, 30]
+    np.testing.assert_allclose(table["mean"], complete.mean(axis=0))
+    np.testing.assert_allclose(table["sd"], complete.std(axis=0, ddof=1))
+    rows = slice(20, None)
+    wanted = np.cov(complete[rows, 1], alone[rows, 1])[0, 1] / complete[rows, 1].var(ddof=1)
+    np.testing.assert_allclose(table["parameters"][1], wanted)
+    np.testing.assert_allclose(table["parameters"] + table["discrepancy"], 1)

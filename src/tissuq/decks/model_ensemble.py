@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tissuq.decks.model_run import ModelRun
 from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MAX_DRAWS_NAMED, MIN_DRAWS
-from tissuq.finite_elements.spread import PROBABILITY, band_probability, force_table
+from tissuq.finite_elements.spread import BAND, PROBABILITY, SHARES, band_probability, force_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,11 +80,20 @@ class ModelEnsemble:
         return MATERIAL_ONLY in next(iter(self.curves.values()))
 
     def table(self, quantity: str) -> pd.DataFrame:
-        """Return band and shares of the variance of a quantity at every time: see `spread.force_table`."""
-        families = self.curves[quantity]
+        """Return band and shares of the variance of a quantity at every time: see `spread.force_table`.
+
+        The band is that of all complete draws that got there; the shares are those of the draws (``shared_draws``) that
+        got there without their discrepancy, too.
+        """
+        times, families = self.times[quantity], self.curves[quantity]
         complete = families[COMPLETE]
-        alone = families.get(MATERIAL_ONLY, complete)
-        return force_table(self.times[quantity], complete, alone, None, 0.0, "time", "")
+        table = force_table(times, complete, complete, None, 0.0, "time", "")
+        if not self.is_shared:
+            return table
+        shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time", "")
+        names = [name for name in (*SHARES, "discrepancy_sd", *(f"alone_{part}" for part in BAND)) if name in shared]
+        errors = [f"{name}_error" for name in names if f"{name}_error" in shared]
+        return table.assign(**{name: shared[name] for name in (*names, *errors)}, shared_draws=shared["draws"])
 
     def last_values(self, quantity: str) -> FloatArray:
         """Return the last value (N,) of a quantity of every complete draw; not a number where it did not get there."""

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
+    "BAND",
     "PROBABILITY",
+    "SHARES",
     "Band",
     "Shares",
     "band_of",
