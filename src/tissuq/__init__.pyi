@@ -1,5 +1,6 @@
 """The public names, and the modules they are imported from when they are first used."""
 
+from tissuq import decks as decks
 from tissuq import finite_elements as finite_elements
 from tissuq.assessment import Assessment as Assessment, Average as Average, average as average, compare as compare
 from tissuq.emulation import Calibration as Calibration, Emulator as Emulator, UmbridgeForward as UmbridgeForward

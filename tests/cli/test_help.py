@@ -46,6 +46,7 @@ def test_help_is_shown_without_importing_a_heavy_library():
         "study",
         "export",
         "structure",
+        "ensemble",
     ],
 )
 def test_every_command_has_help(cli, name):

@@ -107,9 +107,11 @@ def test_the_volumetric_energy_that_is_stated_is_that_of_the_form(given, code, n
 def test_a_unit_scales_stresses_and_nothing_else(given, code):
     ensemble = given([("ogden-2", [0.9, 0.2, 3.0, -4.0])])
     for unit, factor in (("kPa", 1e3), ("Pa", 1e6)):
-        cards = card_format(code).cards(ensemble, CardSettings(unit=unit, bulk_modulus=700.0))
+        cards = card_format(code).cards(ensemble, CardSettings(unit=unit, bulk_modulus=700.0 * factor))
         assert relative_errors(ensemble, cards, code, factor).max() < 1e-8
-        assert READERS[code](cards.files["draw-1" + card_format(code).suffix]).bulk == pytest.approx(700, rel=1e-6)
+        assert READERS[code](cards.files["draw-1" + card_format(code).suffix]).bulk == pytest.approx(
+            700 * factor, rel=1e-6
+        )
         assert cards.index[0]["mu1"] == pytest.approx(0.9 * factor)
         assert cards.index[0]["alpha1"] == 3.0
         assert cards.index[0]["initial_shear_modulus"] == pytest.approx(1.1 * factor)
@@ -227,3 +229,26 @@ def test_an_unknown_format_is_refused_with_those_there_are():
 def test_the_modes_of_the_readers_are_those_of_the_index(auto):
     (row, *_) = card_format("abaqus").cards(auto, CardSettings()).index
     assert {name[len("error_") : -len("_max")] for name in row if name.endswith("_max")} == {*PATHS, "states"}
+
+
+def test_a_bulk_modulus_near_zero_is_refused_and_a_small_one_is_warned_of(given):
+    ensemble = given([("neo-hookean", [0.5])])  # an initial shear modulus of 1 MPa
+    for bulk in (1e-9, 0.1, 0.66):
+        with pytest.raises(tq.InputError, match=r"Poisson's ratio that is not positive.*give 20 MPa or more"):
+            card_format("febio").cards(ensemble, CardSettings(bulk_modulus=bulk))
+    cards = card_format("febio").cards(ensemble, CardSettings(bulk_modulus=0.7))
+    assert "down to 0.7 times the initial shear modulus" in cards.warnings[-1]
+    assert len(card_format("febio").cards(ensemble, CardSettings(bulk_modulus=20.0)).warnings) == 1
+
+
+def test_a_material_has_the_number_that_it_has_in_the_model(given):
+    ensemble, settings = given([("yeoh", [0.5, 0.1, 0.0])]), CardSettings(number=7)
+    texts = {code: next(iter(card_format(code).cards(ensemble, settings).files.values())) for code in CODES}
+    assert '<material id="7" name="TISSUE"' in texts["febio"]
+    assert "\nTB,HYPER,7,1," in texts["ansys"]
+    data = [line for line in texts["ls-dyna"].splitlines() if line[0] not in "$*"]
+    assert data[1][:20].strip() == "7"
+    for code, text in texts.items():
+        assert READERS[code](text).law, code
+    with pytest.raises(tq.InputError, match="1 or more, not 0"):
+        CardSettings(number=0)

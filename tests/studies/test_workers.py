@@ -8,9 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from threading import Timer
+from threading import Lock, Timer
 
 import pytest
 
@@ -127,3 +128,22 @@ def test_a_task_whose_line_is_damaged_is_carried_out_again(tmp_path):
         told = []
         assert run_tasks(tasks, carry_out, tmp_path, step=lambda *each: told.append(each)) == expected  # noqa: B023
         assert told == [("task 0", False), ("task 3", False), ("task 2", True)]
+
+
+@pytest.mark.parametrize(("limit", "together"), [(2, 2), (None, 4)])
+def test_no_more_tasks_are_at_work_than_the_limit(tmp_path, limit, together):
+    barrier, at_work, most = Lock(), [0], [0]
+
+    def carry_out(task):
+        with barrier:
+            at_work[0] += 1
+            most[0] = max(most[0], at_work[0])
+        time.sleep(0.2)
+        with barrier:
+            at_work[0] -= 1
+        return {"twice": 2 * task.number}
+
+    with ThreadPoolExecutor(4) as pool:
+        results = run_tasks([Number(n) for n in range(8)], carry_out, tmp_path, pool=pool, limit=limit)
+    assert [result["twice"] for result in results] == [2 * n for n in range(8)]
+    assert most[0] == together

@@ -13,6 +13,7 @@ import typer
 from tissuq.cli import (
     calibrate,
     catalogue,
+    ensemble,
     fit,
     inspect,
     project,
@@ -65,6 +66,7 @@ app.command("compare")(runs.compare)
 app.command("design", cls=Renamed)(runs.design)
 app.command("export", cls=Renamed)(runs.export)
 app.command("structure", cls=Renamed)(structure.structure)
+app.command("ensemble")(ensemble.ensemble)
 app.command("simulate", cls=Renamed, hidden=True, deprecated=True)(structure.structure)
 app.command("show")(runs.show)
 app.command("materials")(catalogue.materials)

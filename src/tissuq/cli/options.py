@@ -162,8 +162,10 @@ def not_converged(names: list[str]) -> None:
         raise typer.Exit(NOT_CONVERGED)
 
 
-def check_folder(folder: Path, settings: BaseModel) -> None:
+def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = frozenset()) -> None:
     """Refuse a folder that is not empty, unless it is that of the same campaign.
+
+    Settings that are ``free`` may be others than before.
 
     Raises
     ------
@@ -177,7 +179,8 @@ def check_folder(folder: Path, settings: BaseModel) -> None:
         return
     if not recipe.exists():
         raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
-    if recipe.read_text(encoding="utf-8") != _recipe(settings):
+    stored, wanted = recipe.read_text(encoding="utf-8"), _recipe(settings)
+    if stored != wanted and not (free and _without(stored, free) == _without(wanted, free)):
         raise InputError(f"'{folder}' holds a campaign with other settings; choose another folder with --out.")
 
 
@@ -193,6 +196,16 @@ def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
 
 def _unfinished(recipe: Path) -> str:
     return f"{recipe.name}.new"
+
+
+def _without(recipe: str, names: frozenset[str]) -> dict[str, Any] | None:
+    """Return the settings of a recipe without some of them, None where it is damaged."""
+    import tomllib
+
+    try:
+        return {name: value for name, value in tomllib.loads(recipe).items() if name not in names}
+    except tomllib.TOMLDecodeError:
+        return None
 
 
 def _recipe(settings: BaseModel) -> str:

@@ -213,6 +213,7 @@ def export(
     ] = None,
     poisson: Annotated[float | None, typer.Option(help="Instead: Poisson's ratio of all draws.")] = None,
     name: Annotated[str, typer.Option(help="Name of the material in the cards.")] = "TISSUE",
+    number: Annotated[int, typer.Option(help="Number of the material in the model (FEBio, LS-DYNA, ANSYS).")] = 1,
     material: RunMaterial = None,
     seed: Annotated[int, typer.Option(help="Seed of the draws.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for the cards [cards/RUN-FORMAT].")] = None,
@@ -231,6 +232,7 @@ def export(
     check_target(target, force=force)
     settings: dict[str, Any] = {
         "law": law, "order": order, "unit": unit, "bulk_modulus": bulk_modulus, "poisson": poisson, "name": name,
+        "number": number,
     }  # fmt: skip
     CardSettings(**settings)
     posterior = load(run, discrepancy, own_law(material))

@@ -17,6 +17,7 @@ from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.registry import find, variants
 
 __all__ = [
+    "NEARLY",
     "CardFormat",
     "CardSettings",
     "Cards",
@@ -46,6 +47,9 @@ UNITS = {
 DEFAULT_BULK_TO_SHEAR = 1000.0
 """Default bulk modulus over the mean initial shear modulus: near 0.4995 for Poisson's ratio."""
 
+NEARLY = 20.0
+"""Bulk modulus over the initial shear modulus below which the volume changes notably: Poisson's ratio of 0.475."""
+
 
 @dataclass(frozen=True)
 class CardSettings:
@@ -67,6 +71,8 @@ class CardSettings:
         Poisson's ratio at the reference, in place of a common bulk modulus: each draw then has its own bulk modulus.
     name : str
         Name of the material, the same in all cards so that they can be exchanged.
+    number : int
+        Number of the material in the model, for codes that ask for one (FEBio, LS-DYNA, ANSYS).
     source : str
         Origin of the draws, for the comments.
 
@@ -82,6 +88,7 @@ class CardSettings:
     bulk_modulus: float | None = None
     poisson: float | None = None
     name: str = "TISSUE"
+    number: int = 1
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -95,6 +102,8 @@ class CardSettings:
             raise InputError(f"Poisson's ratio must lie between 0 and 0.5, not at {self.poisson:g}.")
         if self.order is not None and self.law is None:
             raise InputError("the order belongs to a law: give the law as well, such as polynomial or ogden.")
+        if self.number < 1:
+            raise InputError(f"the number of a material in a model is 1 or more, not {self.number}.")
         if not (self.name.isascii() and self.name.replace("_", "").replace("-", "").isalnum() and len(self.name) <= 40):
             raise InputError(f"'{self.name}' cannot name a material: use up to 40 letters, digits, _ and -.")
 
@@ -114,7 +123,8 @@ class CardSettings:
         Raises
         ------
         InputError
-            When Poisson's ratio gives none, because the shear modulus is not positive.
+            When Poisson's ratio gives none, because the shear modulus is not positive; or when the bulk modulus is so
+            small that Poisson's ratio would be negative.
         """
         if self.poisson is not None and not modulus > 0:
             raise InputError(
@@ -123,7 +133,14 @@ class CardSettings:
             )
         if self.poisson is not None:
             return 2 * modulus * (1 + self.poisson) / (3 * (1 - 2 * self.poisson))
-        return self.bulk_modulus if self.bulk_modulus is not None else DEFAULT_BULK_TO_SHEAR * mean
+        bulk = self.bulk_modulus if self.bulk_modulus is not None else DEFAULT_BULK_TO_SHEAR * mean
+        if 3 * bulk <= 2 * modulus:
+            raise InputError(
+                f"a bulk modulus of {bulk:g} {self.unit} gives a draw with an initial shear modulus of {modulus:.3g} "
+                f"{self.unit} a Poisson's ratio that is not positive, and the measurements are taken as those of an "
+                f"incompressible material: give {NEARLY * modulus:.2g} {self.unit} or more, or none (--bulk-modulus)."
+            )
+        return bulk
 
 
 @dataclass(frozen=True)
@@ -138,11 +155,14 @@ class Cards:
         A row for each draw, in the order of the files: parameters, constants, and how far its card is from the draw.
     warnings : tuple of str
         Sentences that the user must read: the law of the cards, its errors, and cards that are not stable.
+    blocks : tuple of str
+        The material of each draw alone, without comments and what makes a file of it; none of tables.
     """
 
     files: Mapping[str, str]
     index: tuple[Mapping[str, Any], ...]
     warnings: tuple[str, ...]
+    blocks: tuple[str, ...] = ()
 
 
 class CardFormat(ABC):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.export.cards import (
+    NEARLY,
     CardFormat,
     Cards,
     CardSettings,
@@ -49,6 +50,8 @@ class Card:
         Initial shear and bulk modulus.
     name : str
         Name of the material.
+    number : int
+        Its number in the model.
     water_density : float
         The density of water, for codes that need a density.
     """
@@ -58,6 +61,7 @@ class Card:
     shear: float
     bulk: float
     name: str
+    number: int
     water_density: float
 
     @property
@@ -101,7 +105,7 @@ class FECode(CardFormat):
 
     @abstractmethod
     def text(self, card: Card) -> str:
-        """Return the lines of a card, without comments."""
+        """Return the lines of a material, without comments."""
 
     def check(self, card: Card) -> None:
         """Refuse a card that the code would not read as it is meant."""
@@ -119,12 +123,17 @@ class FECode(CardFormat):
             )
         values = judged.law.scaled(settings.factor).values
         common = [*ensemble_lines(ensemble, settings), *self._law_lines(judged, settings)]
-        files, index = {}, []
+        files, index, blocks, bulks = {}, [], [], []
         for draw_index, modulus in enumerate(shear):
             constants = judged.form.constants(judged.law.material, values[draw_index])
             bulk = settings.bulk(float(modulus), float(shear.mean()))
-            card = Card(judged.form, constants, float(modulus), bulk, settings.name, settings.system.water_density)
+            card = Card(
+                judged.form, constants, float(modulus), bulk, settings.name, settings.number,
+                settings.system.water_density,
+            )  # fmt: skip
             self.check(card)
+            bulks.append(bulk)
+            blocks.append(self.text(card))
             errors = {name: error[draw_index] for name, error in judged.errors.items()}
             draw = ensemble[draw_index]
             row = {"file": file_name(ensemble, draw_index, self.suffix), **draw_row(draw, settings, card.shear)}
@@ -132,9 +141,10 @@ class FECode(CardFormat):
             row |= _errors(errors) | {"card_is_stable": bool(judged.stable[draw_index])}
             lines = [f"draw {draw_index + 1} of {len(ensemble)}: {words_of(draw, settings)}", *common]
             lines += self._error_lines(errors, judged.is_exact, bool(judged.stable[draw_index]))
-            files[str(row["file"])] = self.wrapped(self._commented(lines), self.text(card))
+            files[str(row["file"])] = self.wrapped(self._commented(lines), blocks[-1])
             index.append(row)
-        return Cards(files, tuple(index), tuple(self._warnings(judged)))
+        sentences = (*self._warnings(judged), *_softness(np.array(bulks) / shear))
+        return Cards(files, tuple(index), sentences, tuple(blocks))
 
     def form_of(self, law: Law) -> Form | None:
         """Return the first form that holds a law, if any."""
@@ -212,6 +222,15 @@ class FECode(CardFormat):
                 f"The cards of draws {numbers} are NOT stable over the whole calibrated range. Leave them out, or "
                 "choose another law with --law."
             )
+
+
+def _softness(bulk_to_shear: FloatArray) -> Iterator[str]:
+    """Return a sentence where the volume would change notably."""
+    if bulk_to_shear.min() < NEARLY:
+        yield (
+            f"The bulk modulus is down to {bulk_to_shear.min():.3g} times the initial shear modulus: the volume "
+            "changes, while the measurements were understood as those of an incompressible material."
+        )
 
 
 def _prefixed(constants: Mapping[str, float]) -> dict[str, float]:

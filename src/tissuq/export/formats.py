@@ -160,7 +160,7 @@ class Ansys(FECode):
         numbers = [*card.constants.values(), 2 / card.bulk]
         if count.endswith("terms"):
             numbers += [0.0] * (int(points) - 1)
-        lines = [f"! material {card.name}; MATID 1: change it to that of the model", f"TB,HYPER,1,1,{points},{option}"]
+        lines = [f"! material {card.name}, MATID {card.number}", f"TB,HYPER,{card.number},1,{points},{option}"]
         for start in range(0, len(numbers), ANSYS_LINE):
             words = ",".join(f"{number:.10e}" for number in numbers[start : start + ANSYS_LINE])
             lines.append(f"TBDATA,{start + 1},{words}")
@@ -229,7 +229,7 @@ class FEBio(FECode):
     projections = MixtureFit(FEBIO_TERMS), OgdenFit(FEBIO_TERMS), ReducedFit(reduced_terms(FEBIO_TERMS))
 
     def text(self, card: Card) -> str:
-        head = f'    <material id="1" name={quoteattr(card.name)} type="{card.form.keyword}">'
+        head = f'    <material id="{card.number}" name={quoteattr(card.name)} type="{card.form.keyword}">'
         lines = [head, _element("density", card.water_density)]
         if isinstance(card.form, Mixture):
             lines.append(_element("k", card.bulk))
@@ -280,15 +280,18 @@ class LSDyna(FECode):
     def text(self, card: Card) -> str:
         constants: list[tuple[str, Any]] = list(card.constants.items())
         rows: list[list[tuple[str, Any]]] = [
-            [("mid", "1"), ("ro", card.water_density), ("pr", card.poisson), ("n", "0"), ("nv", "0")]
+            [("mid", str(card.number)), ("ro", card.water_density), ("pr", card.poisson), ("n", "0"), ("nv", "0")]
         ]
         if card.form.keyword == "MAT_077_O":
             rows += [constants[0::2], constants[1::2]]
             rows[1:] = [row + [("", 0.0)] * (LS_DYNA_OGDEN_TERMS - len(row)) for row in rows[1:]]
         else:
             rows.append(constants)
-        lines = ["*KEYWORD", f"{LS_DYNA_KEYWORDS[card.form.keyword]} +", card.name]
+        lines = [f"{LS_DYNA_KEYWORDS[card.form.keyword]} +", card.name]
         for row in rows:
             lines.append("$#" + "".join(f"{name:>20}" for name, _ in row)[2:])
             lines.append("".join(f"{value if isinstance(value, str) else f'{value:.12e}':>20}" for _, value in row))
-        return "\n".join([*lines, "*END", ""])
+        return "\n".join([*lines, ""])
+
+    def wrapped(self, heading: str, text: str) -> str:
+        return f"{heading}*KEYWORD\n{text}*END\n"

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
+    "BAND",
     "PROBABILITY",
+    "SHARES",
     "Band",
     "Shares",
     "band_of",
@@ -132,6 +134,7 @@ def force_table(
     without: FloatArray | None,
     noise_sd: float,
     travel_name: str = "travel",
+    unit: str = "mm",
 ) -> pd.DataFrame:
     """Return band and shares of the variance at every step, each with its standard error (``_error``).
 
@@ -145,6 +148,8 @@ def force_table(
     noise_sd : float
         Standard deviation of a new measurement of the force, N.
     travel_name : str
+    unit : str
+        Of the travel; empty where it has none.
 
     Returns
     -------
@@ -157,7 +162,7 @@ def force_table(
 
     rows = []
     for step, travel_at_step in enumerate(travel):
-        row: dict[str, Any] = {f"{travel_name}_mm": float(travel_at_step)}
+        row: dict[str, Any] = {f"{travel_name}_{unit}" if unit else travel_name: float(travel_at_step)}
         is_reached = np.isfinite(complete[:, step]) & np.isfinite(material_only[:, step])
         row["draws"] = int(is_reached.sum())
         if row["draws"] > 1:

@@ -7,9 +7,18 @@ import logging
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    as_completed,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -18,7 +27,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 
 from tissuq.errors import InputError
 
-__all__ = ["RESULTS", "Step", "WorkerProcesses", "open_pool", "run_tasks", "silent"]
+__all__ = ["RESULTS", "Step", "WorkerProcesses", "open_pool", "read_results", "run_tasks", "silent"]
 
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
@@ -178,6 +187,7 @@ def run_tasks(
     folder: Path,
     *,
     pool: Executor | None = None,
+    limit: int | None = None,
     step: Step = silent,
 ) -> list[dict[str, Any]]:
     """Carry out what is not done yet, and return the results of all tasks, in their order.
@@ -194,16 +204,19 @@ def run_tasks(
         Exists; holds the results so far, if any.
     pool : Executor, optional
         From `tissuq.studies.stream.open_pool`.
+    limit : int, optional
+        Tasks that are carried out at the same time, where they may be fewer than the pool has workers.
     step : callable
         Told of every task that is done: its label, and whether it was done now or before.
     """
     path = folder / RESULTS
-    done = _read(path)
+    done = read_results(path)
     for task in tasks:
         if task.key in done:
             step(task.label, False)
     with path.open("a", encoding="utf-8") as file:
-        for task, result in _carried_out([task for task in tasks if task.key not in done], carry_out, pool):
+        remaining = [task for task in tasks if task.key not in done]
+        for task, result in _carried_out(remaining, carry_out, pool, limit):
             done[task.key] = {"key": task.key, **result}
             file.write(json.dumps(done[task.key]) + "\n")
             file.flush()
@@ -216,8 +229,8 @@ def run_tasks(
     return results
 
 
-def _read(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the results on disk by their keys; a line that was cut short by a kill is taken off the file.
+def read_results(path: Path) -> dict[str, dict[str, Any]]:
+    """Return the results in a file by their keys; a line that was cut short by a kill is taken off the file.
 
     A line that is damaged in another way is passed over, so that its task is carried out again.
     """
@@ -242,7 +255,7 @@ def _parsed(line: bytes) -> dict[str, Any] | None:
 
 
 def _carried_out(
-    tasks: Sequence[Kind], carry_out: Callable[[Kind], dict[str, Any]], pool: Executor | None
+    tasks: Sequence[Kind], carry_out: Callable[[Kind], dict[str, Any]], pool: Executor | None, limit: int | None
 ) -> Iterator[tuple[Kind, dict[str, Any]]]:
     """Yield tasks and their results as they come; processes that are killed are replaced."""
     if pool is None:
@@ -252,7 +265,7 @@ def _carried_out(
     losses = 0
     while remaining:
         try:
-            for task, result in _submitted(list(remaining.values()), carry_out, pool):
+            for task, result in _submitted(list(remaining.values()), carry_out, pool, limit):
                 losses = 0
                 del remaining[task.key]
                 yield task, result
@@ -267,13 +280,20 @@ def _carried_out(
 
 
 def _submitted(
-    tasks: Sequence[Kind], carry_out: Callable[[Kind], dict[str, Any]], pool: Executor
+    tasks: Sequence[Kind], carry_out: Callable[[Kind], dict[str, Any]], pool: Executor, limit: int | None
 ) -> Iterator[tuple[Kind, dict[str, Any]]]:
-    """Yield tasks and their results as they come from a pool."""
+    """Yield tasks and their results as they come from a pool, to which not more than the limit are given at a time."""
     futures: dict[Future[dict[str, Any]], Kind] = {}
+    waiting = iter(tasks)
     try:
-        futures |= {pool.submit(carry_out, task): task for task in tasks}
-        yield from ((futures[future], future.result()) for future in as_completed(futures))
+        futures |= {pool.submit(carry_out, task): task for task in islice(waiting, limit)}
+        if limit is None:
+            yield from ((futures[future], future.result()) for future in as_completed(futures))
+            return
+        while futures:
+            for future in wait(futures, return_when=FIRST_COMPLETED).done:
+                yield futures.pop(future), future.result()
+                futures |= {pool.submit(carry_out, task): task for task in islice(waiting, 1)}
     finally:
         for future in futures:
             future.cancel()

@@ -1,0 +1,30 @@
+"""The user's model in an input deck: its material replaced, the solver run, and what it gives read."""
+
+from tissuq.decks.abaqus import AbaqusDeck
+from tissuq.decks.ansys import AnsysDeck
+from tissuq.decks.deck import Deck, DeckFormat, DeckMaterial, deck_formats
+from tissuq.decks.febio import FEBioDeck
+from tissuq.decks.ls_dyna import LSDynaDeck
+from tissuq.decks.model_ensemble import ModelEnsemble
+from tissuq.decks.quantity import FunctionQuantity, Quantity, parse_quantity
+from tissuq.decks.solver import CalculiXSolver, CommandSolver, FEBioSolver, Solver, solver_for
+
+__all__ = [
+    "AbaqusDeck",
+    "AnsysDeck",
+    "CalculiXSolver",
+    "CommandSolver",
+    "Deck",
+    "DeckFormat",
+    "DeckMaterial",
+    "FEBioDeck",
+    "FEBioSolver",
+    "FunctionQuantity",
+    "LSDynaDeck",
+    "ModelEnsemble",
+    "Quantity",
+    "Solver",
+    "deck_formats",
+    "parse_quantity",
+    "solver_for",
+]

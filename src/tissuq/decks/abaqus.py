@@ -1,0 +1,134 @@
+"""Decks of Abaqus and CalculiX: ``*MATERIAL`` blocks, included files, and sets of nodes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+
+__all__ = ["AbaqusDeck", "Keyword", "keywords_of"]
+
+ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
+"""Options of a material that a card replaces."""
+INDEPENDENT = {"DENSITY", "DAMPING", "EXPANSION", "CONDUCTIVITY", "SPECIFICHEAT", "PERMEABILITY", "POROUSBULKMODULI"}
+"""Options of a material that stay as they are."""
+DEPENDENT = {
+    "VISCOELASTIC", "PLASTIC", "MULLINSEFFECT", "CREEP", "HYSTERESIS", "CYCLICHARDENING", "RATEDEPENDENT",
+    "DEFORMATIONPLASTICITY", "NOCOMPRESSION", "NOTENSION", "LOWDENSITYFOAM", "DAMAGEINITIATION", "DAMAGEEVOLUTION",
+    "UNIAXIALTESTDATA", "BIAXIALTESTDATA", "PLANARTESTDATA", "VOLUMETRICTESTDATA", "SIMPLESHEARTESTDATA",
+}  # fmt: skip
+"""Options of a material that change its stress, or would be read together with another card."""
+
+
+@dataclass(frozen=True)
+class Keyword:
+    """A keyword line, its continuations included, and the end of the data below it (bytes)."""
+
+    name: str
+    parameters: dict[str, str]
+    start: int
+    data_start: int
+    end: int
+    data: tuple[str, ...]
+
+
+def keywords_of(content: bytes) -> Iterator[Keyword]:
+    """Return the keywords of a file; comments and blank lines below the data of one belong to none."""
+    heads: list[list[Line]] = []
+    bodies: list[list[Line]] = []
+    is_continued = False
+    for line in lines_of(content):
+        text = line.text.strip()
+        if text.startswith("**"):
+            continue
+        if is_continued:
+            heads[-1].append(line)
+        elif text.startswith("*"):
+            heads.append([line])
+            bodies.append([])
+        elif text and bodies:
+            bodies[-1].append(line)
+            continue
+        else:
+            continue
+        is_continued = text.endswith(",")
+    for head, body in zip(heads, bodies, strict=True):
+        name, *words = ",".join(line.text.strip().rstrip(",") for line in head).lstrip("*").split(",")
+        pairs = (word.partition("=") for word in words)
+        parameters = {_joined(key): value.strip().strip('"') for key, _, value in pairs if key.strip()}
+        end = body[-1].end if body else head[-1].end
+        data = tuple(line.text.strip() for line in body)
+        yield Keyword(_joined(name), parameters, head[0].start, head[-1].end, end, data)
+
+
+def _joined(word: str) -> str:
+    """Return a keyword as the programs compare it: without blanks, in capitals."""
+    return re.sub(r"\s", "", word).upper()
+
+
+class AbaqusDeck(DeckFormat):
+    """``*MATERIAL, NAME=...`` in any case: of its options those that say its elasticity are replaced.
+
+    The line with its name stays, and so do density, damping and the like.
+    """
+
+    name = "abaqus"
+    card_format = "abaqus"
+    suffixes = (".inp",)
+
+    def recognises(self, content: bytes) -> bool:
+        return bool(
+            re.search(rb"^\s*\*\s*(node|heading|material|include|part)\b", content, re.IGNORECASE | re.MULTILINE)
+        )
+
+    def includes(self, content: bytes) -> list[str]:
+        return [keyword.parameters.get("INPUT", "") for keyword in keywords_of(content) if keyword.name == "INCLUDE"]
+
+    def materials(self, content: bytes) -> list[DeckMaterial]:
+        keywords, materials = list(keywords_of(content)), []
+        for index, keyword in enumerate(keywords):
+            if keyword.name == "MATERIAL":
+                materials.append(_material(keyword, keywords[index + 1 :]))
+        return materials
+
+    def fragment(self, material: DeckMaterial, block: str) -> str:
+        return block.partition("\n")[2]
+
+
+def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:
+    spans, refused = [], ""
+    for option in following:
+        if option.name in ELASTICITY:
+            spans.append((option.start, option.end))
+        elif option.name in DEPENDENT:
+            refused = (
+                f"*{option.name} belongs to the elasticity that the deck has, and would be read with that of the "
+                "draws. Take it out of the deck, or give its effect to the material that is fitted."
+            )
+        elif option.name not in INDEPENDENT:
+            break
+    return DeckMaterial(head.parameters.get("NAME", ""), "", tuple(spans or [(head.end, head.end)]), refused=refused)
+
+
+def node_sets(files: Sequence[bytes]) -> dict[str, set[int]]:
+    """Return the sets of nodes that decks define, by their names in capitals."""
+    sets: dict[str, set[int]] = {}
+    for content in files:
+        for keyword in keywords_of(content):
+            name = keyword.parameters.get("NSET", "").upper()
+            if keyword.name not in ("NSET", "NODE") or not name:
+                continue
+            rows = [[word.strip() for word in row.split(",") if word.strip()] for row in keyword.data]
+            members = sets.setdefault(name, set())
+            if keyword.name == "NODE":
+                members |= {int(row[0]) for row in rows}
+            elif "GENERATE" in keyword.parameters:
+                for row in rows:
+                    first, last, *step = map(int, row)
+                    members |= set(range(first, last + 1, *step))
+            else:
+                for word in (word for row in rows for word in row):
+                    members |= {int(word)} if word.isdigit() else sets.get(word.upper(), set())
+    return sets

@@ -1,0 +1,96 @@
+"""Decks of ANSYS (APDL text and .cdb files): ``TB`` and ``MP`` commands by the number of a material."""
+
+from __future__ import annotations
+
+import re
+
+from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+
+__all__ = ["AnsysDeck"]
+
+ELASTIC_TABLES = {"HYPE", "ELAS", "ANEL", "AHYP"}
+"""Tables (TB) that a card replaces, by the four letters that the program reads."""
+OTHER_TABLES = {"DENS", "CTE", "THER", "SPEC", "SDAM"}
+"""Tables that stay; any other changes the stress."""
+ELASTIC_CONSTANTS = {"EX", "EY", "EZ", "NUXY", "NUYZ", "NUXZ", "PRXY", "PRYZ", "PRXZ", "GXY", "GYZ", "GXZ"}
+DATA = ("TBDATA", "TBDAT", "TBPT", "TBTEMP", "TBTEM", "TBEO", "TBFIELD")
+
+
+class AnsysDeck(DeckFormat):
+    """``TB,HYPER``, ``TB,ELASTIC`` and ``MP,EX`` with their like of one material number are replaced by a card.
+
+    Its density and other properties stay.
+    """
+
+    name = "ansys"
+    card_format = "ansys"
+    suffixes = (".cdb", ".mac", ".ans", ".dat", ".txt", ".inp")
+
+    def recognises(self, content: bytes) -> bool:
+        return bool(re.search(rb"^\s*(/prep7|tb\s*,|mp\s*,|mpdata\s*,|et\s*,)", content, re.IGNORECASE | re.MULTILINE))
+
+    def includes(self, content: bytes) -> list[str]:
+        names = []
+        for _, words in _commands(content):
+            if words[0] == "/INPUT" and len(words) > 1 and words[1]:
+                name = words[1].strip("'")
+                names.append(f"{name}.{words[2]}" if len(words) > 2 and words[2] else name)
+        return names
+
+    def materials(self, content: bytes) -> list[DeckMaterial]:
+        spans: dict[str, list[tuple[int, int]]] = {}
+        refused: dict[str, str] = {}
+        in_table = ""
+        for line, words in _commands(content):
+            command = words[0]
+            if command == "TB":
+                table, number = _word(words, 1)[:4].upper(), _word(words, 2)
+                spans.setdefault(number, [])
+                in_table = number if table in ELASTIC_TABLES else ""
+                if not in_table and table not in OTHER_TABLES:
+                    refused[number] = (
+                        f"its table TB,{_word(words, 1)} would be read together with the card of a draw. Take it "
+                        "out of the deck."
+                    )
+            elif command == "MP" and _word(words, 1).upper() in ELASTIC_CONSTANTS:
+                in_table = ""
+                spans.setdefault(_word(words, 2), []).append((line.start, line.end))
+                continue
+            elif command == "MPDATA":
+                constant, number = _mpdata(words)
+                spans.setdefault(number, [])
+                if constant in ELASTIC_CONSTANTS:
+                    spans[number].append((line.start, line.end))
+                continue
+            elif command not in DATA:
+                in_table = ""
+            if in_table:
+                spans[in_table].append((line.start, line.end))
+        return [
+            DeckMaterial("", number, tuple(lines), (), refused.get(number, ""))
+            for number, lines in spans.items()
+            if lines
+        ]
+
+    def fragment(self, material: DeckMaterial, block: str) -> str:
+        return block
+
+
+def _commands(content: bytes) -> list[tuple[Line, list[str]]]:
+    """Return the lines with commands, and the words of each, the command in capitals; comments follow a ``!``."""
+    commands = []
+    for line in lines_of(content):
+        words = [word.strip() for word in line.text.partition("!")[0].split(",")]
+        if words[0]:
+            commands.append((line, [words[0].upper(), *words[1:]]))
+    return commands
+
+
+def _word(words: list[str], index: int) -> str:
+    return words[index] if len(words) > index else ""
+
+
+def _mpdata(words: list[str]) -> tuple[str, str]:
+    """Return the constant and the number of the material of ``MPDATA``, with or without the ``R5.0, 1`` of .cdb."""
+    start = 3 if _word(words, 1).upper().startswith("R") and "." in _word(words, 1) else 1
+    return _word(words, start).upper(), _word(words, start + 1)

@@ -1,0 +1,190 @@
+"""Result files of CalculiX: the tables of ``.dat``, and the mesh and the fields of ``.frd``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+
+__all__ = ["CELL_TYPES", "Frd", "Table", "read_dat", "read_frd"]
+
+FloatArray = NDArray[np.float64]
+
+TABLE = re.compile(
+    r"^\s*(?P<what>[a-z][a-z ]*?)\s*\((?P<columns>[^)]*)\) for set (?P<set>\S+) and time\s+(?P<time>\S+)"
+)
+CELL_TYPES = {
+    1: ("hexahedron", 8), 2: ("wedge", 6), 3: ("tetra", 4), 4: ("hexahedron20", 20), 5: ("wedge15", 15),
+    6: ("tetra10", 10), 7: ("triangle", 3), 8: ("triangle6", 6), 9: ("quad", 4), 10: ("quad8", 8), 11: ("line", 2),
+    12: ("line3", 3),
+}  # fmt: skip
+"""Names of cells in meshio and their numbers of nodes, by the types of ``.frd``."""
+ORDERS = {
+    4: [*range(12), *range(16, 20), *range(12, 16)],
+    5: [*range(9), *range(12, 15), *range(9, 12)],
+}
+"""Nodes of ``.frd`` in the order of VTK, where it is another: there the edges across stand last."""
+NUMBER = 12
+"""Columns of a number, and of what stands before the first."""
+LEADING = 13
+
+
+class Table(NamedTuple):
+    """A quantity of a set in ``.dat``: its times (t,), and the columns of the rows then, (t, rows, columns)."""
+
+    columns: tuple[str, ...]
+    times: FloatArray
+    values: FloatArray
+
+
+def read_dat(path: Path) -> dict[tuple[str, str], Table]:
+    """Return the tables of a file by what they hold and the set, both as in the file: ("total force", "TOP").
+
+    Numbers of nodes, elements and integration points are left out.
+    """
+    by_table: dict[tuple[str, str], tuple[tuple[str, ...], list[float], list[list[list[float]]]]] = {}
+    rows: list[list[float]] | None = None
+    skip = 0
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        head = TABLE.match(line)
+        if head is not None:
+            names = [name.strip() for name in head["columns"].split(",")]
+            skip = 0 if head["what"].startswith("total") else 1
+            if names[:2] == ["elem", "integ.pnt."]:
+                names, skip = names[2:], 2
+            _, times, tables = by_table.setdefault((head["what"], head["set"]), (tuple(names), [], []))
+            rows = []
+            times.append(float(head["time"]))
+            tables.append(rows)
+        elif rows is not None and line.strip():
+            try:
+                rows.append([float(word) for word in line.split()[skip:]])
+            except ValueError:
+                rows = None
+    return {key: Table(names, np.array(times), np.array(values)) for key, (names, times, values) in by_table.items()}
+
+
+@dataclass(frozen=True)
+class Frd:
+    """The content of a ``.frd`` file.
+
+    Attributes
+    ----------
+    nodes : (n,) int array
+        Numbers of the nodes.
+    points : (n, 3) array
+    cells : mapping of int to (int array, int array)
+        By the type of ``.frd``, places in ``nodes`` (c, k), in the order of VTK, and numbers of materials (c,).
+    materials : mapping of int to str
+        Names of the materials by their numbers.
+    fields : mapping of str to list of (time, {component: (n,) array})
+        By the name of the field, such as DISP, in the order of time.
+    """
+
+    nodes: NDArray[np.int64]
+    points: FloatArray
+    cells: Mapping[int, tuple[NDArray[np.int64], NDArray[np.int64]]]
+    materials: Mapping[int, str]
+    fields: Mapping[str, list[tuple[float, dict[str, FloatArray]]]]
+
+
+def read_frd(path: Path, last_time: float = np.inf) -> Frd:
+    """Return mesh and fields of a file in text form, up to a time.
+
+    Raises
+    ------
+    InputError
+        When the file is binary or is damaged.
+    """
+    lines = path.read_bytes().splitlines()
+    try:
+        return _read(lines, last_time)
+    except (ValueError, LookupError) as error:
+        raise InputError(
+            f"'{path.name}' cannot be read: it must be text (*NODE FILE and *EL FILE, not *NODE OUTPUT), and whole."
+        ) from error
+
+
+def _read(lines: list[bytes], last_time: float) -> Frd:
+    nodes, points = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    elements: dict[int, list[tuple[list[int], int]]] = {}
+    materials: dict[int, str] = {}
+    fields: dict[str, list[tuple[float, dict[str, FloatArray]]]] = {}
+    at = 0
+    while at < len(lines):
+        line = lines[at]
+        if line.startswith(b"    1UMAT"):
+            materials[int(line[9:14])] = line[14:].strip().decode("utf-8", "replace")
+        elif line.startswith(b"    2C"):
+            count = int(line.split()[1])
+            nodes, points = _numbers(lines[at + 1 : at + 1 + count], 3)
+            at += count
+        elif line.startswith(b"    3C"):
+            at = _read_elements(lines, at + 1, int(line.split()[1]), elements)
+        elif line.startswith(b"  100C"):
+            at = _read_field(lines, at, last_time, nodes, fields)
+        at += 1
+    row_of = {int(node): index for index, node in enumerate(nodes)}
+    cells = {}
+    for kind, rows in elements.items():
+        corners = np.array([[row_of[node] for node in members] for members, _ in rows], dtype=np.int64)
+        cells[kind] = corners[:, ORDERS.get(kind, slice(None))], np.array([number for _, number in rows])
+    return Frd(nodes, points, cells, materials, fields)
+
+
+def _numbers(lines: list[bytes], count: int) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return the nodes and the numbers (n, count) of lines with fixed columns, of which as many as there are."""
+    width = LEADING + NUMBER * count
+    text = np.frombuffer(b"".join(line[:width].ljust(width) for line in lines), dtype="S1").reshape(-1, width)
+    nodes = np.ascontiguousarray(text[:, 3:LEADING]).view(f"S{LEADING - 3}").astype(np.int64).ravel()
+    values = np.ascontiguousarray(text[:, LEADING:]).view(f"S{NUMBER}").astype(np.float64)
+    return nodes, values
+
+
+def _read_elements(lines: list[bytes], at: int, count: int, elements: dict[int, list[tuple[list[int], int]]]) -> int:
+    for _ in range(count):
+        kind, material = int(lines[at][13:18]), int(lines[at][23:28])
+        wanted, members = CELL_TYPES[kind][1], list[int]()
+        while len(members) < wanted:
+            at += 1
+            members += [int(lines[at][start : start + 10]) for start in range(3, len(lines[at].rstrip()), 10)]
+        elements.setdefault(kind, []).append((members, material))
+        at += 1
+    return at - 1
+
+
+def _read_field(
+    lines: list[bytes], at: int, last_time: float, nodes: NDArray[np.int64], fields: dict[str, list[Any]]
+) -> int:
+    """Read one field at one time; return where it ends. Components that are not stored (ALL) are passed over."""
+    time = float(lines[at][12:24])
+    at += 1
+    name = lines[at].split()[1].decode()
+    components = []
+    at += 1
+    while lines[at].startswith(b" -5"):
+        words = lines[at].split()
+        if words[1] != b"ALL":
+            components.append(words[1].decode())
+        at += 1
+    end = at
+    while not lines[end].startswith(b" -3"):
+        end += 1
+    if time <= last_time * (1 + 1e-5):
+        rows = [line for line in lines[at:end] if line.startswith(b" -1")]
+        numbers, values = _numbers(rows, min(len(components), 6))
+        if not np.array_equal(numbers, nodes):
+            order = {int(node): index for index, node in enumerate(numbers)}
+            whole = np.full((len(nodes), values.shape[1]), np.nan)
+            present = [index for index, node in enumerate(nodes) if int(node) in order]
+            whole[present] = values[[order[int(nodes[index])] for index in present]]
+            values = whole
+        fields.setdefault(name, []).append((time, dict(zip(components, values.T, strict=False))))
+    return end

@@ -1,0 +1,283 @@
+"""A deck with its included files as bytes: its materials found, replaced, and nothing else touched."""
+
+from __future__ import annotations
+
+import os
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import unified_diff
+from pathlib import Path, PurePosixPath
+from typing import ClassVar
+
+from tissuq.errors import InputError
+from tissuq.registry import find, variants
+
+__all__ = ["Deck", "DeckFormat", "DeckMaterial", "Line", "deck_formats", "decoded", "encoded", "lines_of"]
+
+CONTEXT = 3
+"""Lines around a difference that are shown."""
+HUNK = re.compile(r"( [-+])(\d+)")
+"""The number of a line where a difference starts."""
+
+
+def decoded(content: bytes) -> str:
+    """Return the text of a part of a deck; bytes that are no UTF-8 are kept for `encoded`."""
+    return content.decode("utf-8", "surrogateescape")
+
+
+def encoded(text: str) -> bytes:
+    """Return the bytes of a text of `decoded`."""
+    return text.encode("utf-8", "surrogateescape")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a file: where it starts and ends (bytes, its end of line included), and its text without that."""
+
+    start: int
+    end: int
+    text: str
+
+
+def lines_of(content: bytes) -> Iterator[Line]:
+    """Return the lines of a file."""
+    start = 0
+    for line in content.splitlines(keepends=True):
+        yield Line(start, start + len(line), decoded(line).rstrip("\r\n"))
+        start += len(line)
+
+
+@dataclass(frozen=True)
+class DeckMaterial:
+    """A material in a file of a deck.
+
+    Attributes
+    ----------
+    name, number : str
+        What it is called, and its number in the model; empty where the format has no such thing.
+    spans : tuple of (int, int)
+        The bytes that a card replaces: it stands in the place of the first, the others vanish.
+    remains : tuple of str
+        What the new text needs of the old one; every format has its meaning for them.
+    refused : str
+        What stands in the way of another card, in words.
+    """
+
+    name: str
+    number: str
+    spans: tuple[tuple[int, int], ...]
+    remains: tuple[str, ...] = ()
+    refused: str = ""
+
+    @property
+    def label(self) -> str:
+        """The name, else the number."""
+        return self.name or self.number
+
+
+class DeckFormat(ABC):
+    """The input of a finite-element program; a new one is one subclass in one file."""
+
+    entry_point_group: ClassVar[str] = "tissuq.deck_formats"
+    name: ClassVar[str]
+    card_format: ClassVar[str]
+    """The format of cards that goes into it."""
+    suffixes: ClassVar[tuple[str, ...]]
+
+    @abstractmethod
+    def recognises(self, content: bytes) -> bool:
+        """Return whether a file whose suffix several formats have is of this one."""
+
+    @abstractmethod
+    def includes(self, content: bytes) -> list[str]:
+        """Return the names of the files that a file includes, as they stand there."""
+
+    @abstractmethod
+    def materials(self, content: bytes) -> list[DeckMaterial]:
+        """Return the materials in a file."""
+
+    @abstractmethod
+    def fragment(self, material: DeckMaterial, block: str) -> str:
+        """Return the text that replaces a material, from the block of a card with its number."""
+
+    def matches(self, material: DeckMaterial, wanted: str) -> bool:
+        """Return whether a material is the one that is wanted: by its name, whatever its case, or its number."""
+        return wanted.strip().casefold() in (material.name.strip().casefold(), material.number.casefold())
+
+
+def deck_formats() -> dict[str, type[DeckFormat]]:
+    """Return the formats by name."""
+    return variants(DeckFormat)
+
+
+@dataclass(frozen=True, eq=False)
+class Deck:
+    """A deck and all the files that it includes.
+
+    Attributes
+    ----------
+    format : DeckFormat
+    main : str
+        The file that the program is given, relative to ``root`` as all are.
+    files : mapping of str to bytes
+    root : Path
+        The folder that holds all of them.
+    outside : tuple of str
+        Included files with absolute names, which stay where they are.
+    """
+
+    format: DeckFormat
+    main: str
+    files: Mapping[str, bytes]
+    root: Path
+    outside: tuple[str, ...] = ()
+
+    @classmethod
+    def read(cls, path: str | Path, format: str | None = None) -> Deck:
+        r"""Return the deck in a file.
+
+        Parameters
+        ----------
+        path : str or Path
+        format : str, optional
+            ``"abaqus"`` (CalculiX, too), ``"febio"``, ``"ls-dyna"`` or ``"ansys"``; unless given, what the file looks
+            like.
+
+        Raises
+        ------
+        InputError
+            When a file is missing, or is of no known format.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from tissuq.decks import Deck
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = Path(folder) / "bar.inp"
+        ...     _ = file.write_text("*MATERIAL, NAME=Fat\n*ELASTIC\n1., 0.3\n*STEP\n")
+        ...     deck = Deck.read(file)
+        >>> deck.format.name, [material.name for _, material in deck.materials()]
+        ('abaqus', ['Fat'])
+        """
+        main = Path(os.path.abspath(path))
+        content = _content(main, "model")
+        deck_format = (
+            find(DeckFormat, "format of decks", format, InputError)() if format else _recognised(main, content)
+        )
+        files, outside, waiting = {main: content}, [], [main]
+        while waiting:
+            file = waiting.pop()
+            for name in deck_format.includes(files[file]):
+                if os.path.isabs(name):
+                    outside.append(name)
+                    continue
+                beside = [Path(os.path.abspath(folder / name)) for folder in (main.parent, file.parent)]
+                included = next((candidate for candidate in beside if candidate.is_file()), beside[0])
+                if included not in files:
+                    files[included] = _content(included, f"file that '{file.name}' includes")
+                    waiting.append(included)
+        root = Path(os.path.commonpath([file.parent for file in files]))
+        relative = {file.relative_to(root).as_posix(): text for file, text in files.items()}
+        return cls(deck_format, main.relative_to(root).as_posix(), relative, root, tuple(outside))
+
+    @property
+    def job(self) -> str:
+        """The name of the main file without folder and suffix."""
+        return PurePosixPath(self.main).stem
+
+    def materials(self) -> list[tuple[str, DeckMaterial]]:
+        """Return the files with materials in them, each with its material."""
+        return [(file, material) for file, content in self.files.items() for material in self.format.materials(content)]
+
+    def material(self, wanted: str) -> DeckMaterial:
+        """Return the material of a name or number.
+
+        Raises
+        ------
+        InputError
+            When there is none, or more than one, or a card cannot replace it.
+        """
+        return self._placed(wanted)[1]
+
+    def with_materials(self, blocks: Mapping[str, str]) -> dict[str, bytes]:
+        """Return the files that change, where the blocks of cards replace the materials of these names or numbers.
+
+        Raises
+        ------
+        InputError
+            As `material`.
+        """
+        edits: dict[str, list[tuple[int, int, bytes]]] = {}
+        for wanted, block in blocks.items():
+            file, material = self._placed(wanted)
+            end_of_line = b"\r\n" if b"\r\n" in self.files[file] else b"\n"
+            text = encoded(self.format.fragment(material, block)).replace(b"\n", end_of_line)
+            first, *others = material.spans
+            edits.setdefault(file, []).append((*first, text))
+            edits[file] += [(*span, b"") for span in others]
+        return {file: _edited(self.files[file], sorted(parts)) for file, parts in edits.items()}
+
+    def diff(self, changed: Mapping[str, bytes]) -> str:
+        """Return the difference of the files that change, as ``diff -u`` shows it."""
+        lines: list[str] = []
+        for file, content in changed.items():
+            lines += _difference(
+                file, *([line.text for line in lines_of(text)] for text in (self.files[file], content))
+            )
+        return "\n".join(lines)
+
+    def _placed(self, wanted: str) -> tuple[str, DeckMaterial]:
+        matching = [(file, material) for file, material in self.materials() if self.format.matches(material, wanted)]
+        if len(matching) == 1:
+            if matching[0][1].refused:
+                raise InputError(f"material '{wanted}' in '{matching[0][0]}': {matching[0][1].refused}")
+            return matching[0]
+        if matching:
+            places = ", ".join(f"'{file}'" for file, _ in matching)
+            raise InputError(f"the model '{self.main}' has {len(matching)} materials '{wanted}' (in {places}).")
+        names = ", ".join(material.label for _, material in self.materials()) or "none that is known"
+        outside = f" Files with absolute names were not looked at: {', '.join(self.outside)}." if self.outside else ""
+        raise InputError(f"the model '{self.main}' has no material '{wanted}'; its materials are {names}.{outside}")
+
+
+def _content(file: Path, what: str) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise InputError(f"the {what} '{file}' cannot be read: {error.strerror}.") from error
+
+
+def _recognised(file: Path, content: bytes) -> DeckFormat:
+    kinds = [kind() for kind in deck_formats().values() if file.suffix.lower() in kind.suffixes]
+    if len(kinds) == 1:
+        return kinds[0]
+    for kind in kinds or [kind() for kind in deck_formats().values()]:
+        if kind.recognises(content):
+            return kind
+    raise InputError(f"'{file.name}' looks like no known deck: say which it is with --deck {'|'.join(deck_formats())}.")
+
+
+def _difference(file: str, before: list[str], after: list[str]) -> list[str]:
+    """Return the difference of the lines of a file, of which the equal ones at its start and end are not compared."""
+    pairs = enumerate(zip(before, after, strict=False))
+    equal = next((index for index, (old, new) in pairs if old != new), min(len(before), len(after)))
+    backwards = enumerate(zip(before[:equal:-1], after[:equal:-1], strict=False))
+    tail = next((index for index, (old, new) in backwards if old != new), min(len(before), len(after)) - equal)
+    start, end = max(0, equal - CONTEXT), max(0, tail - CONTEXT)
+    parts = before[start : len(before) - end], after[start : len(after) - end]
+    difference = unified_diff(*parts, f"{file} (the model)", f"{file} (a draw)", n=CONTEXT, lineterm="")
+    return [
+        HUNK.sub(lambda match: f"{match[1]}{int(match[2]) + start}", line) if line[:2] == "@@" else line
+        for line in difference
+    ]
+
+
+def _edited(content: bytes, edits: list[tuple[int, int, bytes]]) -> bytes:
+    parts, at = [], 0
+    for start, end, text in edits:
+        parts += [content[at:start], text]
+        at = end
+    return b"".join([*parts, content[at:]])

@@ -1,0 +1,99 @@
+"""Decks of FEBio: ``<material>`` elements, and files that sections come from."""
+
+from __future__ import annotations
+
+import re
+from xml.parsers.expat import ExpatError, ParserCreate
+
+from tissuq.decks.deck import DeckFormat, DeckMaterial, decoded
+from tissuq.errors import InputError
+
+__all__ = ["FEBioDeck"]
+
+TYPE = re.compile(r"""(\stype\s*=\s*)("[^"]*"|'[^']*')""")
+DENSITY = re.compile(r"<density\b[^>]*>[^<]*</density>")
+SHARED = "rigid body"
+
+
+class FEBioDeck(DeckFormat):
+    """``<material id= name= type=>`` below ``<Material>``: its type and what is in it are replaced.
+
+    Its id, its name and its density stay. FEBio wants the ids of materials in their order, from 1 on.
+    """
+
+    name = "febio"
+    card_format = "febio"
+    suffixes = (".feb",)
+
+    def recognises(self, content: bytes) -> bool:
+        return b"<febio_spec" in content[:2000]
+
+    def includes(self, content: bytes) -> list[str]:
+        parsed = _Parsed(content)
+        return parsed.includes
+
+    def materials(self, content: bytes) -> list[DeckMaterial]:
+        return _Parsed(content).materials
+
+    def fragment(self, material: DeckMaterial, block: str) -> str:
+        head, density = material.remains
+        kind = TYPE.search(block.partition(">")[0])
+        assert kind is not None  # noqa: S101 (the writer's)
+        start = TYPE.sub(lambda match: match[1] + kind[2], head, count=1)
+        lines = block.partition("\n")[2].rstrip().splitlines()
+        lines = [DENSITY.sub(lambda match: density, line) for line in lines]
+        return "\n".join([start, *(line for line in lines if line.strip())])
+
+
+class _Parsed:
+    """The materials of a file and where they stand, as the parser of XML tells."""
+
+    def __init__(self, content: bytes) -> None:
+        self.content = content
+        self.materials: list[DeckMaterial] = []
+        self.includes: list[str] = []
+        self._stack: list[str] = []
+        self._start = 0
+        self._attributes: dict[str, str] = {}
+        self._words = ""
+        self._parser = ParserCreate()
+        self._parser.StartElementHandler = self._open
+        self._parser.EndElementHandler = self._close
+        self._parser.CharacterDataHandler = self._read
+        try:
+            self._parser.Parse(content, True)
+        except ExpatError as error:
+            raise InputError(f"the FEBio deck is no XML: {error}.") from error
+
+    def _open(self, name: str, attributes: dict[str, str]) -> None:
+        if "from" in attributes:
+            self.includes.append(attributes["from"])
+        if name == "material" and self._stack[-1:] == ["Material"]:
+            self._start, self._attributes = self._parser.CurrentByteIndex, attributes
+        self._stack.append(name)
+        self._words = ""
+
+    def _read(self, words: str) -> None:
+        self._words += words
+
+    def _close(self, name: str) -> None:
+        self._stack.pop()
+        if name == "Include":
+            self.includes.append(self._words.strip())
+        if name == "material" and self._stack[-1:] == ["Material"]:
+            at = self._parser.CurrentByteIndex
+            end = self.content.index(b">", at) + 1  # of the closing tag, or of one that closes itself
+            text = decoded(self.content[self._start : end])
+            self.materials.append(_material(text, self._attributes, (self._start, end)))
+
+
+def _material(text: str, attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
+    head = text[: text.index(">") + 1]
+    if head.endswith("/>"):
+        head = head[:-2].rstrip() + ">"
+    density = DENSITY.search(text)
+    refused = "" if attributes.get("type") != SHARED else "it is a rigid body."
+    return DeckMaterial(
+        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, density[0] if density else ""),
+        refused,
+    )  # fmt: skip

@@ -1,0 +1,221 @@
+"""What the draws of posteriors give in the user's model: curves, bands, what failed, and warnings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.decks.model_run import ModelRun
+from tissuq.errors import ConvergenceError
+from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MAX_DRAWS_NAMED, MIN_DRAWS
+from tissuq.finite_elements.spread import BAND, PROBABILITY, SHARES, band_probability, force_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["FailedRun", "ModelEnsemble", "gathered", "on_common_times"]
+
+FloatArray = NDArray[np.float64]
+
+TIMES = 41
+"""Common times of curves whose solver chose its increments draw by draw."""
+SAME_TIME = 1e-5
+"""Relative difference of times that are the same in files with six digits."""
+MIN_SHARE_BEYOND = 0.02
+"""Mean share of elements beyond what was measured from which a warning is given."""
+
+
+@dataclass(frozen=True)
+class FailedRun:
+    """A run that did not end well: its family, its number, the last time that it reached, why, and the last lines."""
+
+    family: str
+    number: int
+    reached: float
+    problem: str
+    lines: tuple[str, ...]
+    folder: str
+
+
+@dataclass(frozen=True)
+class ModelEnsemble:
+    """Quantities of draws in the user's model.
+
+    Attributes
+    ----------
+    times : mapping of str to (s,) array
+        By quantity.
+    curves : mapping of str to mapping of str to (N, s) array
+        By quantity, and by family: ``complete``, and ``alone`` (the same draws without discrepancy) where there is one;
+        not a number where a draw did not get that far.
+    beyond : (times (s,), shares (N, s)) or None
+        Shares of the elements that are strained beyond what was measured.
+    failures : tuple of FailedRun
+    folders : tuple of str
+        Of the complete draws that ended well.
+    seconds : float
+        Of all runs of the solver, s.
+    """
+
+    times: Mapping[str, FloatArray]
+    curves: Mapping[str, Mapping[str, FloatArray]]
+    beyond: tuple[FloatArray, FloatArray] | None
+    failures: tuple[FailedRun, ...]
+    folders: tuple[str, ...]
+    seconds: float
+
+    @property
+    def draws(self) -> int:
+        """The number of draws."""
+        return len(next(iter(self.curves.values()))[COMPLETE])
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether the draws without their discrepancy are there, too."""
+        return MATERIAL_ONLY in next(iter(self.curves.values()))
+
+    def table(self, quantity: str) -> pd.DataFrame:
+        """Return band and shares of the variance of a quantity at every time: see `spread.force_table`.
+
+        The band is that of all complete draws that got there; the shares are those of the draws (``shared_draws``) that
+        got there without their discrepancy, too.
+        """
+        times, families = self.times[quantity], self.curves[quantity]
+        complete = families[COMPLETE]
+        table = force_table(times, complete, complete, None, 0.0, "time", "")
+        if not self.is_shared:
+            return table
+        shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time", "")
+        names = [name for name in (*SHARES, "discrepancy_sd", *(f"alone_{part}" for part in BAND)) if name in shared]
+        errors = [f"{name}_error" for name in names if f"{name}_error" in shared]
+        return table.assign(**{name: shared[name] for name in (*names, *errors)}, shared_draws=shared["draws"])
+
+    def last_values(self, quantity: str) -> FloatArray:
+        """Return the last value (N,) of a quantity of every complete draw; not a number where it did not get there."""
+        return self.curves[quantity][COMPLETE][:, -1]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the result."""
+        return [*_failed(self), *_beyond(self), *_too_few(self)]
+
+
+def gathered(tasks: Sequence[ModelRun], results: Sequence[Mapping[str, Any]]) -> ModelEnsemble:
+    """Return the ensemble of runs.
+
+    Raises
+    ------
+    ConvergenceError
+        When fewer than two draws give a quantity.
+    """
+    pairs = list(zip(tasks, results, strict=True))
+    families = {task.family: None for task in tasks}
+    by_family = {name: [result for task, result in pairs if task.family == name] for name in families}
+    times, curves = {}, {}
+    for name in (quantity.name for quantity in tasks[0].quantities):
+        pairs_of_draws = [result["curves"].get(name) for result in results]
+        _check_any(name, by_family[COMPLETE])
+        times[name], rows = on_common_times(pairs_of_draws)
+        members = [np.array([task.family == family for task in tasks]) for family in families]
+        curves[name] = {family: rows[is_member] for family, is_member in zip(families, members, strict=True)}
+    shares = [result["beyond"] for result in by_family[COMPLETE]]
+    return ModelEnsemble(
+        times,
+        curves,
+        on_common_times(shares) if any(shares) else None,
+        tuple(_failures(pairs)),
+        tuple(result["folder"] for result in by_family[COMPLETE] if not result["problem"]),
+        sum(float(result["seconds"]) for result in results),
+    )
+
+
+def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
+    """Return times (s,) and curves (N, s) on them, from pairs of times and values, None where a draw has none.
+
+    Where all have the times of the longest, or those up to where they stopped, these are the common ones; else curves
+    are interpolated linearly. Where a curve has stopped it is not a number.
+
+    Examples
+    --------
+    >>> from tissuq.decks.model_ensemble import on_common_times
+    >>> times, values = on_common_times([([0.5, 1.0], [2.0, 4.0]), ([0.5], [3.0]), None])
+    >>> times.tolist(), values.tolist()
+    ([0.5, 1.0], [[2.0, 4.0], [3.0, nan], [nan, nan]])
+    """
+    pairs = [None if curve is None else tuple(np.asarray(part, dtype=np.float64) for part in curve) for curve in curves]
+    present = [pair for pair in pairs if pair is not None and len(pair[0])]
+    longest = max((times for times, _ in present), key=lambda times: (times[-1], len(times)))
+    is_prefix = all(
+        len(times) <= len(longest) and np.allclose(times, longest[: len(times)], rtol=SAME_TIME) for times, _ in present
+    )
+    common = longest if is_prefix else np.linspace(max(times[0] for times, _ in present), longest[-1], TIMES)
+    rows = np.full((len(pairs), len(common)), np.nan)
+    for row, pair in zip(rows, pairs, strict=True):
+        if pair is not None and len(pair[0]) and is_prefix:
+            row[: len(pair[1])] = pair[1]
+        elif pair is not None and len(pair[0]):
+            row[:] = np.interp(common, pair[0], pair[1], right=np.nan)
+            row[-1] = pair[1][-1] if np.isclose(pair[0][-1], common[-1], rtol=SAME_TIME) else np.nan
+    return common, rows
+
+
+def _check_any(name: str, complete: Sequence[Mapping[str, Any]]) -> None:
+    if sum(bool(result["curves"].get(name, [[]])[0]) for result in complete) >= MIN_DRAWS:
+        return
+    reasons = [(result["problem"] or result["misread"], result["lines"]) for result in complete]
+    problem, lines = next((pair for pair in reasons if pair[0]), ("", []))
+    said = "".join(f"\n    {line}" for line in lines)
+    raise ConvergenceError(
+        f"of {len(complete)} draws, fewer than {MIN_DRAWS} give '{name}' ({problem or 'no results'})."
+        + (f" The solver's last lines:{said}" if said else "")
+    )
+
+
+def _failures(pairs: Iterable[tuple[ModelRun, Mapping[str, Any]]]) -> Iterable[FailedRun]:
+    for task, result in pairs:
+        problem = result["problem"] or result["misread"]
+        if problem:
+            ends = [times[-1] for times, _ in result["curves"].values() if times]
+            reached = max(ends, default=0.0)
+            yield FailedRun(task.family, task.number, reached, problem, tuple(result["lines"]), result["folder"])
+
+
+def _failed(ensemble: ModelEnsemble) -> list[str]:
+    """Return a sentence for each family of draws of which some failed."""
+    texts = []
+    for family, count in Counter(failure.family for failure in ensemble.failures).items():
+        failures = [failure for failure in ensemble.failures if failure.family == family]
+        named = ", ".join(str(failure.number + 1) for failure in failures[:MAX_DRAWS_NAMED])
+        more = f" and {count - MAX_DRAWS_NAMED} more" if count > MAX_DRAWS_NAMED else ""
+        texts.append(
+            f"{count} of {ensemble.draws} {FAMILIES[family]} failed ({named}{more}; first reason: "
+            f"{failures[0].problem}). failures.csv has all of them with the solver's last lines. Each time shows only "
+            "the draws that reached it, which may no longer be a fair sample."
+        )
+    return texts
+
+
+def _beyond(ensemble: ModelEnsemble) -> list[str]:
+    if ensemble.beyond is None:
+        return []
+    share = float(np.nanmean(ensemble.beyond[1][:, -1]))
+    if share < MIN_SHARE_BEYOND:
+        return []
+    return [
+        f"At the end {100 * share:.2g} % of the elements are strained beyond what was measured (I1 or I2). There a "
+        "card goes on as its form does, with an error that no number here holds: measure further, or load the model "
+        "less."
+    ]
+
+
+def _too_few(ensemble: ModelEnsemble) -> list[str]:
+    count = max(int(np.isfinite(ensemble.curves[name][COMPLETE]).sum(axis=0).max()) for name in ensemble.curves)
+    probability = band_probability(count)
+    if probability >= PROBABILITY:
+        return []
+    return [f"{count} draws are too few for a 95 % band: the band is their range, a {100 * probability:.0f} % band."]

@@ -1,0 +1,219 @@
+"""One draw in the user's model: a folder with its deck, the solver's run there, and what is read from it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path, PurePosixPath
+from tempfile import mkdtemp
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from tissuq.decks.abaqus import AbaqusDeck, node_sets
+from tissuq.decks.deck import Deck
+from tissuq.decks.fields import final_fields, share_beyond
+from tissuq.decks.quantity import Quantity, Results
+from tissuq.decks.solver import LOG, Solver
+from tissuq.errors import InputError
+
+__all__ = ["DONE", "FIELDS", "SCRATCH", "ModelRun", "carried_out"]
+
+DONE = "run.json"
+"""What is known of a run of the solver that has ended, in its folder."""
+FIELDS = "fields.npz"
+SCRATCH = ".running-"
+"""What names of folders begin with in which a solver is at work."""
+
+
+@dataclass(frozen=True)
+class ModelRun:
+    """A draw of each material in the user's model.
+
+    Attributes
+    ----------
+    family : str
+        Which kind of draws it belongs to.
+    number : int
+        From zero.
+    model : Path
+        The folder with the files of the model.
+    main, deck_format : str
+        The deck's file, relative to that folder, and its format.
+    blocks : tuple of (str, str)
+        The materials, and the blocks of cards that replace them.
+    solver : Solver
+    quantities : tuple of Quantity
+    limits : tuple of (str, (float, float))
+        The largest I1 - 3 and I2 - 3 that were measured, by materials in capitals.
+    folder : Path
+        Where the run is left.
+    timeout : float, optional
+        Seconds after which the solver is stopped.
+    retries : int
+        Times that a run which failed is made again.
+    keep : bool
+        Keep the files of the solver.
+    """
+
+    family: str
+    number: int
+    model: Path
+    main: str
+    deck_format: str
+    blocks: tuple[tuple[str, str], ...]
+    solver: Solver
+    quantities: tuple[Quantity, ...]
+    limits: tuple[tuple[str, tuple[float, float]], ...]
+    folder: Path
+    timeout: float | None = None
+    retries: int = 0
+    keep: bool = True
+
+    @property
+    def solver_key(self) -> str:
+        """A digest of all that the solver's run depends on."""
+        return _digest(self.main, self.blocks, self.solver.name, self.solver.words("job", "deck"))
+
+    @property
+    def key(self) -> str:
+        """A digest that identifies the task, whose result depends on the quantities, too."""
+        return _digest(self.solver_key, [(quantity.name, quantity.identity) for quantity in self.quantities])
+
+    @property
+    def label(self) -> str:
+        """The text shown when the task is done."""
+        return f"draw {self.number + 1}"
+
+    @property
+    def deck(self) -> Deck:
+        """The deck as it is in the folder of the model."""
+        return Deck.read(self.model / self.main, self.deck_format)
+
+
+def carried_out(task: ModelRun) -> dict[str, Any]:
+    """Run the solver for a task, unless that is done, and return what it gave, plain data.
+
+    The folder of the run stands when the solver has ended, and not before: what is killed leaves nothing that could be
+    taken for a result.
+    """
+    stored = _stored(task)
+    if stored is None:
+        stored = _solved(task)
+    deck = task.deck
+    job_folder = task.folder / PurePosixPath(task.main).parent
+    sets = node_sets(list(deck.files.values())) if isinstance(deck.format, AbaqusDeck) else {}
+    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets)
+    curves, misread = _curves(task, results)
+    beyond = None
+    if not misread and not stored["problem"]:
+        misread, beyond = _saved_fields(task, results)
+    if not task.keep:
+        _strip(task.folder)
+    return {**stored, "curves": curves, "misread": misread, "beyond": beyond, "folder": task.folder.name}
+
+
+def _digest(*parts: object) -> str:
+    return sha256(repr(parts).encode()).hexdigest()[:24]
+
+
+def _stored(task: ModelRun) -> dict[str, Any] | None:
+    """Return what is known of a run that has ended, and whose files are all there."""
+    try:
+        stored = json.loads((task.folder / DONE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    is_this = isinstance(stored, dict) and stored.get("solver_key") == task.solver_key
+    return stored if is_this and stored.get("is_whole") else None
+
+
+def _solved(task: ModelRun) -> dict[str, Any]:
+    start = perf_counter()
+    task.folder.parent.mkdir(parents=True, exist_ok=True)
+    for attempt in range(1, task.retries + 2):
+        scratch = Path(mkdtemp(prefix=f"{SCRATCH}{task.folder.name}-", dir=task.folder.parent))
+        scratch.chmod(0o755)
+        try:
+            _lay_out(task, scratch)
+            job_folder = scratch / PurePosixPath(task.main).parent
+            outcome = task.solver.run(job_folder, PurePosixPath(task.main).name, task.timeout)
+            if outcome.problem and attempt <= task.retries:
+                continue
+            last_time = task.solver.last_time(job_folder, PurePosixPath(task.main).stem)
+            stored = {
+                "solver_key": task.solver_key,
+                "is_whole": True,
+                "problem": outcome.problem,
+                "lines": list(outcome.lines),
+                "last_time": last_time if np.isfinite(last_time) else None,
+                "attempts": attempt,
+                "seconds": perf_counter() - start,
+            }
+            (scratch / DONE).write_text(json.dumps(stored), encoding="utf-8")
+            shutil.rmtree(task.folder, ignore_errors=True)
+            scratch.rename(task.folder)
+            return stored
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+    raise AssertionError("the last attempt returns")
+
+
+def _lay_out(task: ModelRun, folder: Path) -> None:
+    """Write the deck of a draw: changed files anew, and all others as links to those of the model."""
+    changed = task.deck.with_materials(dict(task.blocks))
+    for source in sorted(task.model.rglob("*")):
+        name = source.relative_to(task.model)
+        if source.is_dir():
+            continue
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        if name.as_posix() in changed:
+            (folder / name).write_bytes(changed[name.as_posix()])
+            continue
+        try:
+            (folder / name).symlink_to(os.path.relpath(source, (folder / name).parent))
+        except OSError:
+            shutil.copyfile(source, folder / name)
+
+
+def _curves(task: ModelRun, results: Results) -> tuple[dict[str, Any], str]:
+    """Return the quantities as plain data, and why one of a run that ended well could not be read."""
+    curves, misread = {}, ""
+    for quantity in task.quantities:
+        try:
+            curve = quantity.read(results)
+        except InputError as error:
+            misread = misread or str(error)
+            continue
+        curves[quantity.name] = [curve.times.tolist(), curve.values.tolist()]
+    return curves, misread
+
+
+def _saved_fields(task: ModelRun, results: Results) -> tuple[str, Any]:
+    """Write the fields of a run that ended well; return why it cannot, and the share of elements beyond the data."""
+    try:
+        frd = results.frd
+    except InputError as error:
+        return str(error), None
+    fields = final_fields(frd) if frd is not None else None
+    if frd is None or fields is None:
+        return "", None
+    fields.save(task.folder / FIELDS)
+    beyond = share_beyond(frd, dict(task.limits))
+    return "", None if beyond is None else [beyond.times.tolist(), beyond.values.tolist()]
+
+
+def _strip(folder: Path) -> None:
+    """Take off a run's folder what the solver left there."""
+    stored: Mapping[str, Any] = json.loads((folder / DONE).read_text(encoding="utf-8"))
+    (folder / DONE).write_text(json.dumps({**stored, "is_whole": False}), encoding="utf-8")
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path.is_dir() and not path.is_symlink():
+            if not any(path.iterdir()):
+                path.rmdir()
+        elif path.name not in (DONE, FIELDS, LOG):
+            path.unlink()

@@ -1,0 +1,133 @@
+"""Figures of an ensemble of a user's model (bands, last values, shares of the variance, states), and its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.decks.calculix_results import CELL_TYPES
+from tissuq.decks.fields import FinalFields
+from tissuq.decks.model_ensemble import ModelEnsemble
+from tissuq.finite_elements.spread import band_probability
+from tissuq.report.figures import BAND, BASE, INK, STYLE, TRUTH
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+__all__ = ["ensemble_figures", "write_fields"]
+
+FloatArray = NDArray[np.float64]
+
+SHARES = {"parameters": BAND, "discrepancy": TRUTH}
+
+
+def ensemble_figures(
+    ensemble: ModelEnsemble, fields: Sequence[FinalFields], limits: tuple[tuple[str, tuple[float, float]], ...]
+) -> dict[str, Figure]:
+    """Return the figures by name: one of every quantity, and that of the states where strains were written."""
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):
+        figures = {f"quantity-{name}": _quantity(ensemble, name) for name in ensemble.curves}
+        if fields and len(fields[0].invariants):
+            figures["states"] = _states(ensemble, fields, limits)
+    return figures
+
+
+def _quantity(ensemble: ModelEnsemble, name: str) -> Figure:
+    """Draw the band of a quantity over time, the last values, and the shares of the variance where there are any."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.6, 3.7))
+    has_shares = ensemble.is_shared and len(ensemble.times[name]) > 1
+    axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
+    table = ensemble.table(name)
+    table = table[table["draws"] > 1]
+    time, percent = table["time"], f"{100 * band_probability(int(table['draws'].max())):.0f} %"
+    marker = "o" if len(table) == 1 else ""
+    axes[0].fill_between(time, table["low"], table["high"], color=BAND, alpha=0.25, lw=0, label=percent)
+    axes[0].plot(time, table["mean"], color=BAND, lw=1.7, marker=marker, label="mean")
+    axes[0].set_xlabel("time")
+    axes[0].set_title(name)
+    axes[0].legend(fontsize=9)
+    last = ensemble.last_values(name)
+    axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
+    axes[1].set_title(f"{name} at the end")
+    axes[1].set_ylabel("draws")
+    if has_shares:
+        _draw_shares(axes[2], table)
+    return figure
+
+
+def _draw_shares(axis: object, table: pd.DataFrame) -> None:
+    from matplotlib.axes import Axes
+
+    assert isinstance(axis, Axes)  # noqa: S101 (of subplots)
+    axis.axhline(0, color=INK, lw=0.8)
+    for name, color in SHARES.items():
+        share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
+        axis.fill_between(table["time"], share - error, share + error, color=color, alpha=0.2, lw=0)
+        axis.plot(table["time"], share, color=color, lw=1.6, label=name)
+    axis.set_title("Share of the variance [%]")
+    axis.set_xlabel("time")
+    axis.legend(fontsize=9)
+
+
+def _states(
+    ensemble: ModelEnsemble, fields: Sequence[FinalFields], limits: tuple[tuple[str, tuple[float, float]], ...]
+) -> Figure:
+    """Draw the states of the elements at the end, draws together, and what was measured of draw material."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
+
+    figure = Figure(figsize=(9.6, 3.7))
+    axis, share_axis = figure.subplots(1, 2, width_ratios=(1.4, 1))
+    for index, (name, (max_1, max_2)) in enumerate(limits):
+        color = (BAND, TRUTH, BASE)[index % 3]
+        is_ours = fields[0].materials == name
+        states = np.concatenate([draw.invariants[is_ours] for draw in fields])
+        axis.plot(*states.T, ".", ms=2, color=color, alpha=0.3, label=name, rasterized=True)
+        axis.add_patch(Rectangle((0, 0), max_1, max_2, fill=False, ec=color, lw=1.5))
+    axis.set_xlabel("I1 - 3")
+    axis.set_ylabel("I2 - 3")
+    axis.set_title("Elements at the end; within the frame: measured")
+    axis.legend(fontsize=9, markerscale=5)
+    if ensemble.beyond is not None:
+        times, shares = ensemble.beyond
+        shown = np.isfinite(shares).any(axis=0)
+        share_axis.plot(times[shown], 100 * np.nanmean(shares[:, shown], axis=0), color=INK)
+        share_axis.set_title("Elements beyond it [%]")
+        share_axis.set_xlabel("time")
+        share_axis.set_ylim(0, 103)
+    return figure
+
+
+def write_fields(path: Path, fields: Sequence[FinalFields]) -> None:
+    """Write mean and standard deviation of displacement, von Mises stress and invariants over draws, for ParaView."""
+    import meshio
+
+    first = fields[0]
+    points = {"displacement": np.stack([draw.displacement for draw in fields])}
+    if len(first.von_mises):
+        points["von Mises stress"] = np.stack([draw.von_mises for draw in fields])
+    cells = {}
+    if len(first.invariants):
+        cells["I1 - 3"], cells["I2 - 3"] = (np.stack([draw.invariants[:, axis] for draw in fields]) for axis in (0, 1))
+    ends = np.cumsum([len(members) for members in first.cells.values()])[:-1]
+    blocks = [(CELL_TYPES[kind][0], members) for kind, members in first.cells.items()]
+    of_cells = {name: np.split(values, ends) for name, values in _moments(cells).items()}
+    meshio.Mesh(first.points, blocks, _moments(points), of_cells).write(path, file_format="vtu")
+
+
+def _moments(fields: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return mean and standard deviation over the first axis, by labels."""
+    moments = {}
+    for name, values in fields.items():
+        moments[f"mean {name}"] = values.mean(axis=0)
+        moments[f"sd of {name}"] = values.std(axis=0, ddof=1)
+    return moments

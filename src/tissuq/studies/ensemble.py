@@ -1,0 +1,346 @@
+"""The study of a user's own finite-element model with draws of the posteriors of one or several materials."""
+
+from __future__ import annotations
+
+import filecmp
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
+from tissuq.decks.model_ensemble import ModelEnsemble, gathered
+from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out
+from tissuq.errors import InputError
+from tissuq.export import Cards, CardSettings, card_format
+from tissuq.finite_elements.simulation import COMPLETE, MATERIAL_ONLY
+from tissuq.mechanics import Material
+from tissuq.mechanics.user_law import LAW
+from tissuq.parameters.seeds import MAX_SEED
+from tissuq.posterior.ensemble import Ensemble, Sampling
+from tissuq.studies.earlier_run import load
+from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
+
+__all__ = [
+    "DRAWS", "MODEL", "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "copy_model", "forget_failures",
+    "prepare_ensemble", "run_ensemble",
+]  # fmt: skip
+
+MODEL = "model"
+"""Folder with copies of the files of the model."""
+DRAWS = "draws"
+"""Folder with a folder for each run."""
+
+
+class EnsembleSettings(BaseModel):
+    """Everything that the results of an ensemble depend on.
+
+    ``materials`` has the folder of a run for each material of the model, ``quantities`` what each quantity is.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    model: str
+    materials: dict[str, str] = Field(min_length=1)
+    quantities: dict[str, str] = Field(min_length=1)
+    deck: str | None = None
+    solver: str | None = None
+    command: str = ""
+    card_format: str | None = None
+    discrepancy: str | None = None
+    law: str | None = None
+    order: int | None = None
+    unit: str = "MPa"
+    bulk_modulus: float | None = Field(None, gt=0, lt=inf)
+    poisson: float | None = None
+    draws: int = Field(64, ge=2)
+    sampling: Sampling = "sobol"
+    all_draws: bool = False
+    seed: int = Field(0, ge=0, le=MAX_SEED)
+    shares: bool = True
+    also: list[str] = Field(default_factory=list)
+
+    def card_settings(self, **changes: Any) -> CardSettings:
+        """Return the settings of the cards.
+
+        Raises
+        ------
+        InputError
+            When they have no meaning.
+        """
+        names = "law", "order", "unit", "bulk_modulus", "poisson"
+        return CardSettings(**{name: getattr(self, name) for name in names}, **changes)
+
+
+@dataclass(frozen=True)
+class PreparedEnsemble:
+    """All that is known before a solver runs.
+
+    Attributes
+    ----------
+    settings : EnsembleSettings
+    deck : Deck
+    solver : Solver
+    quantities : tuple of Quantity
+    ensembles : mapping of str to Ensemble
+        By material.
+    cards : mapping of str to mapping of str to Cards
+        By family, and by material.
+    """
+
+    settings: EnsembleSettings
+    deck: Deck
+    solver: Solver
+    quantities: tuple[Quantity, ...]
+    ensembles: Mapping[str, Ensemble]
+    cards: Mapping[str, Mapping[str, Cards]]
+
+    def blocks(self, family: str, number: int) -> dict[str, str]:
+        """Return the blocks of cards of a draw, by material."""
+        return {material: cards.blocks[number] for material, cards in self.cards[family].items()}
+
+    def diff(self, number: int = 0) -> str:
+        """Return the difference between the model and that of a draw."""
+        return self.deck.diff(self.deck.with_materials(self.blocks(COMPLETE, number)))
+
+    def tasks(
+        self, folder: Path, *, timeout: float | None = None, retries: int = 0, keep: bool = True
+    ) -> list[ModelRun]:
+        """Return the runs: the complete draws first."""
+        limits = tuple(
+            (self.deck.material(name).name.upper(), ensemble.most) for name, ensemble in self.ensembles.items()
+        )
+        width = len(str(self.settings.draws))
+        return [
+            ModelRun(
+                family, number, folder / MODEL, self.deck.main, self.deck.format.name,
+                tuple(self.blocks(family, number).items()), self.solver, self.quantities, limits,
+                folder / DRAWS / f"{family}-{number + 1:0{width}d}", timeout, retries, keep,
+            )
+            for family in self.cards
+            for number in range(self.settings.draws)
+        ]  # fmt: skip
+
+    @property
+    def card_warnings(self) -> list[str]:
+        """What is to be known of the cards, by material where there are several."""
+        prefix = "{}: " if len(self.ensembles) > 1 else ""
+        complete = self.cards[COMPLETE]
+        return [prefix.format(name) + text for name, cards in complete.items() for text in cards.warnings]
+
+
+@dataclass(frozen=True)
+class EnsembleStudy:
+    """Results of an ensemble."""
+
+    prepared: PreparedEnsemble
+    result: ModelEnsemble
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the result."""
+        unstable = [text for text in self.prepared.card_warnings if "NOT stable" in text or "volume changes" in text]
+        return [*self.result.warnings, *unstable]
+
+
+def prepare_ensemble(
+    settings: EnsembleSettings,
+    beside: Path = Path(),
+    law: Material | None = None,
+    step: Callable[[str], None] = lambda text: None,
+    *,
+    runs_here: bool = True,
+) -> PreparedEnsemble:
+    """Return deck, solver, quantities and cards of an ensemble; nothing is run.
+
+    Parameters
+    ----------
+    settings : EnsembleSettings
+    beside : Path
+        Where its files lie, unless their names are absolute.
+    law : Material, optional
+        The material of the runs, where it is a law in a file.
+    step : callable
+        Told what is being done.
+    runs_here : bool
+        Whether the solver is to be run by this machine.
+
+    Raises
+    ------
+    InputError, ModelError
+        When the model has no such material, the solver is not there, a quantity is not understood, or a run cannot be
+        used.
+    """
+    settings.card_settings()
+    deck = Deck.read(beside / settings.model, settings.deck)
+    solver = solver_for(deck.format.name, settings.solver, settings.command)
+    if runs_here:
+        solver.check_installed()
+    _extra_files(deck, settings, beside)
+    quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
+    replaced = {name: deck.material(name) for name in settings.materials}
+    if len(set(replaced.values())) < len(replaced):
+        raise InputError(f"--material names one material of the model twice: {', '.join(replaced)}.")
+    formatting = card_format(settings.card_format or solver.card_format or deck.format.card_format)
+    runs = list(dict.fromkeys(settings.materials.values()))
+    ensembles: dict[str, Ensemble] = {}
+    cards: dict[str, dict[str, Cards]] = {COMPLETE: {}}
+    for name, run in settings.materials.items():
+        step(f"draws of {name}")
+        posterior = load(beside / run, settings.discrepancy, law)
+        seed = settings.seed + runs.index(run)  # materials of different runs are independent
+        admissible = not settings.all_draws
+        ensembles[name] = posterior.ensemble(settings.draws, seed, settings.sampling, admissible=admissible)
+    all_draws = [draw for ensemble in ensembles.values() for draw in ensemble]
+    is_shared = settings.shares and any(draw.discrepancy or len(draw.parts) > 1 for draw in all_draws)
+    if is_shared:
+        cards[MATERIAL_ONLY] = {}
+    for name, ensemble in ensembles.items():
+        step(f"cards of {name}")
+        number = replaced[name].number
+        card_settings = settings.card_settings(number=int(number) if number.isdigit() else 1)
+        cards[COMPLETE][name] = formatting.cards(ensemble, card_settings)
+        if not cards[COMPLETE][name].blocks:
+            raise InputError(f"cards of the format '{settings.card_format}' do not go into a deck.")
+        if is_shared:
+            cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
+    _check_names(quantities, ensembles)
+    prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards)
+    for quantity in quantities:
+        quantity.check()
+    return prepared
+
+
+def run_ensemble(
+    prepared: PreparedEnsemble,
+    folder: Path,
+    *,
+    pool: Executor | None = None,
+    limit: int | None = None,
+    timeout: float | None = None,
+    retries: int = 0,
+    keep: bool = True,
+    progress: Callable[[int], AbstractContextManager[Step]] = lambda total: nullcontext(silent),
+) -> EnsembleStudy:
+    """Run the solver for every draw, those in ``folder`` not again, and gather what they give.
+
+    The first draw is run by itself: where a quantity is not in its results, no other has been run in vain.
+
+    Parameters
+    ----------
+    prepared : PreparedEnsemble
+    folder : Path
+        Holds the files of the model (`copy_model`), and the results so far, if any.
+    pool : Executor, optional
+        From `tissuq.studies.stream.open_pool`.
+    limit : int, optional
+        Runs at the same time.
+    timeout : float, optional
+        Seconds after which a run is stopped.
+    retries : int
+        Times that a run which failed is made again.
+    keep : bool
+        Keep the files of the solver.
+    progress : callable
+        Gives, for a number of tasks, a context with the function that is told of each.
+
+    Raises
+    ------
+    InputError, ConvergenceError
+        When a quantity cannot be read, or hardly any draw gets anywhere.
+    """
+    for unfinished in (folder / DRAWS).glob(f"{SCRATCH}*"):  # of a process that was killed
+        shutil.rmtree(unfinished, ignore_errors=True)
+    tasks = prepared.tasks(folder.absolute(), timeout=timeout, retries=retries, keep=keep)
+    unique = list({task.key: task for task in tasks}.values())
+    with progress(len(unique)) as step:
+        if unique[0].key not in read_results(folder / RESULTS):
+            run_tasks(unique[:1], carried_out, folder, pool=pool)
+        first = read_results(folder / RESULTS)[unique[0].key]
+        if first["misread"] and not first["problem"]:
+            raise InputError(first["misread"])
+        results = run_tasks(unique, carried_out, folder, pool=pool, limit=limit, step=step)
+    by_key = {result["key"]: result for result in results}
+    return EnsembleStudy(prepared, gathered(tasks, [by_key[task.key] for task in tasks]))
+
+
+def copy_model(prepared: PreparedEnsemble, beside: Path, folder: Path) -> None:
+    """Copy the files of the model into the folder of an ensemble, or see that they are those that lie there.
+
+    Raises
+    ------
+    InputError
+        When the folder holds another model.
+    """
+    deck, stored = prepared.deck, folder / MODEL
+    extra = _extra_files(deck, prepared.settings, beside)
+    if stored.is_dir():
+        stored_files = {name: (stored / name).read_bytes() for name in deck.files if (stored / name).is_file()}
+        if stored_files != deck.files or not all(
+            filecmp.cmp(stored / name, file, False) for name, file in extra.items()
+        ):
+            raise InputError(f"'{folder}' holds an ensemble of another model; choose another folder with --out.")
+        return
+    scratch = folder / f"{MODEL}.new"
+    shutil.rmtree(scratch, ignore_errors=True)
+    for name, content in deck.files.items():
+        (scratch / name).parent.mkdir(parents=True, exist_ok=True)
+        (scratch / name).write_bytes(content)
+    for name, file in extra.items():
+        shutil.copyfile(file, scratch / name)
+    scratch.rename(stored)
+
+
+def deck_folder(deck: Deck) -> str:
+    """Return the folder of the deck's main file within its root, with a slash at the end unless it is the root."""
+    return deck.main[: deck.main.rfind("/") + 1]
+
+
+def forget_failures(folder: Path) -> int:
+    """Take the results of runs that failed off the file of results, and their folders away; return how many."""
+    path = folder / RESULTS
+    results = read_results(path)
+    failed = {key for key, result in results.items() if result.get("problem") or result.get("misread")}
+    for key in failed:
+        shutil.rmtree(folder / DRAWS / str(results[key]["folder"]), ignore_errors=True)
+    if failed:
+        lines = (json.dumps(result) + "\n" for key, result in results.items() if key not in failed)
+        scratch = path.with_suffix(".new")
+        scratch.write_text("".join(lines), encoding="utf-8")
+        scratch.replace(path)
+    return len(failed)
+
+
+def _check_names(quantities: tuple[Quantity, ...], ensembles: Mapping[str, Ensemble]) -> None:
+    """Refuse quantities that are called as another column of the table of draws."""
+    symbols = [symbol for ensemble in ensembles.values() for symbol in ensemble[0].values]
+    for quantity in quantities:
+        if quantity.name in ("draw", "problem", *symbols):
+            raise InputError(f"a quantity cannot be called '{quantity.name}', as a column of the draws: rename it.")
+
+
+def _extra_files(deck: Deck, settings: EnsembleSettings, beside: Path) -> dict[str, Path]:
+    """Return the files that go with the deck, by their places in its folder."""
+    extra = {deck_folder(deck) + Path(name).name: beside / name for name in settings.also}
+    for name, file in extra.items():
+        if not file.is_file():
+            raise InputError(f"there is no file '{file}' to go with the model (--also).")
+        if name in deck.files:
+            raise InputError(f"'{file}' would take the place of a file of the model (--also).")
+    return extra
+
+
+def _quantity(name: str, text: str, beside: Path) -> Quantity:
+    quantity = parse_quantity(name, text)
+    if isinstance(quantity, FunctionQuantity):
+        match = LAW.fullmatch(quantity.location)
+        assert match is not None  # noqa: S101 (it is one)
+        return replace(quantity, location=f"{(beside / match['path']).absolute()}:{match['name']}")
+    return quantity

@@ -1,0 +1,188 @@
+"""The example decks, run by CalculiX with a draw: against FElupe on the same mesh, and against a closed form."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+import tissuq as tq
+from tissuq.decks import Deck, parse_quantity
+from tissuq.decks.abaqus import node_sets
+from tissuq.decks.calculix_results import read_frd
+from tissuq.decks.fields import element_invariants, final_fields, share_beyond
+from tissuq.decks.model_run import ModelRun, carried_out
+from tissuq.decks.solver import CalculiXSolver
+from tissuq.export import CardSettings, card_format
+from tissuq.finite_elements import FElupeMaterial
+
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+pytestmark = [
+    pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed: make system"),
+    pytest.mark.finite_elements,
+]
+
+BULK = 1.0
+LAWS = {"yeoh": [0.0005, 0.0004, 0.0002], "ogden-2": [0.0009, 0.0002, 3.0, -4.0]}
+"""MPa: soft, as the tissue of the decks."""
+
+
+@pytest.fixture(scope="module")
+def draws():
+    """The laws as draws, on a model of their range."""
+    from dataclasses import replace
+
+    from tissuq.mechanics import material_named
+
+    stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3]
+    data = tq.simulate("neo-hookean", {"C10": 0.0005}, stretch, noise_sd=2e-5, seed=1)
+    like = tq.fit(data, discrepancy="none", noise_sd=2e-5).ensemble(1)
+
+    def draw(law):
+        energy = tq.EnergyDraw(0, ((material_named(law), tuple(LAWS[law])),), None)
+        return replace(like, draws=(energy,))
+
+    return draw
+
+
+def run(ensemble, deck, material, quantities, folder):
+    cards = card_format("calculix").cards(ensemble, CardSettings(bulk_modulus=BULK))
+    task = ModelRun(
+        "complete", 0, EXAMPLES, deck, "abaqus", ((material, cards.blocks[0]),), CalculiXSolver(),
+        tuple(parse_quantity(name, text) for name, text in quantities.items()),
+        ((material.upper(), ensemble.most),), folder / "draw",
+    )  # fmt: skip
+    result = carried_out(task)
+    assert not result["problem"], result["lines"]
+    assert not result["misread"]
+    return result
+
+
+def mesh_of(deck):
+    """Return points, cells (hexahedra of 20 nodes) and sets of nodes of a deck, read here by themselves."""
+    text = "".join(content.decode() for content in Deck.read(EXAMPLES / deck).files.values())
+    nodes = re.search(r"\*NODE, NSET=ALL\n(.*?)(?=\n\*)", text, re.DOTALL)[1]
+    elements = re.search(r"\*ELEMENT, TYPE=C3D20R[^\n]*\n(.*?)(?=\n\*)", text, re.DOTALL)[1]
+    points = np.array([[float(word) for word in line.split(",")[1:]] for line in nodes.splitlines()])
+    numbers = np.array([int(word) for word in re.findall(r"\d+", elements)]).reshape(-1, 21)
+    sets = {
+        name: np.isin(np.arange(len(points)) + 1, sorted(each)) for name, each in node_sets([text.encode()]).items()
+    }
+    return points, numbers[:, 1:] - 1, sets
+
+
+def plate_in_felupe(draw):
+    """Return the force on the plate's upper edge, and the displacements, from FElupe with the same reduced elements."""
+    felupe = pytest.importorskip("felupe")
+    points, cells, sets = mesh_of("plate.inp")
+    mesh = felupe.Mesh(points, cells, "hexahedron20")
+    region = felupe.RegionQuadraticHexahedron(mesh, quadrature=felupe.GaussLegendre(order=1, dim=3))
+    field = felupe.FieldContainer([felupe.Field(region, dim=3)])
+    body = felupe.SolidBody(FElupeMaterial(draw, BULK, unit=1e-3), field)
+    fixed = {"LEFT": 0, "BOTTOM": 1, "BACK": 2, "TOP": 1}
+    bounds = {
+        name: felupe.Boundary(field[0], mask=sets[name], skip=[axis != own for axis in range(3)])
+        for name, own in fixed.items()
+    }
+    travel = np.linspace(0, 1.0, 6)[1:]
+    step = felupe.Step([body], ramp={bounds["TOP"]: travel}, boundaries=bounds)
+    felupe.CharacteristicCurve([step], boundary=bounds["TOP"]).evaluate(verbose=0, tol=1e-8)
+    force = felupe.tools.force(field, body.results.force, bounds["TOP"])
+    return 1e-3 * force[1], field
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_plate_has_the_force_and_the_states_that_felupe_finds_on_its_mesh(draws, tmp_path, law):
+    pytest.importorskip("felupe")
+    ensemble = draws(law)
+    result = run(
+        ensemble, "plate.inp", "tissue", {"force": "RF2@TOP", "down": "RF2@BOTTOM", "pull": "U2@TOP"}, tmp_path
+    )
+    times, force = result["curves"]["force"]
+    wanted, field = plate_in_felupe(ensemble[0])
+    assert times[-1] == 1.0
+    assert force[-1] == pytest.approx(wanted, rel=1e-4)
+    assert result["curves"]["down"][1][-1] == pytest.approx(-force[-1], rel=1e-4)
+    assert result["curves"]["pull"][1][-1] == pytest.approx(1.0)
+
+    frd = read_frd(tmp_path / "draw" / "plate.frd")
+    fields = final_fields(frd)
+    np.testing.assert_allclose(fields.displacement, field[0].values, atol=2e-5)
+    gradient = np.moveaxis(field.extract()[0], (0, 1), (-2, -1))
+    right = np.swapaxes(gradient, -1, -2) @ gradient
+    volume = np.linalg.det(gradient)
+    first = np.trace(right, axis1=-2, axis2=-1) * volume ** (-2 / 3) - 3
+    inverse = np.trace(np.linalg.inv(right), axis1=-2, axis2=-1) * volume ** (2 / 3) - 3
+    assert fields.materials.tolist() == ["TISSUE"] * 40
+    ours = fields.invariants.T
+    for found, theirs in zip(ours, (first, inverse), strict=True):  # nodes of an element against its points
+        assert np.corrcoef(found, theirs.mean(axis=0))[0, 1] > 0.99
+        np.testing.assert_allclose(found.mean(), theirs.mean(), rtol=0.05)
+    median = float(np.median(ours[0])), 1e9
+    shares = share_beyond(frd, {"TISSUE": median})
+    assert shares.values[-1] == pytest.approx(0.5)
+    assert shares.values[0] == 0
+    assert share_beyond(frd, {"FAT": median}) is None
+    assert element_invariants(frd, 0).shape == (40, 2)
+
+
+def test_the_tube_opens_as_the_closed_form_says(draws, tmp_path):
+    """A thick tube in plane strain: p is the integral of the difference of its principal stresses over ln r."""
+    inner, outer, pressure = 2.0, 3.0, 7e-5
+    ensemble = draws("yeoh")
+
+    def held(radius):
+        def integrand(reference):
+            r = np.sqrt(reference**2 + radius**2 - inner**2)
+            hoop = r / reference
+            slope = sum((n + 1) * value * (hoop**2 + hoop**-2 - 2) ** n for n, value in enumerate(LAWS["yeoh"]))
+            return 2 * slope * (hoop**2 - hoop**-2) * reference / r**2
+
+        return quad(integrand, inner, outer)[0]
+
+    wanted = brentq(lambda radius: held(radius) - pressure, inner, 2 * inner) - inner
+    result = run(ensemble, "tube.inp", "Wall", {"opening": "U1@INNER", "outer": "U1@OUTER"}, tmp_path)
+    assert result["curves"]["opening"][1][-1] == pytest.approx(wanted, rel=2e-3)
+    outside = np.sqrt(outer**2 + (inner + wanted) ** 2 - inner**2) - outer
+    assert result["curves"]["outer"][1][-1] == pytest.approx(outside, rel=2e-3)
+
+
+def test_from_data_to_the_band_of_a_force_with_the_fields(cli_in, tmp_path):
+    """The commands of docs/ensembles.md with few draws."""
+    shutil.copy(EXAMPLES / "plate.inp", tmp_path)
+    assert cli_in(tmp_path, "fit", "brain-cortex-uniaxial", "--no-figures", "--out", "runs/brain") == 0
+    options = [
+        "--material",
+        "TISSUE",
+        "--qoi",
+        "force=RF2@TOP",
+        "--qoi",
+        "peak=MISES:max",
+        "--draws",
+        3,
+        "--max-jobs",
+        2,
+    ]
+    assert cli_in(tmp_path, "ensemble", "runs/brain", "plate.inp", *options) == 0
+    folder = tmp_path / "runs" / "brain-plate"
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["quantities"]["force"]["parameters"] + summary["quantities"]["force"][
+        "discrepancy"
+    ] == pytest.approx(1)
+    assert 0 < summary["elements_beyond"] < 1
+    mesh = meshio.read(folder / "fields.vtu")
+    points, cells, sets = mesh_of("plate.inp")
+    np.testing.assert_allclose(mesh.points, points, atol=1e-5)
+    np.testing.assert_array_equal(mesh.cells_dict["hexahedron20"], cells)
+    np.testing.assert_allclose(mesh.point_data["mean displacement"][sets["TOP"], 1], 1.0)
+    np.testing.assert_allclose(mesh.point_data["sd of displacement"][sets["TOP"], 1], 0.0, atol=1e-12)
+    assert mesh.point_data["sd of displacement"].max() > 0
+    assert mesh.cell_data["mean I1 - 3"][0].shape == (40,)
+    assert (folder / "figures" / "states.png").stat().st_size > 1000

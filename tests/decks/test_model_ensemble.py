@@ -1,0 +1,45 @@
+"""Curves of draws on common times, whatever increments the solver chose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tissuq.decks.model_ensemble import TIMES, ModelEnsemble, on_common_times
+
+
+def test_curves_with_the_same_times_stay_as_they_are():
+    times, rows = on_common_times([([1, 2, 3], [1, 4, 9]), ([1, 2 * (1 + 1e-7), 3], [2, 3, 4])])
+    assert times.tolist() == [1, 2, 3]
+    np.testing.assert_array_equal(rows, [[1, 4, 9], [2, 3, 4]])
+
+
+def test_a_curve_that_stopped_is_not_a_number_from_there_on():
+    times, rows = on_common_times([([1, 2], [5, 6]), ([1, 2, 3], [1, 2, 3]), ([], []), None])
+    assert times.tolist() == [1, 2, 3]
+    np.testing.assert_array_equal(rows, [[5, 6, np.nan], [1, 2, 3], [np.nan] * 3, [np.nan] * 3])
+
+
+def test_curves_with_other_times_are_interpolated_where_they_are():
+    times, rows = on_common_times([([0.1, 0.4, 1.0], [1, 4, 10]), ([0.2, 0.5], [3, 6]), ([0.1, 1 + 1e-7], [0, 9])])
+    assert (len(times), times[0], times[-1]) == (TIMES, 0.2, 1 + 1e-7)
+    np.testing.assert_allclose(rows[0], 10 * times, rtol=1e-6)
+    np.testing.assert_allclose(rows[1][times <= 0.5], 1 + 10 * times[times <= 0.5])
+    assert np.isnan(rows[1][times > 0.5]).all()
+    assert np.isfinite(rows[2]).all()
+
+
+def test_a_draw_that_fails_without_its_discrepancy_stays_in_the_band():
+    generator = np.random.default_rng(0)
+    alone = generator.normal(size=(50, 2))
+    complete = alone + generator.normal(size=(50, 2))
+    alone[:20, 1] = np.nan
+    families = {"complete": complete, "alone": alone}
+    table = ModelEnsemble({"force": np.array([0.5, 1.0])}, {"force": families}, None, (), (), 0.0).table("force")
+    assert table["draws"].tolist() == [50, 50]
+    assert table["shared_draws"].tolist() == [50, 30]
+    np.testing.assert_allclose(table["mean"], complete.mean(axis=0))
+    np.testing.assert_allclose(table["sd"], complete.std(axis=0, ddof=1))
+    rows = slice(20, None)
+    wanted = np.cov(complete[rows, 1], alone[rows, 1])[0, 1] / complete[rows, 1].var(ddof=1)
+    np.testing.assert_allclose(table["parameters"][1], wanted)
+    np.testing.assert_allclose(table["parameters"] + table["discrepancy"], 1)

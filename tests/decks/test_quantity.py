@@ -1,0 +1,123 @@
+"""Quantities of interest: their texts, what they are of a set, and functions of the user's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tissuq.decks import parse_quantity
+from tissuq.decks.abaqus import node_sets
+from tissuq.decks.quantity import Results
+from tissuq.errors import InputError
+
+TABLES = """
+ displacements (vx,vy,vz) for set TOP and time  0.5000000E+00
+
+         3  3.0 4.0 0.0
+         4  1.0 0.0 0.0
+
+ forces (fx,fy,fz) for set TOP and time  0.5000000E+00
+
+         3  1.0 2.0 0.0
+         4  2.0 2.0 0.0
+
+ stresses (elem, integ.pnt.,sxx,syy,szz,sxy,sxz,syz) for set EALL and time  0.5000000E+00
+
+         1   1  10.0  0.0  0.0  0.0  0.0  2.0
+         1   2  0.0  0.0  0.0  0.0  5.0  0.0
+"""
+
+
+@pytest.fixture
+def results(tmp_path):
+    (tmp_path / "job.dat").write_text(TABLES)
+    return Results(tmp_path, "job")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("U1@TOP", 2.0),
+        ("u1@top:max", 3.0),
+        ("U@TOP:max", 5.0),
+        ("U@TOP", 3.0),
+        ("RF2@TOP", 4.0),
+        ("RF@TOP", 5.0),
+        ("RF1@TOP:min", 1.0),
+        ("S11@EALL:max", 10.0),
+        ("S13@EALL:max", 5.0),
+        ("S23@EALL", 1.0),
+        ("MISES@EALL:min", np.sqrt(3) * 5.0),
+        ("MISES@EALL:max", np.sqrt(100 + 3 * 4)),
+    ],
+)
+def test_a_quantity_of_a_set(results, text, value):
+    curve = parse_quantity("q", text).read(results)
+    assert curve.times.tolist() == [0.5]
+    assert curve.values.tolist() == pytest.approx([value], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("q", "RF4@TOP", "is not a quantity"),
+        ("q", "S14@TOP", "is not a quantity"),
+        ("q", "S@TOP", "is not a quantity"),
+        ("q", "MISES1@TOP", "is not a quantity"),
+        ("q", "T@TOP", "is not a quantity"),
+        ("q", "RF3@TOP:median", "is not a quantity"),
+        ("q q", "RF3@TOP", "cannot name"),
+    ],
+)
+def test_what_is_no_quantity_is_refused(name, text, words):
+    with pytest.raises(InputError, match=words):
+        parse_quantity(name, text)
+
+
+def test_what_the_deck_did_not_ask_for_is_told_with_what_to_write(results):
+    with pytest.raises(InputError, match=r"RF3@BASE:sum is not in the results.*\*NODE PRINT, NSET=BASE, TOTALS=ONLY"):
+        parse_quantity("q", "RF3@BASE").read(results)
+
+
+@pytest.mark.parametrize(
+    ("body", "times", "values"),
+    [
+        ("3", [1.0], [3.0]),
+        ("[0.0, 1.0], [2, 4]", [0.0, 1.0], [2.0, 4.0]),
+        ("(folder / 'job.dat').stat().st_size * 0 + 7", [1.0], [7.0]),
+    ],
+)
+def test_a_function_of_the_folder_gives_a_number_or_a_curve(results, tmp_path, body, times, values):
+    (tmp_path / "mine.py").write_text(f"def get(folder):\n    return {body}\n")
+    quantity = parse_quantity("q", f"{tmp_path}/mine.py:get")
+    quantity.check()
+    curve = quantity.read(results)
+    assert (curve.times.tolist(), curve.values.tolist()) == (times, values)
+    before = quantity.identity
+    (tmp_path / "mine.py").write_text("def get(folder):\n    return 5\n")
+    assert quantity.identity != before
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("1 / 0", "ZeroDivisionError"),
+        ("'a'", "ValueError"),
+        ("[1.0, 2.0], [1.0]", "of one length"),
+        ("float('nan')", "finite"),
+    ],
+)
+def test_a_function_that_fails_is_named(results, tmp_path, body, words):
+    (tmp_path / "mine.py").write_text(f"def get(folder):\n    return {body}\n")
+    with pytest.raises(InputError, match=words):
+        parse_quantity("q", f"{tmp_path}/mine.py:get").read(results)
+    with pytest.raises(InputError, match="no function named 'other'"):
+        parse_quantity("q", f"{tmp_path}/mine.py:other").check()
+    with pytest.raises(InputError, match="no file"):
+        parse_quantity("q", f"{tmp_path}/yours.py:get").check()
+
+
+def test_sets_of_nodes_are_those_of_the_manual():
+    deck = b"*NODE, NSET=All\n1, 0., 0., 0.\n2, 0., 0., 0.\n*NSET, NSET=Some\n1,\n*nset, nset=Row, generate\n2, 8, 3\n"
+    deck += b"*NSET, NSET=BOTH\nSome, 9\nrow\n"
+    assert node_sets([deck]) == {"ALL": {1, 2}, "SOME": {1}, "ROW": {2, 5, 8}, "BOTH": {1, 2, 5, 8, 9}}
