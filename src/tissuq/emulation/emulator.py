@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import product
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, leave_one_out, moments, trend_basis
+from tissuq.emulation.kriging import Kriging, fitted, leave_one_out, moments
+from tissuq.emulation.length_scales import Kernel, LengthScales, Mode, Trend, trend_basis
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError
 from tissuq.parameters.priors import Prior
@@ -53,6 +53,11 @@ class OutputBasis:
     def is_log(self) -> bool:
         """Whether it is one of logarithms."""
         return self.signs is not None
+
+    def truncated_to(self, is_kept: NDArray[np.bool_]) -> OutputBasis:
+        """Return the basis of some of its directions (q,); the others become part of the remainder."""
+        dropped = self.directions[:, ~is_kept]
+        return replace(self, directions=self.directions[:, is_kept], truncated=self.truncated + dropped @ dropped.T)
 
     def scores(self, outputs: FloatArray) -> FloatArray:
         """Return the scores (N, q) of outputs (N, n)."""
@@ -112,8 +117,8 @@ def _logs(outputs: FloatArray, signs: FloatArray) -> FloatArray:
     return np.log(np.where(signs == 0, 1.0, np.abs(outputs)))
 
 
-MAX_PARAMETERS_COMBINED = 3
-"""Largest number of positive parameters for which all combinations of logarithms are tried; with more, all or none."""
+LEADING_DIRECTIONS = 2
+"""Number of directions of the outputs for which coordinates are chosen."""
 LOW_PROBABILITY, MAX_DISTANCE_BELOW = 1e-4, 0.25
 """Prior probability below the smallest value that matters, and the largest distance of this value from the runs, as a
 share of their range of logarithms."""
@@ -300,13 +305,10 @@ def emulate(
         )
     if np.ptp(outputs, axis=0).max() == 0:
         raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")
-    candidates = _coordinate_candidates(
-        points, [_may_be_log(column, prior) for column, prior in zip(points.T, prior_of_column, strict=True)]
-    )
+    may_be_log = [_may_be_log(column, prior) for column, prior in zip(points.T, prior_of_column, strict=True)]
+    controls = np.asarray(control, dtype=np.float64)
     emulators = [
-        _best_coordinates(
-            runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), candidates, form
-        )
+        _emulator_on(runs, controls, basis_of(outputs, is_log=is_log), np.array(may_be_log), form)
         for is_log in (False, True)[: 1 + has_signs(outputs)]
     ]
     return max(emulators, key=lambda emulator: emulator.check().log_density)
@@ -317,19 +319,50 @@ def runs_needed(dimension: int, trend: Trend) -> int:
     return EXTRA_RUNS + int(trend_basis(np.zeros((1, dimension)), trend).shape[1])
 
 
-def _best_coordinates(
+def _emulator_on(
     runs: ForwardRuns,
     control: FloatArray,
     basis: OutputBasis,
-    candidates: Sequence[Coordinates],
+    may_be_log: NDArray[np.bool_],
     form: tuple[Kernel, Trend],
 ) -> Emulator:
-    """Return the emulator with the coordinates that make the scores of the runs most probable."""
+    """Return the emulator with the coordinates that make the leading scores of the runs most probable."""
     points, outputs = runs.good
     scores = basis.scores(outputs)
-    fits = ((coordinates, fitted(coordinates.of(points), scores, *form)) for coordinates in candidates)
-    coordinates, kriging = max(fits, key=lambda pair: pair[1].log_evidence)
-    return Emulator(runs, control, coordinates, basis, kriging)
+    coordinates, modes = _best_coordinates(points, scores[:, :LEADING_DIRECTIONS], may_be_log, form)
+    kriging, is_predicted = fitted(coordinates.of(points), scores, *form, near=modes)
+    return Emulator(runs, control, coordinates, basis.truncated_to(is_predicted), kriging)
+
+
+def _best_coordinates(
+    points: FloatArray, scores: FloatArray, may_be_log: NDArray[np.bool_], form: tuple[Kernel, Trend]
+) -> tuple[Coordinates, list[Mode]]:
+    """Return the coordinates that make scores (m, q) most probable, and the modes of their length scales.
+
+    Each parameter by itself and all by their logarithms are tried, and from the better of the two one parameter after
+    the other is changed as long as that helps.
+    """
+    fits: dict[tuple[bool, ...], tuple[float, Coordinates, list[Mode]]] = {}
+
+    def log_evidence(is_log: NDArray[np.bool_]) -> float:
+        key = tuple(is_log.tolist())
+        if key not in fits:
+            coordinates = _box(points, is_log)
+            scales = LengthScales(coordinates.of(points), *form)
+            earlier = max(fits.values(), key=lambda fit: fit[0])[2] if fits else []
+            modes: list[Mode] = []
+            for column, values in enumerate(scores.T):
+                modes.append(scales.mode(values, [*earlier[column : column + 1], *modes[-1:]], 0 if fits else 2))
+            fits[key] = sum(mode.log_density for mode in modes), coordinates, modes
+        return fits[key][0]
+
+    best = max((np.zeros_like(may_be_log), may_be_log), key=log_evidence)
+    is_better = True
+    while is_better:
+        neighbours = [np.where(np.arange(len(best)) == k, ~best, best) for k in np.flatnonzero(may_be_log)]
+        candidate = max([best, *neighbours], key=log_evidence)
+        is_better, best = log_evidence(candidate) > log_evidence(best), candidate
+    return fits[tuple(best.tolist())][1:]
 
 
 def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
@@ -341,15 +374,8 @@ def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
     return smallest > 0 and low - np.log(smallest) <= MAX_DISTANCE_BELOW * (high - low)
 
 
-def _coordinate_candidates(points: FloatArray, positive: Sequence[bool]) -> list[Coordinates]:
-    """Return the coordinates to try: every parameter by itself or, where it is positive, by its logarithm."""
-    choices: list[tuple[bool, ...]] = [(False,) * len(positive), tuple(positive)]
-    if sum(positive) <= MAX_PARAMETERS_COMBINED:
-        choices = list(product(*((False, True) if is_positive else (False,) for is_positive in positive)))
-    candidates = []
-    for choice in choices:
-        is_log = np.array(choice)
-        values = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
-        low, high = values.min(axis=0), values.max(axis=0)
-        candidates.append(Coordinates(low, np.where(high > low, high, low + 1), is_log))
-    return candidates
+def _box(points: FloatArray, is_log: NDArray[np.bool_]) -> Coordinates:
+    """Return the unit box of points (m, d), of some parameters by their logarithms."""
+    values = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
+    low, high = values.min(axis=0), values.max(axis=0)
+    return Coordinates(low, np.where(high > low, high, low + 1), is_log)

@@ -14,7 +14,7 @@ from jax.scipy.linalg import cho_solve, solve_triangular
 from numpy.typing import NDArray
 
 from tissuq.emulation.emulator import Emulator, emulated
-from tissuq.emulation.kriging import Kernel, Trend
+from tissuq.emulation.length_scales import Kernel, Trend
 from tissuq.emulation.problem import Problem
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.parameters.priors import Prior

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from tissuq.emulation import Calibration, FileForward, UmbridgeForward
 from tissuq.emulation.forward import Forward
-from tissuq.emulation.kriging import Kernel, Trend
+from tissuq.emulation.length_scales import Kernel, Trend
 from tissuq.emulation.problem import Method
 from tissuq.emulation.runs import PointSet
 from tissuq.errors import InputError
