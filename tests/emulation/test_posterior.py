@@ -79,6 +79,44 @@ def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     assert found.log_evidence == pytest.approx(np.log(weights.sum() * cell) + logs.max(), abs=0.02)
 
 
+@pytest.mark.parametrize("discrepancy", slow_but(["gp"], ["gp", "gp-pinned"]))
+def test_a_process_beside_the_model_agrees_with_the_exact_posterior_on_a_dense_grid(discrepancy):
+    """The grid computes the model itself, which is linear in mu; the emulator has 40 runs of it.
+
+    Means are off by no more than 0.06 sd, and sds by 6 %, where nothing is wrong. Half the variance of the process
+    moves the mean of c by more than is allowed.
+    """
+    priors = {"mu": tq.Uniform(0.5, 3.0), "alpha": tq.Uniform(-20.0, -2.0)}
+    data = ogden(TRUTH) * (1 + 2 * DEPTH**2) + 0.05 * np.random.default_rng(3).standard_normal(len(DEPTH))
+    found = tq.calibrate(DEPTH, data, ogden, priors, discrepancy=discrepancy, noise_sd=0.05, runs=40)
+    middles, alpha = (np.arange(60) + 0.5) / 60, np.linspace(-13.5, -7.0, 300)
+    columns = np.array([data, *(ogden({"mu": 1.0, "alpha": value}) for value in alpha)]).T
+    # the priors that are documented: uniform to the largest measurement, and 0.02 to 3 times the range of the controls
+    c, psi = data.max() * middles**3, np.ptp(DEPTH) * (0.02 + 2.98 * middles**1.5)
+    logs, mean_mu, precision = (np.empty((len(c), len(psi), len(alpha))) for _ in range(3))
+    for k, length in enumerate(psi):
+        s = DEPTH[:, None] / length
+        kernel = np.exp(-0.5 * (s - s.T) ** 2)
+        if discrepancy == "gp-pinned":
+            kernel -= np.exp(-0.5 * (s**2 + s.T**2)) * (1 + s * s.T)
+        for i, amplitude in enumerate(c):
+            root = np.linalg.cholesky(amplitude**2 * kernel + 0.05**2 * np.eye(len(s)))
+            whitened = np.linalg.solve(root, columns)
+            precision[i, k] = (whitened[:, 1:] ** 2).sum(axis=0)
+            mean_mu[i, k] = whitened[:, 0] @ whitened[:, 1:] / precision[i, k]
+            logs[i, k] = 0.5 * (precision[i, k] * mean_mu[i, k] ** 2 - whitened[:, 0] @ whitened[:, 0])
+            logs[i, k] -= 0.5 * np.log(precision[i, k]) + np.log(np.diag(root)).sum()
+    logs += 2 * np.log(middles)[:, None, None] + 0.5 * np.log(middles)[:, None]  # widths of the cells
+    weights = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
+    exact = {"mu": (mean_mu, 1 / precision), "alpha": (alpha, 0.0), "c": (c[:, None, None], 0.0),
+             "psi": (psi[:, None], 0.0)}  # fmt: skip
+    for symbol, (values, variance) in exact.items():
+        mean = (weights * values).sum()
+        sd = np.sqrt((weights * ((values - mean) ** 2 + variance)).sum())
+        assert found.marginals[symbol].mean == pytest.approx(mean, abs=0.2 * sd)
+        assert found.marginals[symbol].sd == pytest.approx(sd, rel=0.1)
+
+
 @pytest.mark.slow
 def test_importance_sampling_and_nuts_agree():
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)

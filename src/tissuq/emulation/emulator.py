@@ -14,6 +14,7 @@ from tissuq.emulation.kriging import Kriging, fitted, leave_one_out, moments
 from tissuq.emulation.length_scales import Kernel, LengthScales, Mode, Trend, trend_basis
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError
+from tissuq.inference.threads import one_thread
 from tissuq.parameters.priors import Prior
 
 if TYPE_CHECKING:
@@ -307,11 +308,12 @@ def emulate(
         raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")
     may_be_log = [_may_be_log(column, prior) for column, prior in zip(points.T, prior_of_column, strict=True)]
     controls = np.asarray(control, dtype=np.float64)
-    emulators = [
-        _emulator_on(runs, controls, basis_of(outputs, is_log=is_log), np.array(may_be_log), form)
-        for is_log in (False, True)[: 1 + has_signs(outputs)]
-    ]
-    return max(emulators, key=lambda emulator: emulator.check().log_density)
+    with one_thread():
+        emulators = [
+            _emulator_on(runs, controls, basis_of(outputs, is_log=is_log), np.array(may_be_log), form)
+            for is_log in (False, True)[: 1 + has_signs(outputs)]
+        ]
+        return max(emulators, key=lambda emulator: emulator.check().log_density)
 
 
 def runs_needed(dimension: int, trend: Trend) -> int:
