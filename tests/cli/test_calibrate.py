@@ -124,3 +124,40 @@ def test_a_server_that_a_configuration_names_is_asked_only_when_the_command_line
     said = cli("calibrate", "--config", "own.toml")
     assert (said.status, asked) == (2, [])
     assert "add --umbridge http://127.0.0.1:9" in said.err
+
+
+PUNCH = """
+def force(parameters, depth):
+    stretch = 1 - depth
+    return 2 * parameters["C10"] * (stretch**-2 - stretch)
+"""
+
+
+def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(tmp_path):
+    (tmp_path / "cube.py").write_text(PUNCH)
+    depth = np.linspace(0.05, 0.3, 8)
+    rows = zip(depth, 3 * ((1 - depth) ** -2 - (1 - depth)), strict=True)
+    (tmp_path / "punch.csv").write_text("depth,force\n" + "".join(f"{a:.4f},{b:.5f}\n" for a, b in rows))
+    usual = ["--forward", "cube.py:force", "--prior", "C10=uniform(0.5,5)", "--noise-sd", 0.02, "--runs", 8]
+    material = ["--material", "neo-hookean", "--range", "0.7:1.2", "--unit", "kPa", "--no-figures"]
+    said = run_in(tmp_path, "calibrate", "punch.csv", *usual, *material, "--out", "run")
+    assert said.status == 0, said.err
+    said = run_in(tmp_path, "predict", "run", "--stretch", "1.1", "--out", "predicted", "--no-figures")
+    assert said.status == 0, said.err
+    row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
+    median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))
+    assert median == pytest.approx(3 * (1.1 - 1.1**-2), rel=0.01)  # kPa
+    said = run_in(tmp_path, "export", "run", "--draws", 2, "--out", "cards")
+    assert said.status == 0, said.err
+
+
+def test_a_material_without_its_range_or_parameters_is_refused_before_any_run(tmp_path):
+    write_all(tmp_path)
+    usual = ["calibrate", "punch.csv", "--forward", "force.py:force", *USUAL, "--out", "run"]
+    said = run_in(tmp_path, *usual, "--material", "neo-hookean")
+    assert said.status == 2
+    assert "material and range belong together" in said.err.replace("\n", " ")
+    said = run_in(tmp_path, *usual, "--material", "neo-hookean", "--range", "0.7:1.2")
+    assert said.status == 2
+    assert "calibrated without C10" in " ".join(said.err.split())
+    assert not (tmp_path / "run").exists()

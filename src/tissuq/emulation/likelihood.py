@@ -89,6 +89,14 @@ class Likelihood:
         """
         return float(self._in_blocks(_ratio(self.form), values)[0].mean())
 
+    def misfits(self, values: FloatArray) -> FloatArray:
+        """Return how far the measurements are from the model at parameters (N, D).
+
+        The squared distance (N,) in standard deviations of noise, discrepancy and emulator together: chi-squared with n
+        degrees of freedom where the model is right.
+        """
+        return self._in_blocks(_misfit(self.form), values)[0]
+
     def _in_blocks(self, function: Any, values: FloatArray) -> tuple[FloatArray, ...]:
         count = len(values)
         padded = np.concatenate([values, np.repeat(values[-1:], -count % BLOCK_SIZE, axis=0)])
@@ -132,6 +140,16 @@ def log_density(form: Form, values: Any, data: Mapping[str, Any]) -> Any:
 @lru_cache
 def _density(form: Form) -> Any:
     return jax.jit(jax.vmap(lambda values, data: (log_density(form, values, data),), (0, None)))
+
+
+@lru_cache
+def _misfit(form: Form) -> Any:
+    def misfit(values: Any, data: Any) -> tuple[Any]:
+        mean, error, discrepancy, noise = _moments(form, values, data)
+        score = solve_triangular(_root(error, discrepancy, noise), data["measured"] - mean, lower=True)
+        return (score @ score,)
+
+    return jax.jit(jax.vmap(misfit, (0, None)))
 
 
 @lru_cache

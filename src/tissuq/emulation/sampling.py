@@ -209,8 +209,8 @@ def _components(scores: FloatArray, logs: FloatArray) -> list[tuple[float, Propo
 
 def _log_gaussian(proposal: Proposal, points: FloatArray) -> FloatArray:
     """Return the log density (N,) of the Gaussian with mean and root of a proposal, at points (N, D)."""
-    standard = np.linalg.solve(proposal.root, (points - proposal.mean).T).T
-    return log_normal(standard) - np.log(np.abs(np.diag(proposal.root))).sum()
+    standard = np.asarray(np.linalg.solve(proposal.root, (points - proposal.mean).T).T, dtype=np.float64)
+    return np.asarray(log_normal(standard) - np.log(np.abs(np.diag(proposal.root))).sum())
 
 
 def _moved(scores: FloatArray, weights: FloatArray) -> Proposal:

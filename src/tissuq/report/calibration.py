@@ -11,10 +11,12 @@ import numpy as np
 
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
+from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.figures import BAND, BASE, INK, legend_above, new_figure
 from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, interval, significant, write_csv, write_json
 from tissuq.studies.calibration import CalibrationStudy, Measured
+from tissuq.studies.earlier_run import POSTERIORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,6 +58,9 @@ def write_calibration_run(
     write_recipe(folder, command, study.settings.model_copy(update=relocated))
     _write_tables(study, folder)
     calibration.save(folder / "calibration.nc")
+    if study.posterior is not None:
+        (folder / POSTERIORS).mkdir()
+        study.posterior.save(folder / POSTERIORS / f"{NoDiscrepancy.name}.nc")
     if figures:
         drawn = {
             "band": band_figure(calibration, study.data),
