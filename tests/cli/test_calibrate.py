@@ -50,12 +50,23 @@ def test_a_run_leaves_the_promised_files(calibrate_run):
     folder, said = calibrate_run
     found = {name for name, content in tree(folder / "run").items() if content is not None}
     figures = {f"figures/{name}.{kind}" for name in ("band", "emulator", "marginals") for kind in ("svg", "png")}
-    tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc"}
+    tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc",
+              "leave_one_out.csv", "sensitivity.csv"}  # fmt: skip
     assert found == figures | tables | {"input/punch.csv", "input/force.py", "report.html", "run.toml", "contents.txt"}
     for words in ("force.py:force: 16 runs", "each left out", "the solver has not converged", "run-forward-runs"):
         assert words in said.out.replace("\n      ", " ")
     page = (folder / "run" / "report.html").read_text()
-    assert all(words in page for words in ("Runs that failed", "depth (mm)", "<td>mu</td>") if words != "depth (mm)")
+    assert all(
+        words in page
+        for words in (
+            "Runs that failed",
+            "predicted worst from the others",
+            "What the outputs depend on",
+            "depth (mm)",
+            "<td>mu</td>",
+        )
+        if words != "depth (mm)"
+    )
 
 
 def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):

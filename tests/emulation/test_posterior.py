@@ -247,6 +247,37 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     assert any("reaches the end of the simulated range of C10 (upper)" in text for text in found.warnings)
 
 
+def test_measurements_that_no_parameters_give_are_told():
+    """The model is proportional to C10: beyond the prior's end, or of another shape, nothing comes near."""
+    priors = {"C10": tq.Uniform(0.2, 1.0)}
+    emulator = emulate(designed(neo_hooke, priors, 8), DEPTH)
+    words = "no parameters that the priors allow give the measurements"
+    for data, is_told in (
+        (measured(neo_hooke, {"C10": 0.6}, 0.02), False),
+        (measured(neo_hooke, {"C10": 2.0}, 0.02), True),
+        (measured(lambda p: neo_hooke(p) * (1 + 5 * DEPTH), {"C10": 0.4}, 0.02), True),
+    ):
+        found = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, emulator=emulator)
+        told = [text for text in found.warnings if words in text]
+        assert len(told) == is_told
+    unknown = tq.calibrate(DEPTH, 3 * neo_hooke({"C10": 1.0}), neo_hooke, priors, emulator=emulator)
+    (text,) = [text for text in unknown.warnings if words in text]
+    assert "15 of 15 measurements are beyond the outputs of all runs" in text
+    admitted = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, emulator=emulator, discrepancy="gp-pinned")
+    assert not any(words in text for text in admitted.warnings)
+
+
+def test_the_table_of_runs_left_out_has_the_worst_first():
+    found = tq.calibrate(DEPTH, measured(ogden, TRUTH, 0.05), ogden, OGDEN, noise_sd=0.05, runs=12)
+    table, check = found.leave_one_out, found.check
+    assert list(table.columns) == ["mu", "alpha", "error", "sd", "standardised"]
+    assert table["error"].is_monotonic_decreasing
+    assert np.sqrt((table["error"] ** 2).mean()) == pytest.approx(check.relative_error)
+    assert np.sqrt((table["standardised"] ** 2).mean()) == pytest.approx(check.rms_standardised)
+    worst = np.abs(check.computed - check.predicted).max(axis=1).argmax()
+    assert table[["mu", "alpha"]].iloc[0].tolist() == check.points[worst].tolist()
+
+
 def test_measurements_are_simulated_together():
     """The mean of all is as uncertain as a Gaussian process given the data says, at one value of every parameter."""
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)

@@ -196,7 +196,7 @@ class Calibration:
         Returns
         -------
         pandas.DataFrame
-            Columns control, mean, low, high.
+            Columns control, mean, low, high; and quantity, where several were measured.
         """
         import pandas as pd
 
@@ -204,7 +204,11 @@ class Calibration:
         mean, variance = self.likelihood.predictions(self.draws(PREDICTION_DRAWS), discrepancy=discrepancy, noise=noise)
         mixture = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
         low, high = (mixture.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
-        return pd.DataFrame({"control": self.problem.control, "mean": mixture.mean, "low": low, "high": high})
+        table = pd.DataFrame({"control": self.problem.control, "mean": mixture.mean, "low": low, "high": high})
+        if len(self.problem.quantities) > 1:
+            counts = [stop - start for start, stop in self.problem.quantities.values()]
+            table.insert(0, "quantity", np.repeat(list(self.problem.quantities), counts))
+        return table
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of parameters)."""
@@ -324,7 +328,7 @@ def _labels(calibration: Calibration) -> dict[str, str | float]:
     labels: dict[str, str | float] = {
         "inference_library": "tissuq",
         "discrepancy": problem.discrepancy.name,
-        "noise_sd": "unknown" if problem.noise_sd is None else problem.noise_sd,
+        "noise_sd": ", ".join(str(sd or "unknown") for sd in problem.noise_sd.values()),
         "method": posterior.method,
         "converged": str(posterior.converged),
         "verdict": posterior.verdict,

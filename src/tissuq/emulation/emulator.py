@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.emulation.kriging import Kriging, fitted, leave_one_out, moments
 from tissuq.emulation.length_scales import Kernel, LengthScales, Mode, Trend, trend_basis
+from tissuq.emulation.output_basis import OutputBasis, basis_of, has_signs, output_moments
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError
 from tissuq.inference.threads import one_thread
@@ -20,103 +21,9 @@ from tissuq.parameters.priors import Prior
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Coordinates", "Emulator", "OutputBasis", "basis_of", "emulate", "has_signs", "runs_needed"]
+__all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
 
 FloatArray = NDArray[np.float64]
-
-MAX_TRUNCATED_SHARE = 1e-10
-"""Largest share of the outputs' variance in the directions that are truncated."""
-MAX_LOG_VARIANCE = 10.0
-"""Largest variance of a logarithm, beyond which its moments would overflow."""
-
-
-@dataclass(frozen=True, eq=False)
-class OutputBasis:
-    """Outputs, or the logarithms of their sizes, = mean + directions @ scores + truncated remainder.
-
-    Parameters
-    ----------
-    mean : (n,) array
-    directions : (n, q) array
-        Scaled, so that the scores of the runs have unit variance.
-    truncated : (n, n) array
-        Covariance of the truncated remainder over the runs.
-    signs : (n,) array, optional
-        Signs of the outputs, where their logarithms are taken; zero where an output is always zero.
-    """
-
-    mean: FloatArray
-    directions: FloatArray
-    truncated: FloatArray
-    signs: FloatArray | None = None
-
-    @property
-    def is_log(self) -> bool:
-        """Whether it is one of logarithms."""
-        return self.signs is not None
-
-    def truncated_to(self, is_kept: NDArray[np.bool_]) -> OutputBasis:
-        """Return the basis of some of its directions (q,); the others become part of the remainder."""
-        dropped = self.directions[:, ~is_kept]
-        return replace(self, directions=self.directions[:, is_kept], truncated=self.truncated + dropped @ dropped.T)
-
-    def scores(self, outputs: FloatArray) -> FloatArray:
-        """Return the scores (N, q) of outputs (N, n)."""
-        size = (self.directions**2).sum(axis=0)
-        return np.asarray((self._working_scale(outputs) - self.mean) @ (self.directions / size))
-
-    def residuals(self, outputs: FloatArray) -> FloatArray:
-        """Return the remainder of outputs (N, n), or of their logarithms, that the directions do not reach."""
-        return np.asarray(self._working_scale(outputs) - self.mean - self.scores(outputs) @ self.directions.T)
-
-    def _working_scale(self, outputs: FloatArray) -> FloatArray:
-        return outputs if self.signs is None else _logs(outputs, self.signs)
-
-    @property
-    def arrays(self) -> dict[str, Any]:
-        """The arrays of which `output_moments` is computed."""
-        arrays = {name: getattr(self, name) for name in ("mean", "directions", "truncated")}
-        return arrays if self.signs is None else arrays | {"signs": self.signs}
-
-
-def basis_of(outputs: FloatArray, *, is_log: bool = False) -> OutputBasis:
-    """Return the directions in which outputs (m, n) of runs vary, up to a negligible share of their variance."""
-    signs = np.sign(outputs[0]) if is_log else None
-    working = outputs if signs is None else _logs(outputs, signs)
-    mean = working.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(working - mean, full_matrices=False)
-    remaining_share = 1 - np.cumsum(sizes**2) / max((sizes**2).sum(), np.finfo(float).tiny)
-    count = int(np.argmax(remaining_share <= MAX_TRUNCATED_SHARE)) + 1
-    dropped = sizes[count:, None] * directions[count:]
-    scale = max(len(outputs) - 1, 1)
-    scaled = (sizes[:count, None] * directions[:count]).T / np.sqrt(scale)
-    return OutputBasis(mean, scaled, dropped.T @ dropped / scale, signs)
-
-
-def has_signs(outputs: FloatArray) -> bool:
-    """Return whether every output has the same sign in all runs, so that logarithms can be taken."""
-    return bool((np.sign(outputs) == np.sign(outputs[0])).all() and outputs.any())
-
-
-def output_moments(arrays: dict[str, Any], mean: Any, variance: Any, error: Any = 0.0) -> tuple[Any, Any]:
-    """Return mean (n,) and covariance (n, n) of the outputs from those of the scores (q,), NumPy or JAX.
-
-    ``error`` (n,) is added to the mean before logarithms are undone. The moments of a log-normal are exact.
-    """
-    directions = arrays["directions"]
-    centre = arrays["mean"] + directions @ mean + error
-    cov = (directions * variance) @ directions.T + arrays["truncated"]
-    if "signs" not in arrays:
-        return centre, cov
-    library = centre.__array_namespace__()
-    bounded = library.minimum(cov, MAX_LOG_VARIANCE)
-    sizes = arrays["signs"] * library.exp(centre + 0.5 * library.diagonal(bounded))
-    return sizes, sizes[:, None] * sizes[None, :] * library.expm1(bounded)
-
-
-def _logs(outputs: FloatArray, signs: FloatArray) -> FloatArray:
-    return np.log(np.where(signs == 0, 1.0, np.abs(outputs)))
-
 
 LEADING_DIRECTIONS = 2
 """Number of directions of the outputs for which coordinates are chosen."""
@@ -262,7 +169,7 @@ class Emulator:
     def _means(self, values: FloatArray) -> FloatArray:
         """Return the means (N, n) of the outputs at parameters (N, d), about those of the runs."""
         blocks = np.array_split(values, max(len(values) // SENSITIVITY_BLOCK, 1))
-        return np.concatenate([self.moments(block)[0] for block in blocks]) - self.runs.good[1].mean(axis=0)
+        return np.asarray(np.concatenate([self.moments(block)[0] for block in blocks]) - self.runs.good[1].mean(axis=0))
 
     def check(self, points: ArrayLike | None = None, outputs: ArrayLike | None = None) -> EmulatorCheck:
         """Return the errors of the emulator: every run predicted from the others, or held-out runs.
@@ -318,6 +225,7 @@ def emulate(
     kernel: Kernel = "squared-exponential",
     trend: Trend = "linear",
     priors: Mapping[str, Prior] | None = None,
+    quantities: Sequence[tuple[int, int]] = (),
 ) -> Emulator:
     """Return the emulator of a model from its runs.
 
@@ -335,6 +243,8 @@ def emulate(
         Polynomial mean of the processes: ``"constant"``, ``"linear"`` or ``"quadratic"``.
     priors : mapping of str to Prior, optional
         Priors of the parameters. The logarithm is not used where a parameter may come far nearer to zero than the runs.
+    quantities : sequence of (int, int)
+        First and last but one of the outputs of each of several quantities, whose units differ.
 
     Raises
     ------
@@ -360,7 +270,9 @@ def emulate(
     controls = np.asarray(control, dtype=np.float64)
     with one_thread():
         emulators = [
-            _emulator_on(runs, controls, basis_of(outputs, is_log=is_log), np.array(may_be_log), form)
+            _emulator_on(
+                runs, controls, basis_of(outputs, is_log=is_log, quantities=quantities), np.array(may_be_log), form
+            )
             for is_log in (False, True)[: 1 + has_signs(outputs)]
         ]
         return max(emulators, key=lambda emulator: emulator.check().log_density)

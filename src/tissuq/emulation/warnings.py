@@ -117,7 +117,7 @@ def _no_parameters_fit(
         f"{np.sqrt(misfits.min() / size):.1f} standard deviations of noise, discrepancy and emulator away (root mean "
         f"square; 1 is right), most at the control {problem.control[worst]:.4g}: measured "
         f"{problem.measured[worst]:.4g}, model {predicted[worst]:.4g}. {is_out.sum()} of {size} measurements are "
-        "beyond the outputs of all runs. Check the units of data and model, give wider priors, or admit an error of the "
+        "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
         "model (discrepancy gp-pinned)."
     )
 
