@@ -32,7 +32,7 @@ OPTIMISER_STARTS = 2
 """Number of starts of a search besides the modes of other functions or coordinates."""
 MAX_SETTINGS = 12
 """Largest number of settings of the length scales that are averaged."""
-MAX_RUNS_AVERAGED = 60
+MAX_RUNS_AVERAGED = 100
 """Largest number of runs for which length scales are averaged; with more, the runs determine them."""
 LOG_STEP = 1e-3
 """Step of the logarithms of the length scales for the curvature at the mode."""
