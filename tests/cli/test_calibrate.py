@@ -50,12 +50,23 @@ def test_a_run_leaves_the_promised_files(calibrate_run):
     folder, said = calibrate_run
     found = {name for name, content in tree(folder / "run").items() if content is not None}
     figures = {f"figures/{name}.{kind}" for name in ("band", "emulator", "marginals") for kind in ("svg", "png")}
-    tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc"}
+    tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc",
+              "leave_one_out.csv", "sensitivity.csv"}  # fmt: skip
     assert found == figures | tables | {"input/punch.csv", "input/force.py", "report.html", "run.toml", "contents.txt"}
     for words in ("force.py:force: 16 runs", "each left out", "the solver has not converged", "run-forward-runs"):
         assert words in said.out.replace("\n      ", " ")
     page = (folder / "run" / "report.html").read_text()
-    assert all(words in page for words in ("Runs that failed", "depth (mm)", "<td>mu</td>") if words != "depth (mm)")
+    assert all(
+        words in page
+        for words in (
+            "Runs that failed",
+            "predicted worst from the others",
+            "What the outputs depend on",
+            "depth (mm)",
+            "<td>mu</td>",
+        )
+        if words != "depth (mm)"
+    )
 
 
 def test_the_parameters_are_found_and_the_runs_listed(calibrate_run):
@@ -124,3 +135,40 @@ def test_a_server_that_a_configuration_names_is_asked_only_when_the_command_line
     said = cli("calibrate", "--config", "own.toml")
     assert (said.status, asked) == (2, [])
     assert "add --umbridge http://127.0.0.1:9" in said.err
+
+
+PUNCH = """
+def force(parameters, depth):
+    stretch = 1 - depth
+    return 2 * parameters["C10"] * (stretch**-2 - stretch)
+"""
+
+
+def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(tmp_path):
+    (tmp_path / "cube.py").write_text(PUNCH)
+    depth = np.linspace(0.05, 0.3, 8)
+    rows = zip(depth, 3 * ((1 - depth) ** -2 - (1 - depth)), strict=True)
+    (tmp_path / "punch.csv").write_text("depth,force\n" + "".join(f"{a:.4f},{b:.5f}\n" for a, b in rows))
+    usual = ["--forward", "cube.py:force", "--prior", "C10=uniform(0.5,5)", "--noise-sd", 0.02, "--runs", 8]
+    material = ["--material", "neo-hookean", "--range", "0.7:1.2", "--unit", "kPa", "--no-figures"]
+    said = run_in(tmp_path, "calibrate", "punch.csv", *usual, *material, "--out", "run")
+    assert said.status == 0, said.err
+    said = run_in(tmp_path, "predict", "run", "--stretch", "1.1", "--out", "predicted", "--no-figures")
+    assert said.status == 0, said.err
+    row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
+    median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))
+    assert median == pytest.approx(3 * (1.1 - 1.1**-2), rel=0.01)  # kPa
+    said = run_in(tmp_path, "export", "run", "--draws", 2, "--out", "cards")
+    assert said.status == 0, said.err
+
+
+def test_a_material_without_its_range_or_parameters_is_refused_before_any_run(tmp_path):
+    write_all(tmp_path)
+    usual = ["calibrate", "punch.csv", "--forward", "force.py:force", *USUAL, "--out", "run"]
+    said = run_in(tmp_path, *usual, "--material", "neo-hookean")
+    assert said.status == 2
+    assert "material and range belong together" in said.err.replace("\n", " ")
+    said = run_in(tmp_path, *usual, "--material", "neo-hookean", "--range", "0.7:1.2")
+    assert said.status == 2
+    assert "calibrated without C10" in " ".join(said.err.split())
+    assert not (tmp_path / "run").exists()

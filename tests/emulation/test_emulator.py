@@ -5,7 +5,7 @@ import pytest
 
 from forward_models import DEPTH, OGDEN, designed, neo_hooke, ogden, runs_at
 from tissuq.emulation import ForwardRuns, emulate
-from tissuq.emulation.emulator import basis_of, output_moments
+from tissuq.emulation.output_basis import basis_of, output_moments
 from tissuq.emulation.runs import space_filling
 from tissuq.errors import InputError, ModelError
 from tissuq.parameters.priors import LogNormal, LogUniform, Normal, Uniform
@@ -116,3 +116,39 @@ def test_unknown_choices_are_refused():
         emulate(runs, DEPTH, "cubic")
     with pytest.raises(InputError, match="design must be one of"):
         space_filling(OGDEN, 8, design="grid")
+
+
+def test_sensitivities_are_those_of_the_closed_form():
+    """Of a + 2 b + 4 (b - 1/2) (c - 1/2): variances 3, 12 and 4 (of b and c together) of 19."""
+    priors = {symbol: Uniform(0.0, 1.0) for symbol in "abc"}
+
+    def function(p):
+        return (p["a"] + 2 * p["b"] + 4 * (p["b"] - 0.5) * (p["c"] - 0.5)) * DEPTH
+
+    found = emulate(designed(function, priors, 40), DEPTH).sensitivity(priors)
+    np.testing.assert_allclose(found["first"] * 19, [3, 12, 0], atol=0.4)
+    np.testing.assert_allclose(found["total"] * 19, [3, 16, 4], atol=0.4)
+
+
+def test_sensitivities_follow_the_priors():
+    def function(p):
+        return (p["a"] + p["b"]) * DEPTH
+
+    priors = {"a": Uniform(0.0, 1.0), "b": Uniform(0.0, 3.0)}
+    found = emulate(designed(function, priors, 12), DEPTH).sensitivity({**priors, "b": Normal(1.5, 0.5)})
+    assert found.loc["b", "first"] == pytest.approx(0.25 / (0.25 + 1 / 12), abs=0.02)
+
+
+def test_eight_parameters_are_emulated_and_those_without_effect_are_seen():
+    priors = {f"p{k}": Uniform(0.5, 1.5) for k in range(8)}
+
+    def function(p):
+        return p["p0"] * np.expm1(p["p1"] * DEPTH * 4) + 4 * p["p2"] * p["p3"] * DEPTH + 0.2 * p["p4"] * DEPTH**2
+
+    emulator = emulate(designed(function, priors, 60), DEPTH)
+    check = emulator.check(*elsewhere(function, priors))
+    spread = np.sqrt(((check.computed - check.computed.mean(axis=0)) ** 2).mean())
+    assert np.sqrt(((check.computed - check.predicted) ** 2).mean()) < spread / 8
+    assert check.share_inside > 0.85
+    found = emulator.sensitivity(priors)
+    assert found["total"].iloc[[5, 6, 7]].max() < 0.02 < found["total"].iloc[:4].min()

@@ -79,6 +79,44 @@ def test_two_parameters_and_a_few_runs_agree_with_brute_force_quadrature():
     assert found.log_evidence == pytest.approx(np.log(weights.sum() * cell) + logs.max(), abs=0.02)
 
 
+@pytest.mark.parametrize("discrepancy", slow_but(["gp"], ["gp", "gp-pinned"]))
+def test_a_process_beside_the_model_agrees_with_the_exact_posterior_on_a_dense_grid(discrepancy):
+    """The grid computes the model itself, which is linear in mu; the emulator has 40 runs of it.
+
+    Means are off by no more than 0.06 sd, and sds by 6 %, where nothing is wrong. Half the variance of the process
+    moves the mean of c by more than is allowed.
+    """
+    priors = {"mu": tq.Uniform(0.5, 3.0), "alpha": tq.Uniform(-20.0, -2.0)}
+    data = ogden(TRUTH) * (1 + 2 * DEPTH**2) + 0.05 * np.random.default_rng(3).standard_normal(len(DEPTH))
+    found = tq.calibrate(DEPTH, data, ogden, priors, discrepancy=discrepancy, noise_sd=0.05, runs=40)
+    middles, alpha = (np.arange(60) + 0.5) / 60, np.linspace(-13.5, -7.0, 300)
+    columns = np.array([data, *(ogden({"mu": 1.0, "alpha": value}) for value in alpha)]).T
+    # the priors that are documented: uniform to the largest measurement, and 0.02 to 3 times the range of the controls
+    c, psi = data.max() * middles**3, np.ptp(DEPTH) * (0.02 + 2.98 * middles**1.5)
+    logs, mean_mu, precision = (np.empty((len(c), len(psi), len(alpha))) for _ in range(3))
+    for k, length in enumerate(psi):
+        s = DEPTH[:, None] / length
+        kernel = np.exp(-0.5 * (s - s.T) ** 2)
+        if discrepancy == "gp-pinned":
+            kernel -= np.exp(-0.5 * (s**2 + s.T**2)) * (1 + s * s.T)
+        for i, amplitude in enumerate(c):
+            root = np.linalg.cholesky(amplitude**2 * kernel + 0.05**2 * np.eye(len(s)))
+            whitened = np.linalg.solve(root, columns)
+            precision[i, k] = (whitened[:, 1:] ** 2).sum(axis=0)
+            mean_mu[i, k] = whitened[:, 0] @ whitened[:, 1:] / precision[i, k]
+            logs[i, k] = 0.5 * (precision[i, k] * mean_mu[i, k] ** 2 - whitened[:, 0] @ whitened[:, 0])
+            logs[i, k] -= 0.5 * np.log(precision[i, k]) + np.log(np.diag(root)).sum()
+    logs += 2 * np.log(middles)[:, None, None] + 0.5 * np.log(middles)[:, None]  # widths of the cells
+    weights = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
+    exact = {"mu": (mean_mu, 1 / precision), "alpha": (alpha, 0.0), "c": (c[:, None, None], 0.0),
+             "psi": (psi[:, None], 0.0)}  # fmt: skip
+    for symbol, (values, variance) in exact.items():
+        mean = (weights * values).sum()
+        sd = np.sqrt((weights * ((values - mean) ** 2 + variance)).sum())
+        assert found.marginals[symbol].mean == pytest.approx(mean, abs=0.2 * sd)
+        assert found.marginals[symbol].sd == pytest.approx(sd, rel=0.1)
+
+
 @pytest.mark.slow
 def test_importance_sampling_and_nuts_agree():
     data = measured(neo_hooke, {"C10": 1.2}, 0.05)
@@ -207,6 +245,37 @@ def test_warnings_tell_a_poor_emulator_and_a_narrow_prior():
     data = measured(neo_hooke, {"C10": 1.2}, 0.02)
     found = tq.calibrate(DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 1.18)}, noise_sd=0.02, runs=6)
     assert any("reaches the end of the simulated range of C10 (upper)" in text for text in found.warnings)
+
+
+def test_measurements_that_no_parameters_give_are_told():
+    """The model is proportional to C10: beyond the prior's end, or of another shape, nothing comes near."""
+    priors = {"C10": tq.Uniform(0.2, 1.0)}
+    emulator = emulate(designed(neo_hooke, priors, 8), DEPTH)
+    words = "no parameters that the priors allow give the measurements"
+    for data, is_told in (
+        (measured(neo_hooke, {"C10": 0.6}, 0.02), False),
+        (measured(neo_hooke, {"C10": 2.0}, 0.02), True),
+        (measured(lambda p: neo_hooke(p) * (1 + 5 * DEPTH), {"C10": 0.4}, 0.02), True),
+    ):
+        found = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, emulator=emulator)
+        told = [text for text in found.warnings if words in text]
+        assert len(told) == is_told
+    unknown = tq.calibrate(DEPTH, 3 * neo_hooke({"C10": 1.0}), neo_hooke, priors, emulator=emulator)
+    (text,) = [text for text in unknown.warnings if words in text]
+    assert "15 of 15 measurements are beyond the outputs of all runs" in text
+    admitted = tq.calibrate(DEPTH, data, neo_hooke, priors, noise_sd=0.02, emulator=emulator, discrepancy="gp-pinned")
+    assert not any(words in text for text in admitted.warnings)
+
+
+def test_the_table_of_runs_left_out_has_the_worst_first():
+    found = tq.calibrate(DEPTH, measured(ogden, TRUTH, 0.05), ogden, OGDEN, noise_sd=0.05, runs=12)
+    table, check = found.leave_one_out, found.check
+    assert list(table.columns) == ["mu", "alpha", "error", "sd", "standardised"]
+    assert table["error"].is_monotonic_decreasing
+    assert np.sqrt((table["error"] ** 2).mean()) == pytest.approx(check.relative_error)
+    assert np.sqrt((table["standardised"] ** 2).mean()) == pytest.approx(check.rms_standardised)
+    worst = np.abs(check.computed - check.predicted).max(axis=1).argmax()
+    assert table[["mu", "alpha"]].iloc[0].tolist() == check.points[worst].tolist()
 
 
 def test_measurements_are_simulated_together():

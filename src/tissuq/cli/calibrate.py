@@ -47,6 +47,15 @@ def calibrate(
     kernel: Annotated[str | None, typer.Option(help="squared-exponential or matern-5/2.")] = None,
     trend: Annotated[str | None, typer.Option(help="Mean: constant, linear or quadratic [linear].")] = None,
     method: Annotated[str | None, typer.Option(help="auto, importance or nuts [auto].")] = None,
+    material: Annotated[
+        str | None,
+        typer.Option(help="Law in the model with all its parameters: predict, export and structure then take the run."),
+    ] = None,
+    stretches: Annotated[
+        str | None, typer.Option("--range", help="With --material: smallest and largest stretch, such as 0.7:1.3.")
+    ] = None,
+    mode: Annotated[str | None, typer.Option(help="With --material: loading mode of the range [uniaxial].")] = None,
+    unit: Annotated[str | None, typer.Option(help="With --material: the model's unit of stress [MPa].")] = None,
     every: Annotated[int | None, typer.Option(help="Use only every N-th row [1].")] = None,
     sheet: Annotated[str | None, typer.Option(help="Sheet of an Excel workbook, by name or number.")] = None,
     skip_rows: Annotated[int | None, typer.Option(help="Lines to skip at the top of the file.")] = None,
@@ -73,7 +82,8 @@ def calibrate(
         "file": str(file) if file else None, "forward": forward, "umbridge": umbridge, "model": model,
         "control": _column(control), "measured": _column(measured), "discrepancy": discrepancy,
         "noise_sd": _noise(noise_sd), "zero_load": zero_load, "runs": runs, "refine": refine, "design": design,
-        "kernel": kernel, "trend": trend, "method": method, "every": every, "sheet": _column(sheet),
+        "kernel": kernel, "trend": trend, "method": method, "material": material,
+        "range": stretches, "mode": mode, "unit": unit, "every": every, "sheet": _column(sheet),
         "skip_rows": skip_rows, "seed": seed, "priors": once_each("--prior", map(parse_prior, prior or [])) or None,
     }  # fmt: skip
     if not (prior or config):

@@ -12,6 +12,7 @@ from tissuq.cli.options import (
     Config,
     Figures,
     RunDiscrepancy,
+    RunMaterial,
     Scheduler,
     Seed,
     campaign_progress,
@@ -77,10 +78,7 @@ def ensemble(
         float | None, typer.Option(help="In that unit, of all draws [1000 times the mean initial shear modulus].")
     ] = None,
     poisson: Annotated[float | None, typer.Option(help="Instead: Poisson's ratio of all draws.")] = None,
-    fitted_law: Annotated[
-        str | None,
-        typer.Option(help="law.py:Name of the run, if its material is your own law; its code runs only if named here."),
-    ] = None,
+    fitted_law: RunMaterial = None,
     also: Annotated[
         list[Path] | None, typer.Option(help="Another file that the solver needs beside the deck; repeat for more.")
     ] = None,

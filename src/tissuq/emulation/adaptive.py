@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tissuq.emulation.calibration import Calibration
 from tissuq.emulation.emulator import Emulator, emulate, runs_needed
-from tissuq.emulation.kriging import Kernel, Trend
+from tissuq.emulation.length_scales import Kernel, Trend
 from tissuq.emulation.problem import Method, Problem
 from tissuq.emulation.runs import ForwardRuns, PointSet, space_filling
 from tissuq.errors import InputError
@@ -76,7 +76,7 @@ def calibrated(
     if emulator is None:
         _check_run_count(problem, settings)
         runs = run(space_filling(problem.forward_priors, settings.runs, settings.seed, settings.design))
-        emulator = emulate(runs, problem.control, settings.kernel, settings.trend, problem.forward_priors)
+        emulator = _emulator(runs, problem, settings)
     else:
         _check_fit(problem, emulator)
     calibration = _posterior(problem, emulator, settings)
@@ -86,13 +86,16 @@ def calibrated(
         remaining -= len(new_runs)
         if not new_runs.failed.all():
             held_out = (*held_out, calibration.emulator.check(*new_runs.good))
-        emulator = emulate(
-            calibration.runs.joined(new_runs), problem.control, settings.kernel, settings.trend, problem.forward_priors
-        )
+        emulator = _emulator(calibration.runs.joined(new_runs), problem, settings)
         calibration = _posterior(problem, emulator, settings)
     return Calibration(
         calibration.problem, calibration.emulator, calibration.posterior, held_out, settings.seed, settings.method
     )
+
+
+def _emulator(runs: ForwardRuns, problem: Problem, settings: EmulationSettings) -> Emulator:
+    quantities = tuple(problem.quantities.values())
+    return emulate(runs, problem.control, settings.kernel, settings.trend, problem.forward_priors, quantities)
 
 
 def _posterior(problem: Problem, emulator: Emulator, settings: EmulationSettings) -> Calibration:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from tissuq.emulation.likelihood import Likelihood
     from tissuq.emulation.problem import Method
     from tissuq.emulation.sampling import SampledPosterior
+    from tissuq.mechanics import Material
+    from tissuq.posterior.posterior import Posterior
 
 __all__ = ["Calibration", "labelled_arrays"]
 
@@ -88,6 +90,28 @@ class Calibration:
         """The emulator at each of its runs, predicted from the others."""
         return self.emulator.check()
 
+    @property
+    def leave_one_out(self) -> pd.DataFrame:
+        """Every run predicted from the others: a row for each, the worst first.
+
+        Columns: the parameters; error, the root mean square over the outputs, as a share of that of all runs; sd, what
+        the emulator says of it; and standardised, the root mean square of the errors in standard deviations (about 1).
+        """
+        import pandas as pd
+
+        check = self.check
+        size = np.sqrt((check.computed**2).mean())
+        table = pd.DataFrame(check.points, columns=list(self.runs.symbols))
+        table["error"] = np.sqrt(((check.computed - check.predicted) ** 2).mean(axis=1)) / size
+        table["sd"] = np.sqrt((check.sd**2).mean(axis=1)) / size
+        table["standardised"] = np.sqrt((check.standardised**2).mean(axis=1))
+        return table.sort_values("error", ascending=False, ignore_index=True)
+
+    @cached_property
+    def sensitivity(self) -> pd.DataFrame:
+        """The share of the outputs' variance over the priors that each parameter explains (`Emulator.sensitivity`)."""
+        return self.emulator.sensitivity(self.problem.forward_priors)
+
     @cached_property
     def likelihood(self) -> Likelihood:
         """The likelihood of the measurements."""
@@ -100,7 +124,7 @@ class Calibration:
         """Warnings that the user must read, in sentences."""
         exact = self.without_emulator_error.posterior
         sentences = calibration_warnings(
-            self.problem, self.emulator, self.check, self.posterior, exact, self.emulator_share
+            self.problem, self.emulator, self.check, self.posterior, exact, self.emulator_share, self.likelihood
         )
         return tuple(sentences)
 
@@ -172,7 +196,7 @@ class Calibration:
         Returns
         -------
         pandas.DataFrame
-            Columns control, mean, low, high.
+            Columns control, mean, low, high; and quantity, where several were measured.
         """
         import pandas as pd
 
@@ -180,7 +204,11 @@ class Calibration:
         mean, variance = self.likelihood.predictions(self.draws(PREDICTION_DRAWS), discrepancy=discrepancy, noise=noise)
         mixture = Mixtures(np.full(len(mean), 1 / len(mean)), mean, variance)
         low, high = (mixture.quantile(tail) for tail in (0.5 - 0.5 * prob, 0.5 + 0.5 * prob))
-        return pd.DataFrame({"control": self.problem.control, "mean": mixture.mean, "low": low, "high": high})
+        table = pd.DataFrame({"control": self.problem.control, "mean": mixture.mean, "low": low, "high": high})
+        if len(self.problem.quantities) > 1:
+            counts = [stop - start for start, stop in self.problem.quantities.values()]
+            table.insert(0, "quantity", np.repeat(list(self.problem.quantities), counts))
+        return table
 
     def predictive_coverage(self, *, discrepancy: bool = True, prob: float = 0.95) -> float:
         """Return the share of the measurements inside their predictive band (a check of the fit, not of parameters)."""
@@ -196,6 +224,45 @@ class Calibration:
         (parameters, outputs, errors).
         """
         return labelled_arrays(self)
+
+    def posterior_of(
+        self, material: str | Material, stretch: tuple[float, float], *, mode: str = "uniaxial", unit: str = "MPa"
+    ) -> Posterior:
+        """Return the posterior of the material whose parameters these are, as `tissuq.fit` gives one of a test.
+
+        It can be saved, loaded (`tissuq.load`), predicted from, exported and handed to finite elements. The
+        discrepancy is one of what was measured, and no part of it.
+
+        Parameters
+        ----------
+        material : str or Material
+            The law in the forward model, all parameters of which were calibrated by their names.
+        stretch : (float, float)
+            Smallest and largest stretch in the forward model: the range in which the material counts as calibrated.
+        mode : str
+            The loading mode of that range.
+        unit : str
+            Unit of stress of the forward model's parameters.
+
+        Raises
+        ------
+        InputError
+            When a parameter of the material was not calibrated, or the range is none.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import tissuq as tq
+        >>> depth = np.linspace(0.1, 1, 8)
+        >>> found = tq.calibrate(depth, 30 * depth + 0.1 * np.sin(9 * depth), lambda p, x: 2 * p["C10"] * x,
+        ...                      {"C10": tq.Uniform(5, 40)}, noise_sd=0.1, runs=8)  # C10 in kPa
+        >>> posterior = found.posterior_of("neo-hookean", (0.7, 1.3), unit="kPa")
+        >>> float(posterior.predict([1.2], noise=False)["median"].iloc[0].round(1))  # 2 C10 (l - 1 / l^2), kPa
+        15.2
+        """
+        from tissuq.emulation.material_posterior import material_posterior
+
+        return material_posterior(self, material, stretch, mode=mode, unit=unit)
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
@@ -261,7 +328,7 @@ def _labels(calibration: Calibration) -> dict[str, str | float]:
     labels: dict[str, str | float] = {
         "inference_library": "tissuq",
         "discrepancy": problem.discrepancy.name,
-        "noise_sd": "unknown" if problem.noise_sd is None else problem.noise_sd,
+        "noise_sd": ", ".join(str(sd or "unknown") for sd in problem.noise_sd.values()),
         "method": posterior.method,
         "converged": str(posterior.converged),
         "verdict": posterior.verdict,

@@ -5,118 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import product
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.emulation.kriging import Kernel, Kriging, Trend, fitted, leave_one_out, moments, trend_basis
+from tissuq.emulation.kriging import Kriging, fitted, leave_one_out, moments
+from tissuq.emulation.length_scales import Kernel, LengthScales, Mode, Trend, trend_basis
+from tissuq.emulation.output_basis import OutputBasis, basis_of, has_signs, output_moments
 from tissuq.emulation.runs import EmulatorCheck, ForwardRuns
 from tissuq.errors import InputError, ModelError
+from tissuq.inference.threads import one_thread
 from tissuq.parameters.priors import Prior
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Coordinates", "Emulator", "OutputBasis", "basis_of", "emulate", "has_signs", "runs_needed"]
+__all__ = ["Coordinates", "Emulator", "emulate", "runs_needed"]
 
 FloatArray = NDArray[np.float64]
 
-MAX_TRUNCATED_SHARE = 1e-10
-"""Largest share of the outputs' variance in the directions that are truncated."""
-MAX_LOG_VARIANCE = 10.0
-"""Largest variance of a logarithm, beyond which its moments would overflow."""
-
-
-@dataclass(frozen=True, eq=False)
-class OutputBasis:
-    """Outputs, or the logarithms of their sizes, = mean + directions @ scores + truncated remainder.
-
-    Parameters
-    ----------
-    mean : (n,) array
-    directions : (n, q) array
-        Scaled, so that the scores of the runs have unit variance.
-    truncated : (n, n) array
-        Covariance of the truncated remainder over the runs.
-    signs : (n,) array, optional
-        Signs of the outputs, where their logarithms are taken; zero where an output is always zero.
-    """
-
-    mean: FloatArray
-    directions: FloatArray
-    truncated: FloatArray
-    signs: FloatArray | None = None
-
-    @property
-    def is_log(self) -> bool:
-        """Whether it is one of logarithms."""
-        return self.signs is not None
-
-    def scores(self, outputs: FloatArray) -> FloatArray:
-        """Return the scores (N, q) of outputs (N, n)."""
-        size = (self.directions**2).sum(axis=0)
-        return np.asarray((self._working_scale(outputs) - self.mean) @ (self.directions / size))
-
-    def residuals(self, outputs: FloatArray) -> FloatArray:
-        """Return the remainder of outputs (N, n), or of their logarithms, that the directions do not reach."""
-        return np.asarray(self._working_scale(outputs) - self.mean - self.scores(outputs) @ self.directions.T)
-
-    def _working_scale(self, outputs: FloatArray) -> FloatArray:
-        return outputs if self.signs is None else _logs(outputs, self.signs)
-
-    @property
-    def arrays(self) -> dict[str, Any]:
-        """The arrays of which `output_moments` is computed."""
-        arrays = {name: getattr(self, name) for name in ("mean", "directions", "truncated")}
-        return arrays if self.signs is None else arrays | {"signs": self.signs}
-
-
-def basis_of(outputs: FloatArray, *, is_log: bool = False) -> OutputBasis:
-    """Return the directions in which outputs (m, n) of runs vary, up to a negligible share of their variance."""
-    signs = np.sign(outputs[0]) if is_log else None
-    working = outputs if signs is None else _logs(outputs, signs)
-    mean = working.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(working - mean, full_matrices=False)
-    remaining_share = 1 - np.cumsum(sizes**2) / max((sizes**2).sum(), np.finfo(float).tiny)
-    count = int(np.argmax(remaining_share <= MAX_TRUNCATED_SHARE)) + 1
-    dropped = sizes[count:, None] * directions[count:]
-    scale = max(len(outputs) - 1, 1)
-    scaled = (sizes[:count, None] * directions[:count]).T / np.sqrt(scale)
-    return OutputBasis(mean, scaled, dropped.T @ dropped / scale, signs)
-
-
-def has_signs(outputs: FloatArray) -> bool:
-    """Return whether every output has the same sign in all runs, so that logarithms can be taken."""
-    return bool((np.sign(outputs) == np.sign(outputs[0])).all() and outputs.any())
-
-
-def output_moments(arrays: dict[str, Any], mean: Any, variance: Any, error: Any = 0.0) -> tuple[Any, Any]:
-    """Return mean (n,) and covariance (n, n) of the outputs from those of the scores (q,), NumPy or JAX.
-
-    ``error`` (n,) is added to the mean before logarithms are undone. The moments of a log-normal are exact.
-    """
-    directions = arrays["directions"]
-    centre = arrays["mean"] + directions @ mean + error
-    cov = (directions * variance) @ directions.T + arrays["truncated"]
-    if "signs" not in arrays:
-        return centre, cov
-    library = centre.__array_namespace__()
-    bounded = library.minimum(cov, MAX_LOG_VARIANCE)
-    sizes = arrays["signs"] * library.exp(centre + 0.5 * library.diagonal(bounded))
-    return sizes, sizes[:, None] * sizes[None, :] * library.expm1(bounded)
-
-
-def _logs(outputs: FloatArray, signs: FloatArray) -> FloatArray:
-    return np.log(np.where(signs == 0, 1.0, np.abs(outputs)))
-
-
-MAX_PARAMETERS_COMBINED = 3
-"""Largest number of positive parameters for which all combinations of logarithms are tried; with more, all or none."""
+LEADING_DIRECTIONS = 2
+"""Number of directions of the outputs for which coordinates are chosen."""
 LOW_PROBABILITY, MAX_DISTANCE_BELOW = 1e-4, 0.25
 """Prior probability below the smallest value that matters, and the largest distance of this value from the runs, as a
 share of their range of logarithms."""
+SENSITIVITY_POINTS, SENSITIVITY_BLOCK = 2048, 512
+"""Points from which sensitivity indices are estimated, and how many are computed at once."""
 EXTRA_RUNS = 4
 """Smallest number of runs in excess of the coefficients of the mean."""
 
@@ -208,6 +123,54 @@ class Emulator:
         sd = np.sqrt(np.diagonal(cov[0]))
         return pd.DataFrame({"control": self.control, "mean": mean[0], "sd": sd})
 
+    def sensitivity(self, priors: Mapping[str, Prior]) -> pd.DataFrame:
+        """Return which share of the outputs' variance each parameter explains where all vary over their priors.
+
+        Sobol's indices, estimated from the emulator's mean (Saltelli et al. 2010), over all outputs together: variances
+        are summed. With those of few runs, errors of the emulator are part of them.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter: first, the share that the parameter explains alone, and total, the share that is
+            left when all others are known.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import tissuq as tq
+        >>> from tissuq.emulation import emulate, gathered
+        >>> points = np.random.default_rng(0).random((12, 2))
+        >>> results = [{"parameters": {"a": a, "b": b}, "outputs": [a + 2 * b], "error": "", "seconds": 0.0}
+        ...            for a, b in points]
+        >>> found = emulate(gathered(["a", "b"], results, 1), [1.0])
+        >>> found.sensitivity({"a": tq.Uniform(0, 1), "b": tq.Uniform(0, 1)})["first"].round(2).to_dict()
+        {'a': 0.2, 'b': 0.8}
+        """
+        import pandas as pd
+        from scipy.stats import qmc
+
+        size = len(self.symbols)
+        cube = qmc.Sobol(2 * size, rng=np.random.default_rng(61)).random(SENSITIVITY_POINTS)
+        quantiles = [priors[symbol].quantile for symbol in self.symbols]
+        one, other = (
+            np.column_stack([quantile(column) for quantile, column in zip(quantiles, half.T, strict=True)])
+            for half in (cube[:, :size], cube[:, size:])
+        )
+        base, new = self._means(one), self._means(other)
+        variance = np.concatenate([base, new]).var(axis=0).sum()
+        rows = []
+        for k in range(size):
+            mixed = self._means(np.where(np.arange(size) == k, other, one))
+            first = (new * (mixed - base)).mean(axis=0).sum()
+            rows.append((first / variance, 0.5 * ((mixed - base) ** 2).mean(axis=0).sum() / variance))
+        return pd.DataFrame(rows, pd.Index(self.symbols, name="parameter"), ["first", "total"])
+
+    def _means(self, values: FloatArray) -> FloatArray:
+        """Return the means (N, n) of the outputs at parameters (N, d), about those of the runs."""
+        blocks = np.array_split(values, max(len(values) // SENSITIVITY_BLOCK, 1))
+        return np.asarray(np.concatenate([self.moments(block)[0] for block in blocks]) - self.runs.good[1].mean(axis=0))
+
     def check(self, points: ArrayLike | None = None, outputs: ArrayLike | None = None) -> EmulatorCheck:
         """Return the errors of the emulator: every run predicted from the others, or held-out runs.
 
@@ -262,6 +225,7 @@ def emulate(
     kernel: Kernel = "squared-exponential",
     trend: Trend = "linear",
     priors: Mapping[str, Prior] | None = None,
+    quantities: Sequence[tuple[int, int]] = (),
 ) -> Emulator:
     """Return the emulator of a model from its runs.
 
@@ -279,6 +243,8 @@ def emulate(
         Polynomial mean of the processes: ``"constant"``, ``"linear"`` or ``"quadratic"``.
     priors : mapping of str to Prior, optional
         Priors of the parameters. The logarithm is not used where a parameter may come far nearer to zero than the runs.
+    quantities : sequence of (int, int)
+        First and last but one of the outputs of each of several quantities, whose units differ.
 
     Raises
     ------
@@ -300,16 +266,16 @@ def emulate(
         )
     if np.ptp(outputs, axis=0).max() == 0:
         raise ModelError("the forward model gives the same outputs at all parameters: there is nothing to identify.")
-    candidates = _coordinate_candidates(
-        points, [_may_be_log(column, prior) for column, prior in zip(points.T, prior_of_column, strict=True)]
-    )
-    emulators = [
-        _best_coordinates(
-            runs, np.asarray(control, dtype=np.float64), basis_of(outputs, is_log=is_log), candidates, form
-        )
-        for is_log in (False, True)[: 1 + has_signs(outputs)]
-    ]
-    return max(emulators, key=lambda emulator: emulator.check().log_density)
+    may_be_log = [_may_be_log(column, prior) for column, prior in zip(points.T, prior_of_column, strict=True)]
+    controls = np.asarray(control, dtype=np.float64)
+    with one_thread():
+        emulators = [
+            _emulator_on(
+                runs, controls, basis_of(outputs, is_log=is_log, quantities=quantities), np.array(may_be_log), form
+            )
+            for is_log in (False, True)[: 1 + has_signs(outputs)]
+        ]
+        return max(emulators, key=lambda emulator: emulator.check().log_density)
 
 
 def runs_needed(dimension: int, trend: Trend) -> int:
@@ -317,19 +283,50 @@ def runs_needed(dimension: int, trend: Trend) -> int:
     return EXTRA_RUNS + int(trend_basis(np.zeros((1, dimension)), trend).shape[1])
 
 
-def _best_coordinates(
+def _emulator_on(
     runs: ForwardRuns,
     control: FloatArray,
     basis: OutputBasis,
-    candidates: Sequence[Coordinates],
+    may_be_log: NDArray[np.bool_],
     form: tuple[Kernel, Trend],
 ) -> Emulator:
-    """Return the emulator with the coordinates that make the scores of the runs most probable."""
+    """Return the emulator with the coordinates that make the leading scores of the runs most probable."""
     points, outputs = runs.good
     scores = basis.scores(outputs)
-    fits = ((coordinates, fitted(coordinates.of(points), scores, *form)) for coordinates in candidates)
-    coordinates, kriging = max(fits, key=lambda pair: pair[1].log_evidence)
-    return Emulator(runs, control, coordinates, basis, kriging)
+    coordinates, modes = _best_coordinates(points, scores[:, :LEADING_DIRECTIONS], may_be_log, form)
+    kriging, is_predicted = fitted(coordinates.of(points), scores, *form, near=modes)
+    return Emulator(runs, control, coordinates, basis.truncated_to(is_predicted), kriging)
+
+
+def _best_coordinates(
+    points: FloatArray, scores: FloatArray, may_be_log: NDArray[np.bool_], form: tuple[Kernel, Trend]
+) -> tuple[Coordinates, list[Mode]]:
+    """Return the coordinates that make scores (m, q) most probable, and the modes of their length scales.
+
+    Each parameter by itself and all by their logarithms are tried, and from the better of the two one parameter after
+    the other is changed as long as that helps.
+    """
+    fits: dict[tuple[bool, ...], tuple[float, Coordinates, list[Mode]]] = {}
+
+    def log_evidence(is_log: NDArray[np.bool_]) -> float:
+        key = tuple(is_log.tolist())
+        if key not in fits:
+            coordinates = _box(points, is_log)
+            scales = LengthScales(coordinates.of(points), *form)
+            earlier = max(fits.values(), key=lambda fit: fit[0])[2] if fits else []
+            modes: list[Mode] = []
+            for column, values in enumerate(scores.T):
+                modes.append(scales.mode(values, [*earlier[column : column + 1], *modes[-1:]], 0 if fits else 2))
+            fits[key] = sum(mode.log_density for mode in modes), coordinates, modes
+        return fits[key][0]
+
+    best = max((np.zeros_like(may_be_log), may_be_log), key=log_evidence)
+    is_better = True
+    while is_better:
+        neighbours = [np.where(np.arange(len(best)) == k, ~best, best) for k in np.flatnonzero(may_be_log)]
+        candidate = max([best, *neighbours], key=log_evidence)
+        is_better, best = log_evidence(candidate) > log_evidence(best), candidate
+    return fits[tuple(best.tolist())][1:]
 
 
 def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
@@ -341,15 +338,8 @@ def _may_be_log(column: FloatArray, prior: Prior | None) -> bool:
     return smallest > 0 and low - np.log(smallest) <= MAX_DISTANCE_BELOW * (high - low)
 
 
-def _coordinate_candidates(points: FloatArray, positive: Sequence[bool]) -> list[Coordinates]:
-    """Return the coordinates to try: every parameter by itself or, where it is positive, by its logarithm."""
-    choices: list[tuple[bool, ...]] = [(False,) * len(positive), tuple(positive)]
-    if sum(positive) <= MAX_PARAMETERS_COMBINED:
-        choices = list(product(*((False, True) if is_positive else (False,) for is_positive in positive)))
-    candidates = []
-    for choice in choices:
-        is_log = np.array(choice)
-        values = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
-        low, high = values.min(axis=0), values.max(axis=0)
-        candidates.append(Coordinates(low, np.where(high > low, high, low + 1), is_log))
-    return candidates
+def _box(points: FloatArray, is_log: NDArray[np.bool_]) -> Coordinates:
+    """Return the unit box of points (m, d), of some parameters by their logarithms."""
+    values = np.where(is_log, np.log(np.where(is_log, points, 1.0)), points)
+    low, high = values.min(axis=0), values.max(axis=0)
+    return Coordinates(low, np.where(high > low, high, low + 1), is_log)

@@ -49,6 +49,10 @@ class Forward(ABC):
         """The name in reports."""
         return self.identity.partition(" ")[0]
 
+    def of_quantities(self, ends: Mapping[str, tuple[int, int]]) -> Forward:
+        """Return the model whose outputs are those of several quantities one after the other."""
+        return self if len(ends) == 1 else SeveralQuantities(self, tuple((name, *pair) for name, pair in ends.items()))
+
     def check(self, symbols: Sequence[str]) -> None:  # noqa: B027  (most kinds have nothing to check)
         """Raise an InputError where no run with these parameters is possible."""
 
@@ -100,6 +104,35 @@ class FileForward(Forward):
 
     def check(self, symbols: Sequence[str]) -> None:
         _function_at(self.location)
+
+
+@dataclass(frozen=True)
+class SeveralQuantities(Forward):
+    """A model that takes the controls, and returns the outputs, as mappings by the name of what was measured."""
+
+    model: Forward
+    quantities: tuple[tuple[str, int, int], ...]
+
+    def run(self, parameters: Mapping[str, float], control: FloatArray) -> Any:
+        controls = {name: control[start:stop] for name, start, stop in self.quantities}
+        outputs = self.model.run(parameters, controls)  # type: ignore[arg-type]  # by name
+        names = [name for name, _, _ in self.quantities]
+        if not isinstance(outputs, Mapping) or set(outputs) != set(names):
+            raise InputError(f"the forward model must return a dictionary of outputs for {', '.join(names)}.")
+        for name, start, stop in self.quantities:
+            if np.shape(outputs[name]) != (stop - start,):
+                raise InputError(
+                    f"the forward model returns outputs of {name} of shape {np.shape(outputs[name])}; there are "
+                    f"{stop - start} measurements of it."
+                )
+        return np.concatenate([np.asarray(outputs[name], dtype=np.float64) for name in names])
+
+    @property
+    def identity(self) -> str:
+        return f"{self.model.identity} of {', '.join(name for name, _, _ in self.quantities)}"
+
+    def check(self, symbols: Sequence[str]) -> None:
+        self.model.check(symbols)
 
 
 def as_forward(forward: Forward | Callable[..., Any]) -> Forward:
@@ -196,6 +229,9 @@ class UmbridgeForward(Forward):
         client, sizes = _client(self.url, self.model)
         inputs = [list(islice(values, size)) for size in sizes]
         return np.concatenate([np.asarray(vector, dtype=np.float64) for vector in client(inputs, settings)])
+
+    def of_quantities(self, ends: Mapping[str, tuple[int, int]]) -> Forward:
+        return self  # its output vectors already are one after the other
 
     @property
     def identity(self) -> str:

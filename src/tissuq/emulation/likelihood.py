@@ -10,13 +10,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.scipy.linalg import cho_solve, solve_triangular
+from jax.scipy.linalg import block_diag, cho_solve, solve_triangular
 from numpy.typing import NDArray
 
 from tissuq.emulation.emulator import Emulator, emulated
-from tissuq.emulation.kriging import Kernel, Trend
-from tissuq.emulation.problem import Problem
+from tissuq.emulation.length_scales import Kernel, Trend
+from tissuq.emulation.problem import Problem, symbol_of
 from tissuq.model.discrepancy import Discrepancy
+from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.priors import Prior
 
 jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
@@ -39,6 +40,7 @@ class Form:
     symbols: tuple[str, ...]
     forward: int
     discrepancy: Discrepancy
+    quantities: tuple[tuple[str, int, int], ...]
 
 
 class Likelihood:
@@ -54,12 +56,13 @@ class Likelihood:
 
     def __init__(self, problem: Problem, emulator: Emulator, *, has_error: bool = True) -> None:
         self.problem, self.emulator, self.has_error = problem, emulator, has_error
-        self.form = Form(emulator.form, problem.symbols, len(problem.forward_symbols), problem.discrepancy)
+        self.form = Form(emulator.form, problem.symbols, len(problem.forward_symbols), problem.discrepancy,
+                         tuple((name, *ends) for name, ends in problem.quantities.items()))  # fmt: skip
         self.data = {
             "emulator": emulator.arrays,
             "measured": problem.measured,
             "control": problem.control,
-            "noise_sd": 0.0 if problem.noise_sd is None else problem.noise_sd,
+            "noise_sd": {name: 0.0 if sd is None else sd for name, sd in problem.noise_sd.items()},
             "has_error": float(has_error),
         }
 
@@ -70,12 +73,7 @@ class Likelihood:
     def predictions(self, values: FloatArray, *, discrepancy: bool, noise: bool) -> tuple[FloatArray, FloatArray]:
         """Return means and variances (N, n) at the controls, given the measurements and parameters (N, D)."""
         mean, variance = self._in_blocks(_conditional(self.form, discrepancy), values)
-        noise_sd = (
-            values[:, self.problem.symbols.index("noise_sd")]
-            if self.problem.noise_sd is None
-            else self.problem.noise_sd
-        )
-        return mean, variance + (np.broadcast_to(noise_sd, len(values))[:, None] ** 2 if noise else 0.0)
+        return (mean, variance + self._in_blocks(_noise(self.form), values)[0]) if noise else (mean, variance)
 
     def replicates(self, values: FloatArray, scores: FloatArray) -> FloatArray:
         """Return new measurements (N, n), all of a row together, from parameters (N, D) and normal scores (N, n)."""
@@ -88,6 +86,14 @@ class Likelihood:
         than this share of its variance.
         """
         return float(self._in_blocks(_ratio(self.form), values)[0].mean())
+
+    def misfits(self, values: FloatArray) -> FloatArray:
+        """Return how far the measurements are from the model at parameters (N, D).
+
+        The squared distance (N,) in standard deviations of noise, discrepancy and emulator together: chi-squared with n
+        degrees of freedom where the model is right.
+        """
+        return self._in_blocks(_misfit(self.form), values)[0]
 
     def _in_blocks(self, function: Any, values: FloatArray) -> tuple[FloatArray, ...]:
         count = len(values)
@@ -102,23 +108,38 @@ def _moments(form: Form, values: Any, data: Mapping[str, Any]) -> tuple[Any, Any
     """Return the mean, the covariances of the emulator's error and of the discrepancy, and the noise variance."""
     mean, error = emulated(form.emulator, values[: form.forward], data["emulator"])
     values_by_symbol = dict(zip(form.symbols, values, strict=True))
-    control = data["control"]
-    discrepancy = jnp.zeros_like(error)
-    if form.discrepancy.is_correlated:
-        discrepancy = form.discrepancy.correlated_variance(values_by_symbol) * form.discrepancy.kernel(
-            0, control, control, values_by_symbol
+    blocks, rounding = [], []
+    for name, start, stop in form.quantities:
+        control = data["control"][start:stop]
+        rounding.append(jnp.full(stop - start, ROUNDING_SHARE * jnp.abs(data["measured"][start:stop]).max()))
+        own = {
+            parameter.symbol: values_by_symbol[symbol_of(parameter.symbol, name)]
+            for parameter in form.discrepancy.parameters
+        }
+        blocks.append(
+            form.discrepancy.correlated_variance(own) * form.discrepancy.kernel(0, control, control, own)
+            if form.discrepancy.is_correlated
+            else jnp.zeros((stop - start, stop - start))
         )
-    rounding = ROUNDING_SHARE * jnp.abs(data["measured"]).max()
     return (
         mean,
         data["has_error"] * error,
-        discrepancy,
-        values_by_symbol.get("noise_sd", data["noise_sd"]) ** 2 + rounding**2,
+        block_diag(*blocks),
+        _noise_variance(form, values_by_symbol, data) + jnp.concatenate(rounding) ** 2,
     )
 
 
+def _noise_variance(form: Form, values_by_symbol: Mapping[str, Any], data: Mapping[str, Any]) -> Any:
+    """Return the variances (n,) of the noise."""
+    sds = [
+        jnp.full(stop - start, values_by_symbol.get(symbol_of(NOISE_SD.symbol, name), data["noise_sd"][name]))
+        for name, start, stop in form.quantities
+    ]
+    return jnp.concatenate(sds) ** 2
+
+
 def _root(error: Any, discrepancy: Any, noise: Any) -> Any:
-    return jnp.linalg.cholesky(error + discrepancy + noise * jnp.eye(len(error)))
+    return jnp.linalg.cholesky(error + discrepancy + jnp.diag(noise))
 
 
 def log_density(form: Form, values: Any, data: Mapping[str, Any]) -> Any:
@@ -135,6 +156,16 @@ def _density(form: Form) -> Any:
 
 
 @lru_cache
+def _misfit(form: Form) -> Any:
+    def misfit(values: Any, data: Any) -> tuple[Any]:
+        mean, error, discrepancy, noise = _moments(form, values, data)
+        score = solve_triangular(_root(error, discrepancy, noise), data["measured"] - mean, lower=True)
+        return (score @ score,)
+
+    return jax.jit(jax.vmap(misfit, (0, None)))
+
+
+@lru_cache
 def _conditional(form: Form, discrepancy: bool) -> Any:
     def moments(values: Any, data: Any) -> tuple[Any, Any]:
         mean, error, process, noise = _moments(form, values, data)
@@ -148,6 +179,14 @@ def _conditional(form: Form, discrepancy: bool) -> Any:
 
 
 @lru_cache
+def _noise(form: Form) -> Any:
+    def variance(values: Any, data: Any) -> tuple[Any]:
+        return (_noise_variance(form, dict(zip(form.symbols, values, strict=True)), data),)
+
+    return jax.jit(jax.vmap(variance, (0, None)))
+
+
+@lru_cache
 def _replicate(form: Form) -> Any:
     def replicate(row: Any, data: Any) -> tuple[Any]:
         values, scores = jnp.split(row, [len(form.symbols)])
@@ -155,8 +194,8 @@ def _replicate(form: Form) -> Any:
         root = _root(error, discrepancy, noise)
         shift = (error + discrepancy) @ cho_solve((root, True), data["measured"] - mean)
         half = solve_triangular(root, jnp.eye(len(scores)), lower=True)
-        # A - A K^-1 A + s^2 I with K = A + s^2 I, but never singular
-        spread = jnp.linalg.cholesky(noise * (2 * jnp.eye(len(scores)) - noise * half.T @ half))
+        # A - A K^-1 A + N with K = A + N, but never singular
+        spread = jnp.linalg.cholesky(2 * jnp.diag(noise) - noise[:, None] * (half.T @ half) * noise)
         return (mean + shift + spread @ scores,)
 
     return jax.jit(jax.vmap(replicate, (0, None)))

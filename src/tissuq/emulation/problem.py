@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import inf, isfinite
 from numbers import Real
 from typing import Literal
@@ -18,7 +19,7 @@ from tissuq.model.noise import NOISE_SD
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Flat, Prior
 
-__all__ = ["DISCREPANCIES", "Method", "Problem", "pose"]
+__all__ = ["DISCREPANCIES", "Method", "Problem", "pose", "symbol_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -44,8 +45,10 @@ class Problem:
     error_priors : mapping of str to Prior
         Priors of the discrepancy's parameters and of an unknown noise.
     discrepancy : Discrepancy
-    noise_sd : float or None
-        None where it is unknown.
+    noise_sd : mapping of str to float or None
+        Of every quantity that was measured; None where it is unknown.
+    quantities : mapping of str to (int, int)
+        First and last but one of the measurements of each quantity; the name of a single one is empty.
     """
 
     control: FloatArray
@@ -53,7 +56,8 @@ class Problem:
     forward_priors: Mapping[str, Prior]
     error_priors: Mapping[str, Prior]
     discrepancy: Discrepancy
-    noise_sd: float | None
+    noise_sd: Mapping[str, float | None]
+    quantities: Mapping[str, tuple[int, int]]
 
     @cached_property
     def priors(self) -> dict[str, Prior]:
@@ -72,23 +76,25 @@ class Problem:
 
 
 def pose(
-    control: ArrayLike,
-    measured: ArrayLike,
+    control: ArrayLike | Mapping[str, ArrayLike],
+    measured: ArrayLike | Mapping[str, ArrayLike],
     priors: Mapping[str, Prior],
     discrepancy: str | Discrepancy = "none",
-    noise_sd: float | str = "unknown",
+    noise_sd: float | str | Mapping[str, float | str] = "unknown",
     zero_load: float = 0.0,
 ) -> Problem:
     """Return the problem, checked, with the priors that were not given.
 
     Parameters
     ----------
-    control, measured : (n,) arrays
+    control, measured : (n,) arrays, or mappings of str to array
+        Of one quantity, or of several by their names, each with its own noise and discrepancy.
     priors : mapping of str to Prior
-        Prior of each parameter of the forward model; and, to replace the defaults, of ``c``, ``psi`` and ``noise_sd``.
+        Prior of each parameter of the forward model; and, to replace the defaults, of ``c``, ``psi`` and ``noise_sd``
+        (with several quantities ``c_NAME`` and so on).
     discrepancy : str or Discrepancy
         ``"none"``, ``"gp"`` or ``"gp-pinned"``, a process of the control.
-    noise_sd : float or str
+    noise_sd : float or str, or a mapping of them
         Standard deviation of the noise in the unit of what was measured, or ``"unknown"``.
     zero_load : float
         The control at zero load, where ``gp-pinned`` is zero with its slope.
@@ -98,24 +104,63 @@ def pose(
     InputError, ModelError
         When something is missing or does not fit.
     """
-    controls, values = _column("control", control), _column("measured", measured)
-    if len(controls) != len(values):
-        raise InputError(
-            f"there are {len(controls)} controls and {len(values)} measured values; their numbers must be equal."
-        )
-    if not values.any():
-        raise InputError("all measured values are zero: nothing can be identified.")
+    columns = _columns(control, measured)
+    noises = dict(noise_sd) if isinstance(noise_sd, Mapping) else dict.fromkeys(columns, noise_sd)
+    if set(noises) != set(columns):
+        raise InputError(f"noise_sd is given for {', '.join(noises)}; what was measured is {', '.join(columns)}.")
     form = _discrepancy(discrepancy, zero_load)
-    error_parameters = (*form.parameters, *(() if noise_sd != "unknown" else (NOISE_SD,)))
-    if noise_sd != "unknown" and not (isinstance(noise_sd, Real) and 0 < float(noise_sd) < inf):
-        raise InputError(f"noise_sd must be a positive number or 'unknown', not {noise_sd!r}.")
-    error_priors = {
-        parameter.symbol: priors.get(parameter.symbol) or _default_prior(parameter, controls, values)
-        for parameter in error_parameters
-    }
+    error_priors: dict[str, Prior] = {}
+    for name, (controls, values) in columns.items():
+        sd = noises[name]
+        if sd != "unknown" and not (isinstance(sd, Real) and 0 < float(sd) < inf):
+            raise InputError(f"noise_sd must be a positive number or 'unknown', not {sd!r}.")
+        for parameter in (*form.parameters, *(() if sd != "unknown" else (NOISE_SD,))):
+            symbol = symbol_of(parameter.symbol, name)
+            error_priors[symbol] = priors.get(symbol) or _default_prior(parameter, controls, values)
+            if isinstance(error_priors[symbol], Prior):
+                error_priors[symbol].within(parameter.support)
     forward = {symbol: prior for symbol, prior in priors.items() if symbol not in error_priors}
-    _check_priors(forward, error_priors, error_parameters)
-    return Problem(controls, values, forward, error_priors, form, None if noise_sd == "unknown" else float(noise_sd))
+    _check_priors(forward, error_priors)
+    ends = np.cumsum([0, *(len(values) for _, values in columns.values())]).tolist()
+    joined_controls, joined_values = (np.concatenate(arrays) for arrays in zip(*columns.values(), strict=True))
+    return Problem(
+        joined_controls,
+        joined_values,
+        forward,
+        error_priors,
+        form,
+        {name: None if sd == "unknown" else float(sd) for name, sd in noises.items()},
+        dict(zip(columns, pairwise(ends), strict=True)),
+    )
+
+
+def symbol_of(symbol: str, quantity: str) -> str:
+    """Return the symbol of an error's parameter for a quantity, such as c_force; with a single quantity c."""
+    return f"{symbol}_{quantity}" if quantity else symbol
+
+
+def _columns(
+    control: ArrayLike | Mapping[str, ArrayLike], measured: ArrayLike | Mapping[str, ArrayLike]
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return controls and measured values by quantity."""
+    if isinstance(control, Mapping) != isinstance(measured, Mapping):
+        raise InputError("control and measured must both be arrays, or both mappings of quantities to arrays.")
+    set_by, measured_by = (values if isinstance(values, Mapping) else {"": values} for values in (control, measured))
+    if set(set_by) != set(measured_by) or not set_by:
+        raise InputError(f"the controls are of {', '.join(set_by)}, and what was measured is {', '.join(measured_by)}.")
+    columns = {}
+    for name in set_by:
+        label = f" of {name}" if name else ""
+        controls, values = _column(f"control{label}", set_by[name]), _column(f"measured{label}", measured_by[name])
+        if len(controls) != len(values):
+            raise InputError(
+                f"there are {len(controls)} controls{label} and {len(values)} measured values; their numbers must be "
+                "equal."
+            )
+        if not values.any():
+            raise InputError(f"all measured values{label} are zero: nothing can be identified.")
+        columns[name] = controls, values
+    return columns
 
 
 def _column(name: str, values: ArrayLike) -> FloatArray:
@@ -158,9 +203,7 @@ def _default_prior(parameter: Parameter, control: FloatArray, measured: FloatArr
     return parameter.relative_prior.scaled(unit)
 
 
-def _check_priors(
-    forward: Mapping[str, Prior], error_priors: Mapping[str, Prior], error_parameters: tuple[Parameter, ...]
-) -> None:
+def _check_priors(forward: Mapping[str, Prior], error_priors: Mapping[str, Prior]) -> None:
     if not forward:
         raise InputError("give a prior for every parameter of the forward model, such as C10=uniform(0, 5).")
     for symbol, prior in {**forward, **error_priors}.items():
@@ -168,5 +211,3 @@ def _check_priors(
             raise InputError(f"the prior of {symbol} must be a prior such as tissuq.Uniform(0, 5), not {prior!r}.")
         if isinstance(prior, Flat):
             raise InputError(f"the prior of {symbol} is flat and improper; an expensive model needs a proper one.")
-    for parameter in error_parameters:
-        error_priors[parameter.symbol].within(parameter.support)

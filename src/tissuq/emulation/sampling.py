@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 
 SEARCH_POINTS, ROUND_POINTS, MAX_ROUNDS = 512, 1024, 8
 """Points of a search round; points of a sampling round, and the number of sampling rounds."""
+COMPONENTS, FITTED_POINTS, FIT_STEPS = 4, 1024, 12
+"""Gaussians of a proposal, points to which they are fitted, and the steps of the fit."""
 MIN_EFFECTIVE_POINTS = 800
 """Smallest effective number of points of a converged posterior."""
 MAX_POINT_WEIGHT = 0.02
@@ -148,16 +150,21 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
         adapted(partial(_log_target, candidate), size, SEARCH_POINTS).proposal for candidate in (exact, likelihood)
     ]
     cube = qmc.Sobol(size, rng=np.random.default_rng([seed, 43])).random(ROUND_POINTS * MAX_ROUNDS)
-    proposals: list[Proposal] = []
+    proposals: list[tuple[float, Proposal]] = []
     scores, targets, logs = np.zeros((0, size)), np.zeros(0), np.zeros(0)
     for number, uniforms in enumerate(np.split(np.clip(cube, 1e-12, 1 - 1e-12), MAX_ROUNDS)):
-        proposals.append(searched[number] if number < len(searched) else _moved(scores, logs))
-        new = proposals[-1].points(uniforms)
+        of_round = [(1.0, searched[number])] if number < len(searched) else _components(scores, logs)
+        ends = np.round(np.cumsum([share for share, _ in of_round]) * ROUND_POINTS).astype(int)
+        blocks = np.split(uniforms, ends[:-1])
+        new = np.concatenate([part.points(block) for (_, part), block in zip(of_round, blocks, strict=True)])
+        proposals += [
+            (len(block) / ROUND_POINTS, part) for (_, part), block in zip(of_round, blocks, strict=True) if len(block)
+        ]
         scores, targets = np.concatenate([scores, new]), np.concatenate([targets, _log_target(likelihood, new)])
         if not np.isfinite(targets).any():
             raise ConvergenceError("the measurements have no probability at any parameters that the priors allow.")
-        mixture = np.logaddexp.reduce([candidate.log_density(scores) for candidate in proposals], axis=0)
-        logs = targets - mixture + np.log(len(proposals))
+        mixture = np.logaddexp.reduce([np.log(share) + part.log_density(scores) for share, part in proposals], axis=0)
+        logs = targets - mixture + np.log(number + 1)
     return scores, logs
 
 
@@ -175,10 +182,40 @@ def _values(problem: Problem, scores: FloatArray) -> FloatArray:
     return np.column_stack([prior.quantile(ndtr(column)) for prior, column in zip(priors, scores.T, strict=True)])
 
 
-def _moved(scores: FloatArray, logs: FloatArray) -> Proposal:
-    """Return a proposal with the mean and the covariance of points with log weights (N,)."""
+def _components(scores: FloatArray, logs: FloatArray) -> list[tuple[float, Proposal]]:
+    """Return proposals with their shares: a mixture of Gaussians fitted to points (N, D) with log weights (N,).
+
+    The width of a discrepancy's amplitude and that of the parameters beside it grow together, which a single Gaussian
+    does not follow. The fit starts at slices of equal weight along one score after the other.
+    """
     weights = np.exp(logs - logs.max())
-    weights /= weights.sum()
+    points = scores[systematic(weights[None], FITTED_POINTS)[0]]
+    points = points + 1e-6 * points.std(axis=0) * np.random.default_rng(0).standard_normal(points.shape)
+    fits = []
+    for axis in range(points.shape[1]):
+        slices = np.argsort(np.argsort(points[:, axis])) * COMPONENTS // FITTED_POINTS
+        shares = np.eye(COMPONENTS)[:, slices]
+        for _ in range(FIT_STEPS):
+            parts = [_moved(points, share) for share in shares]
+            heights = np.array([
+                np.log(share.mean()) + _log_gaussian(part, points) for share, part in zip(shares, parts, strict=True)
+            ])  # fmt: skip
+            total = np.logaddexp.reduce(heights, axis=0)
+            shares = np.maximum(np.exp(heights - total), 1e-3)
+            shares /= shares.sum(axis=0)
+        fits.append((float(total.mean()), [(float(share.mean()), _moved(points, share)) for share in shares]))
+    return max(fits, key=lambda fit: fit[0])[1]
+
+
+def _log_gaussian(proposal: Proposal, points: FloatArray) -> FloatArray:
+    """Return the log density (N,) of the Gaussian with mean and root of a proposal, at points (N, D)."""
+    standard = np.asarray(np.linalg.solve(proposal.root, (points - proposal.mean).T).T, dtype=np.float64)
+    return np.asarray(log_normal(standard) - np.log(np.abs(np.diag(proposal.root))).sum())
+
+
+def _moved(scores: FloatArray, weights: FloatArray) -> Proposal:
+    """Return a proposal with the mean and the covariance of points (N, D) with weights (N,)."""
+    weights = weights / weights.sum()
     mean = weights @ scores
     centred = scores - mean
     covariance = (weights[:, None] * centred).T @ centred + 1e-12 * np.eye(len(mean))

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tissuq.emulation.emulator import Emulator
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.runs import EmulatorCheck
 
 if TYPE_CHECKING:
+    from tissuq.emulation.likelihood import Likelihood
     from tissuq.emulation.sampling import SampledPosterior
 
 __all__ = ["calibration_warnings"]
@@ -23,6 +26,10 @@ MAX_RMS_STANDARDISED = 1.5
 EDGE_WIDTH, MAX_EDGE_PROBABILITY = 0.01, 0.02
 """Width of an edge of the run plan, as a share of its own, and the largest posterior probability there without a
 warning."""
+MIN_MISFIT_PROBABILITY = 1e-4
+"""Probability of a misfit as large as that of the best parameters below which no parameters give the data."""
+MAX_SHARE_OUT_OF_REACH = 0.5
+"""Largest share of the measurements beyond all outputs of the runs without a warning."""
 MAX_SHARE_NEAR_FAILURES = 0.05
 """Largest share of the posterior nearer to a failed run than to any other without a warning."""
 DRAWS_NEAR_FAILURES = 400
@@ -50,6 +57,7 @@ def calibration_warnings(
     posterior: SampledPosterior,
     exact: SampledPosterior,
     emulator_share: Mapping[str, float],
+    likelihood: Likelihood,
 ) -> Iterator[str]:
     """Yield the warnings that a calibration carries, the gravest first.
 
@@ -63,9 +71,11 @@ def calibration_warnings(
         With the emulator's error, and as if it were exact.
     emulator_share : mapping of str to float
         Share of every parameter's posterior variance that is due to the emulator's error.
+    likelihood : Likelihood
     """
     if not posterior.converged:
         yield posterior.verdict
+    yield from _no_parameters_fit(problem, emulator, posterior, likelihood)
     if emulator.runs.failed.any():
         share = _share_near_failures(emulator, posterior)
         position = (
@@ -83,6 +93,33 @@ def calibration_warnings(
             "data, decides. Give a wider prior, unless the bound is intended."
         )
     yield DISCREPANCY_WARNINGS[problem.discrepancy.name]
+
+
+def _no_parameters_fit(
+    problem: Problem, emulator: Emulator, posterior: SampledPosterior, likelihood: Likelihood
+) -> Iterator[str]:
+    """Yield a warning where the measurements cannot be what the model gives at any parameters, beyond all errors."""
+    from scipy.special import gammaincc
+
+    draws = posterior.thinned(DRAWS_NEAR_FAILURES)
+    misfits = likelihood.misfits(draws)
+    best, size = draws[int(misfits.argmin())], len(problem.measured)
+    outputs = emulator.runs.good[1]
+    is_out = (problem.measured < outputs.min(axis=0)) | (problem.measured > outputs.max(axis=0))
+    if gammaincc(0.5 * size, 0.5 * misfits.min()) > MIN_MISFIT_PROBABILITY and is_out.mean() <= MAX_SHARE_OUT_OF_REACH:
+        return
+    values = best[: len(problem.forward_symbols)]
+    predicted = emulator.moments(values[None])[0][0]
+    worst = int(np.argmax(np.abs(problem.measured - predicted)))
+    named = ", ".join(f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, values, strict=True))
+    yield (
+        f"no parameters that the priors allow give the measurements: at the best ({named}) they are "
+        f"{np.sqrt(misfits.min() / size):.1f} standard deviations of noise, discrepancy and emulator away (root mean "
+        f"square; 1 is right), most at the control {problem.control[worst]:.4g}: measured "
+        f"{problem.measured[worst]:.4g}, model {predicted[worst]:.4g}. {is_out.sum()} of {size} measurements are "
+        "beyond the outputs of all runs. Check the units of data and model, give wider priors, or allow for a wrong "
+        "model (discrepancy gp-pinned)."
+    )
 
 
 def _emulator_warnings(

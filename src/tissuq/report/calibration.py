@@ -14,9 +14,11 @@ from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import BAND, BASE, INK, new_figure
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
+from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
 from tissuq.report.tables import Row, interval, significant, write_csv, write_json
 from tissuq.studies.calibration import CalibrationStudy, Measured
+from tissuq.studies.earlier_run import POSTERIORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,6 +60,9 @@ def write_calibration_run(
     write_recipe(folder, command, study.settings.model_copy(update=relocated))
     _write_tables(study, folder)
     calibration.save(folder / "calibration.nc")
+    if study.posterior is not None:
+        (folder / POSTERIORS).mkdir()
+        study.posterior.save(folder / POSTERIORS / f"{NoDiscrepancy.name}.nc")
     if figures:
         drawn = {
             "band": band_figure(calibration, study.data),
@@ -97,6 +102,12 @@ def _write_tables(study: CalibrationStudy, folder: Path) -> None:
     for suffix, band in bands.items():
         table |= {f"{name}{suffix}": band[name].to_numpy() for name in ("mean", "low", "high")}
     write_csv(folder / "prediction.csv", _rows(table))
+    left_out, sensitivity = calibration.leave_one_out, calibration.sensitivity.reset_index()
+    for name, frame in (("leave_one_out", left_out), ("sensitivity", sensitivity)):
+        write_csv(
+            folder / f"{name}.csv",
+            [dict(zip(frame.columns, row, strict=True)) for row in frame.itertuples(index=False)],
+        )
     runs = calibration.runs
     parameters = dict(zip(runs.symbols, runs.points.T, strict=True))
     outputs = {f"output_{number}": column for number, column in enumerate(runs.outputs.T, 1)}
@@ -104,6 +115,18 @@ def _write_tables(study: CalibrationStudy, folder: Path) -> None:
         {**row, "error": error}
         for row, error in zip(_rows(parameters | {"seconds": runs.seconds} | outputs), runs.errors, strict=True)
     ])  # fmt: skip
+
+
+WORST_RUNS = 8
+"""Rows of the page's table of runs that were left out."""
+
+
+def _worst_runs(calibration: Calibration) -> list[list[str]]:
+    """Return the worst rows of `Calibration.leave_one_out` as text."""
+    return [
+        [*(f"{value:.4g}" for value in row[:-3]), f"{row[-3]:.2g}", f"{row[-2]:.2g}", f"{row[-1]:.1f}"]
+        for row in calibration.leave_one_out.to_numpy()[:WORST_RUNS]
+    ]
 
 
 def _rows(columns: dict[str, Any]) -> list[Row]:
@@ -145,6 +168,12 @@ def _context(study: CalibrationStudy) -> dict[str, Any]:
         "measurements": len(study.data.control),
         "check": calibration.check,
         "held_out": calibration.held_out,
+        "left_out": _worst_runs(calibration),
+        "sensitivity": [
+            [str(symbol), f"{100 * first:.0f} %", f"{100 * total:.0f} %"]
+            for symbol, first, total in calibration.sensitivity.itertuples()
+        ],
+        "material": "" if study.posterior is None else study.posterior.model.material.name,
         "runs": len(runs),
         "seconds_a_run": significant(float(np.median(runs.seconds))),
         "seconds": f"{study.seconds:.0f}",

@@ -34,13 +34,13 @@ FloatArray = NDArray[np.float64]
 
 
 def calibrate(
-    control: ArrayLike,
-    measured: ArrayLike,
+    control: ArrayLike | Mapping[str, ArrayLike],
+    measured: ArrayLike | Mapping[str, ArrayLike],
     forward: Forward | Callable[..., Any],
     priors: Mapping[str, Prior],
     *,
     discrepancy: str | Discrepancy = "none",
-    noise_sd: float | str = "unknown",
+    noise_sd: float | str | Mapping[str, float | str] = "unknown",
     zero_load: float = 0.0,
     emulator: Emulator | None = None,
     workers: int = 1,
@@ -55,20 +55,22 @@ def calibrate(
 
     Parameters
     ----------
-    control : (n,) array
-        What was set in the experiment, such as depths; in the model's units, like everything here.
-    measured : (n,) array
-        What was measured there, such as forces.
+    control : (n,) array, or mapping of str to array
+        What was set in the experiment, such as depths; in the model's units, like everything here. Where several
+        quantities or experiments tell of the same parameters, one array for each by its name.
+    measured : (n,) array, or mapping of str to array
+        What was measured there, such as forces; of several quantities each has a noise and a discrepancy of its own.
     forward : callable or Forward
         ``forward(parameters)`` or ``forward(parameters, control)``, with a dictionary of parameters by name: returns n
-        outputs. Or a `tissuq.UmbridgeForward`.
+        outputs; with several quantities control and outputs are dictionaries by their names. Or a
+        `tissuq.UmbridgeForward`.
     priors : mapping of str to Prior
         Of every parameter of the model: together they say where it is run. And, to replace the usual ones, of the
         discrepancy's ``c`` and ``psi`` and of ``noise_sd``.
     discrepancy : str
         ``"none"``, ``"gp"``, or ``"gp-pinned"``: zero with its slope at zero load, which leaves the initial stiffness
         to the parameters.
-    noise_sd : float or ``"unknown"``
+    noise_sd : float or ``"unknown"``, or mapping of str to them
         Standard deviation of the noise.
     zero_load : float
         The control at zero load.
@@ -119,7 +121,7 @@ def calibrate(
     selected = EmulationSettings(**choices)
     if emulator is not None and not selected.refine:
         return calibrated(problem, _no_runs, selected, emulator)
-    model = as_forward(forward)
+    model = as_forward(forward).of_quantities(problem.quantities)
     model.check(problem.forward_symbols)
     with runs_of(model, problem, folder, workers, step) as run:
         return calibrated(problem, run, selected, emulator)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -15,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from tissuq.emulation import Calibration, FileForward, UmbridgeForward
 from tissuq.emulation.forward import Forward
-from tissuq.emulation.kriging import Kernel, Trend
+from tissuq.emulation.length_scales import Kernel, Trend
+from tissuq.emulation.material_posterior import check_material
 from tissuq.emulation.problem import Method
 from tissuq.emulation.runs import PointSet
 from tissuq.errors import InputError
@@ -23,12 +25,18 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
 from tissuq.parameters.priors import Prior, prior_from
 from tissuq.parameters.seeds import MAX_SEED
+from tissuq.posterior.posterior import Posterior
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.stream import Step, silent
 
 __all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
 
 FloatArray = NDArray[np.float64]
+
+
+NUMBER = r"\d+\.?\d*"
+RANGE = re.compile(rf"{NUMBER}:{NUMBER}")
+"""Smallest and largest stretch."""
 
 
 class CalibrationSettings(BaseModel):
@@ -55,6 +63,10 @@ class CalibrationSettings(BaseModel):
     kernel: Kernel = "squared-exponential"
     trend: Trend = "linear"
     method: Method = "auto"
+    material: str | None = None
+    range: str | None = None
+    mode: str = "uniaxial"
+    unit: str = "MPa"
     seed: int = Field(0, ge=0, le=MAX_SEED)
 
     @field_validator("noise_sd", mode="before")
@@ -71,7 +83,18 @@ class CalibrationSettings(BaseModel):
     def _one_model(self) -> Self:
         if (self.forward is None) == (self.umbridge is None):
             raise ValueError("give one forward model: a function in a file (forward) or a server (umbridge), not both")
+        if (self.material is None) != (self.range is None):
+            raise ValueError("material and range belong together: the law of the forward model, and its stretches, "
+                             "such as 0.7:1.3")  # fmt: skip
+        if self.range is not None and not RANGE.fullmatch(self.range):
+            raise ValueError(f"range must be the smallest and the largest stretch, such as 0.7:1.3, not {self.range!r}")
         return self
+
+    @property
+    def stretches(self) -> tuple[float, float]:
+        """The smallest and the largest stretch in the forward model."""
+        low, high = str(self.range).split(":")
+        return float(low), float(high)
 
     @property
     def forward_model(self) -> Forward:
@@ -102,6 +125,8 @@ class CalibrationStudy:
     data: Measured
     calibration: Calibration
     seconds: float
+    posterior: Posterior | None = None
+    """That of the material in the forward model, where one is named."""
 
     @property
     def warnings(self) -> list[str]:
@@ -136,6 +161,8 @@ def run_calibration(
     InputError, ModelError, ConvergenceError
         When file, settings or model cannot be used.
     """
+    if settings.material is not None:
+        check_material(settings.material, settings.parameter_priors, settings.unit)
     data = _read(settings, folder)
     start = perf_counter()
     names = ("discrepancy", "noise_sd", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
@@ -149,7 +176,12 @@ def run_calibration(
         step=step,
         **{name: getattr(settings, name) for name in names},
     )
-    return CalibrationStudy(settings, data, calibration, perf_counter() - start)
+    posterior = None
+    if settings.material is not None:
+        posterior = calibration.posterior_of(
+            settings.material, settings.stretches, mode=settings.mode, unit=settings.unit
+        )
+    return CalibrationStudy(settings, data, calibration, perf_counter() - start, posterior)
 
 
 def _read(settings: CalibrationSettings, folder: Path) -> Measured:

@@ -1,0 +1,137 @@
+"""The posterior of a material whose parameters a forward model was calibrated for: one as `tissuq.fit` gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tissuq.errors import InputError
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.units import stress_unit
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.inference.marginal import Marginal
+from tissuq.inference.solution import Diagnostics, Marginals, Solution
+from tissuq.mechanics import Material, engineering_stress, material_named
+from tissuq.model.discrepancy import NoDiscrepancy
+from tissuq.model.noise import KnownNoise
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.parameters.priors import Prior
+from tissuq.posterior.posterior import Posterior
+from tissuq.posterior.solver import Solver
+
+if TYPE_CHECKING:
+    from tissuq.emulation.calibration import Calibration
+
+__all__ = ["check_material", "material_posterior"]
+
+POINTS = 20
+"""Number of stretches that stand for the range."""
+NOISE_SHARE = 1e-6
+"""Noise of these over their largest stress: no stress was measured."""
+
+
+def material_posterior(
+    calibration: Calibration,
+    material: str | Material,
+    stretch: tuple[float, float],
+    *,
+    mode: str | LoadingMode = "uniaxial",
+    unit: str = "MPa",
+) -> Posterior:
+    """Return the draws of a calibration as the posterior of a material, without discrepancy.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    material : str or Material
+        The law in the forward model, whose parameters are all among the calibrated ones.
+    stretch : (float, float)
+        Smallest and largest stretch in the forward model: the range in which the material counts as calibrated.
+    mode : str or LoadingMode
+        The loading mode of that range; of one control.
+    unit : str
+        Unit of stress of the forward model's parameters.
+
+    Raises
+    ------
+    InputError
+        When a parameter of the material was not calibrated, or has a prior beyond its support, or the range is none.
+    """
+    law, priors = check_material(material, calibration.problem.forward_priors, unit)
+    loading, factor = loading_mode(mode), stress_unit(unit).to_mpa
+    if len(loading.controls) != 1:
+        raise InputError(f"the mode '{loading.name}' has several controls: give the range in one with one control.")
+    low, high = map(float, stretch)
+    if not 0 < low < high:
+        raise InputError(f"the range of the stretch must be two rising positive numbers, not {low:g}:{high:g}.")
+    symbols = list(priors)
+    factors = {parameter.symbol: factor if parameter.unit else 1.0 for parameter in law.parameters}
+    columns = [calibration.problem.symbols.index(symbol) for symbol in symbols]
+    sampled = calibration.posterior
+    draws = sampled.draws[:, :, columns] * np.array([factors[symbol] for symbol in symbols])
+    chains, count, _ = draws.shape
+    points = np.linspace(low, high, POINTS)
+    points = points[np.abs(points - 1) > 1e-9]
+    mean = engineering_stress(law, loading.paths[0], points, draws.reshape(chains * count, -1)).mean(axis=0)
+    experiment = Experiment(loading, points, mean).labelled(
+        name="calibration", source="mean of a calibration of a forward model: nothing was measured", stress_unit=unit
+    )
+    noise = KnownNoise(float(NOISE_SHARE * np.abs(mean).max()))
+    model = StatisticalModel(experiment, law, NoDiscrepancy(), noise, priors)
+    by_symbol = {symbol: draws[:, :, k].ravel() for k, symbol in enumerate(symbols)}
+    settings, linear = (
+        np.array([by_symbol[symbol] for symbol in group]).reshape(-1, chains * count).T
+        for group in (model.nonlinear, model.linear)
+    )
+    mixture = GaussianMixture.of_points(np.full(chains * count, 1 / (chains * count)), settings, linear)
+    marginals = {symbol: _scaled(sampled.marginals[symbol], factors[symbol]) for symbol in symbols}
+    ess = {symbol: float(sampled.ess[symbol]) for symbol in symbols}
+    rhat = {symbol: float(sampled.rhat.get(symbol, np.nan)) for symbol in symbols}
+    solution = Solution(
+        model,
+        "calibration",
+        f"the parameters of a forward model that was calibrated on {len(calibration.problem.measured)} measurements "
+        f"through an emulator of {len(calibration.runs)} runs",
+        lambda: mixture,
+        Marginals.of(model, lambda symbol: marginals[symbol]),
+        seed=calibration.seed,
+        sampled=linear.reshape(chains, count, -1),
+        diagnostics=Diagnostics(sampled.converged, sampled.verdict, rhat, ess, ess),
+        is_of_data=False,
+    )
+    return Posterior(solution, Solver(seed=calibration.seed))
+
+
+def check_material(
+    material: str | Material, priors: Mapping[str, Prior], unit: str
+) -> tuple[Material, dict[str, Prior]]:
+    """Return a material and the priors of its parameters in MPa, from those of a forward model's parameters.
+
+    Raises
+    ------
+    InputError, ModelError
+        When there is no such material or unit, a parameter has no prior, or one beyond its support.
+    """
+    law, factor = material_named(material), stress_unit(unit).to_mpa
+    symbols = [parameter.symbol for parameter in law.parameters]
+    if missing := [symbol for symbol in symbols if symbol not in priors]:
+        raise InputError(
+            f"the material {law.name} has the parameters {', '.join(symbols)}, and the forward model was calibrated "
+            f"without {', '.join(missing)} (its parameters: {', '.join(priors)})."
+        )
+    in_mpa = {
+        parameter.symbol: priors[parameter.symbol].scaled(factor if parameter.unit else 1.0)
+        for parameter in law.parameters
+    }
+    for parameter in law.parameters:
+        in_mpa[parameter.symbol].within(parameter.support)
+    return law, in_mpa
+
+
+def _scaled(marginal: Marginal, factor: float) -> Marginal:
+    """Return the marginal of a parameter in a unit ``factor`` times smaller."""
+    table = marginal.points * factor, marginal.density / factor, marginal.cumulative
+    return Marginal(marginal.mean * factor, marginal.sd * factor, *table)
