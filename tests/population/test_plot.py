@@ -20,7 +20,7 @@ def test_every_specimen_is_a_row_with_its_intervals_in_the_unit_of_the_measureme
     axis = population.plot(given)
     assert axis is given
     assert plt.get_fignums() == [figure.number]
-    table = population.specimen_summary().xs("C10", level="parameter").sort_values("median")
+    table = population.specimen_summary(unit="MPa").xs("C10", level="parameter").sort_values("median")
     assert [label.get_text() for label in axis.get_yticklabels()] == list(table.index)
     bars = [line.get_xdata() for line in axis.lines if line.get_marker() == "None"]
     ends = [table[[f"{prefix}hdi_low", f"{prefix}hdi_high"]].to_numpy() for prefix in ("alone_", "")]
@@ -31,7 +31,7 @@ def test_every_specimen_is_a_row_with_its_intervals_in_the_unit_of_the_measureme
 
 def test_a_notebook_shows_the_population_in_the_unit_of_the_measurements(population):
     page = population._repr_html_()
-    summary = population.summary()["median"]
+    summary = population.summary(unit="MPa")["median"]
     assert "stresses in kPa" in page
     assert f"<td>{1000 * summary['C10', 'median']:.4g}</td>" in page
     assert f"<td>{summary['C10', 'spread']:.4g}</td>" in page  # sd of a logarithm
