@@ -237,7 +237,7 @@ def export(
     CardSettings(**settings)
     posterior = load(run, discrepancy, own_law(material))
     ensemble = posterior.ensemble(draws, seed, cast("Sampling", sampling), admissible=not all_draws)
-    source = f"run {run.resolve().name} of tissuq fit, {sampling} draws from seed {seed}"
+    source = f"run {run.resolve().name} of tissuq, {sampling} draws from seed {seed}"
     cards = write_cards(ensemble, target, format, force=force, source=source, **settings)
     print_explanations(cards.warnings)
     files, distances = list(cards.files), [row["from_median"] for row in cards.index]
