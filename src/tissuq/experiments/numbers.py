@@ -25,7 +25,7 @@ GROUPED = {
 MEAN_WITH_SPREAD = re.compile(rf"({NUMBER.pattern})\s*(?:±|\+/?[-−])\s*({NUMBER.pattern})")
 CROSS = r"\s*[x×*X]\s*"
 """Between the sides of something."""
-SIDE = rf"{NUMBER.pattern}\s*(?:[^\W\dxX×_]+)?"
+SIDE = rf"{NUMBER.pattern}(?:\s*[^\W\dxX×_]+)?"
 PRODUCT = re.compile(rf"{SIDE}(?:{CROSS}{SIDE})+")
 """Two sides or more, as in ``5 x 2 mm``."""
 
