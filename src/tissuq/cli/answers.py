@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -167,5 +167,9 @@ def _values(name: str) -> list[str]:
     from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
     from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 
-    choices = {"mode": loading_modes(), "strain-type": STRAIN_MEASURES, "stress-type": STRESS_MEASURES}
+    choices: dict[str, Iterable[str]] = {
+        "mode": loading_modes(),
+        "strain-type": STRAIN_MEASURES,
+        "stress-type": STRESS_MEASURES,
+    }
     return list(choices[name])
