@@ -111,7 +111,7 @@ def test_input_that_ends_or_is_wrong_says_so_and_writes_nothing(negative):
 
 def test_answers_are_the_options_of_a_message():
     message = (
-        "Leave zero (--zero) out, give --zero '0 mm' or --column stress=NAME (or force=), --strain-type, or --loud 3."
+        "Leave zero (--zero) out. Give --zero '0 mm' or --column stress=NAME (or force=), --strain-type, or --loud 3."
     )
     texts = [answer.text for answer in answers_in(message, ["A b", "C"], {"zero": "first"})]
     columns = [f"--column {role}" for role in ("'stress=A b'", "stress=C", "'force=A b'", "force=C")]
@@ -120,6 +120,10 @@ def test_answers_are_the_options_of_a_message():
     assert [answer.text for answer in answers_in('(--width "5 mm" --thickness "2 mm")', [], {})] == [
         "--width --thickness"
     ]
+    texts = [answer.text for answer in answers_in("Give --mode for another, or leave --length out.", [], {})]
+    assert texts == [f"--mode {name}" for name in tq.loading_modes()]
+    (out,) = answers_in("Leave --length out.", [], {"dimensions": {"length": "2 mm"}})
+    assert out.leaves_out == "length"
     with pytest.raises(InputError, match="cannot be understood"):
         options_in("--length '20")
 

@@ -104,6 +104,21 @@ def test_both_loads_of_a_sheet_are_turned(tmp_path):
     np.testing.assert_allclose(tq.read(path, turn="load").stress, np.column_stack([stress, stress]), atol=1e-9)
     with pytest.raises(InputError, match=r"turn='load' \(--turn load\)"):
         tq.read(path, compression_positive=True)
+    path.write_text("\n".join(line.replace("-", "", 1) for line in path.read_text().splitlines()))
+    with pytest.raises(InputError, match="The other axis has the right sign: change that of this column in the file"):
+        tq.read(path)
+
+
+def test_positions_whose_load_does_not_begin_at_zero_are_read_by_the_zero_of_the_load(tmp_path):
+    stress = neo_hookean(TENSION)
+    path = tmp_path / "test.csv"
+    columns = 35 + LENGTH * (TENSION - 1), AREA * (stress + 0.01)
+    path.write_text("\n".join(["Position (mm),Force (N)", *map("{:.9f},{:.9f}".format, *columns)]))
+    with pytest.raises(InputError, match="--load-zero first"):
+        tq.read(path, dimensions=SIZES)
+    data = tq.read(path, dimensions=SIZES, load_zero="first")
+    np.testing.assert_allclose(data.stretch, TENSION, atol=1e-8)
+    np.testing.assert_allclose(data.stress, stress, atol=1e-8)
 
 
 def test_negative_numbers_of_a_test_that_is_called_tension_are_asked_about(tmp_path):

@@ -67,6 +67,24 @@ def test_cells_that_span_columns_keep_the_others_in_their_places(tmp_path):
     check(path)
 
 
+def test_tables_of_a_page_are_tests_each(tmp_path):
+    rows = "".join(f"<tr><td>{s!r}<td>{p!r}" for s, p in zip(L.tolist(), P.tolist(), strict=True))
+    table = f"<table><tr><th>Stretch<th>Stress (kPa)</tr>{rows}</table>"
+    path = tmp_path / "export.xls"
+    path.write_text(f"<!-- exported --><html><body>{table}{table}</body></html>", encoding="utf-8")
+    tests = tq.read_tests(path)
+    assert len(tests) == 2
+    for test in tests:
+        np.testing.assert_allclose(test.stress, 1e-3 * P, rtol=1e-9, atol=1e-12)
+
+
+def test_other_kinds_of_xml_are_named(tmp_path):
+    path = tmp_path / "export.xls"
+    path.write_text('<?xml version="1.0"?><Workbook></Workbook>', encoding="utf-8")
+    with pytest.raises(InputError, match=r"an XML document.* save it as \.xlsx"):
+        tq.read(path)
+
+
 @pytest.mark.parametrize(
     ("unit", "newtons"),
     [("cN", 1e-2), ("dN", 0.1), ("daN", 10), ("hN", 100), ("nN", 1e-9), ("pN", 1e-12), ("10^-3 N", 1e-3)],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,10 @@ OPTION = re.compile(r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?
 OTHER_ROLES = re.compile(r"\(or ((?:\w+=(?:, | or )?)+)\)")
 """As in ``--column stress=NAME (or force=)``."""
 PLACEHOLDERS = ("NAME", "NUMBER")
-TYPES = ("strain-type", "stress-type")
+WORDS = frozenset(["out", "for", "or", "and", "if", "to", "with", "instead", "once"])
+"""What may follow an option in a sentence, and is no value."""
+CHOICES = ("mode", "strain-type", "stress-type")
+"""Options of which there is a list of values."""
 
 
 @dataclass(frozen=True)
@@ -76,18 +79,20 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
         if _setting(name) not in {*OPTIONS, "mode"}:
             continue
         value = "" if name in SWITCHES else "".join(shlex.split(value)) if value.count("'") % 2 == 0 else value
+        value = "" if value in WORDS else value
         is_joined = match.start() == end + 1 and found and not found[-1].leaves_out
         end = match.start() + len(f"--{name}") if name in SWITCHES else match.end()
-        if not value and settings.get(_setting(name)) is not None:
-            found.append(Answer(((f"--{name}", ""),), _setting(name)))
+        if not value and "eave" in message[: match.start()].rpartition(". ")[2]:
+            if {**settings, **(settings.get("dimensions") or {})}.get(_setting(name)) is not None:
+                found.append(Answer(((f"--{name}", ""),), _setting(name)))
         elif name == "column":
             roles = [value.partition("=")[0], *_other_roles(message[match.end() :])]
             names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
             pairs = [f"{role}={column}" for role in roles for column in names] if names else [value]
             found += [Answer((("column", pair),)) for pair in pairs]
-        elif name in TYPES and not value:
-            found += [Answer(((name, measure),)) for measure in _measures(name)]
-        elif value or name in SWITCHES:
+        elif name in CHOICES and not value:
+            found += [Answer(((name, choice),)) for choice in _values(name)]
+        elif value or name in SWITCHES or name in DIMENSIONS:
             if is_joined:
                 found[-1] = Answer((*found[-1].options, (name, value)))
             else:
@@ -127,7 +132,9 @@ def options_in(text: str) -> tuple[tuple[str, str], ...]:
 def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
     """Return settings of reading with those of an answer, added to columns, sizes and rows that are given already."""
     if answer.leaves_out:
-        return {**settings, answer.leaves_out: None}
+        sizes = {name: size for name, size in (settings.get("dimensions") or {}).items() if name != answer.leaves_out}
+        kept = {name: value for name, value in settings.items() if name != answer.leaves_out}
+        return {**kept, "dimensions": sizes or None}
     values: dict[str, Any] = dict.fromkeys(OPTIONS)
     mode = settings.get("mode")
     for name, value in answer.options:
@@ -155,8 +162,14 @@ def _other_roles(text: str) -> list[str]:
     return re.findall(r"(\w+)=", match[1]) if match else []
 
 
-def _measures(name: str) -> list[str]:
+def _values(name: str) -> list[str]:
+    from tissuq.experiments.modes import loading_modes
     from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
     from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 
-    return list(STRAIN_MEASURES if name == "strain-type" else STRESS_MEASURES)
+    choices: dict[str, Iterable[str]] = {
+        "mode": loading_modes(),
+        "strain-type": STRAIN_MEASURES,
+        "stress-type": STRESS_MEASURES,
+    }
+    return list(choices[name])

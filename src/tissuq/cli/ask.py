@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.cli.answers import Answer, answers_in, options_in, with_options
 from tissuq.cli.reading import find_tests
-from tissuq.errors import InputError
+from tissuq.errors import InputError, TissuqError
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -94,7 +94,10 @@ def _chosen(
     if now is not None:
         is_read = {answer: text for answer, text in given.items() if not text.startswith(REFUSED)}
         given = is_read or given
-    listed = [answer for answer in given if given[answer]][:MOST_ANSWERS] or answers[:MOST_ANSWERS]
+    helpful = sorted(
+        (answer for answer in given if given[answer]), key=lambda answer: given[answer].startswith(REFUSED)
+    )
+    listed = (helpful or answers)[:MOST_ANSWERS]
     if now is not None:
         print(f"  Enter  leave it: {_in_words(now)}")
     for number, answer in enumerate(listed, start=1):
@@ -110,7 +113,7 @@ def _chosen(
             if typed.startswith("--"):
                 return with_options(settings, Answer(options_in(typed)))
             print(f"Type a number from 1 to {len(listed)}, or options such as --length '20 mm'.")
-        except InputError as error:
+        except TissuqError as error:
             print(error)
 
 
@@ -122,7 +125,7 @@ def _what_it_gives(
         return "a size, to type with its unit"
     try:
         return _in_words(find_tests(file, with_options(settings, answer), is_only_file=is_only_file))
-    except InputError as refusal:
+    except TissuqError as refusal:
         if str(refusal) == question:
             return ""
         words = str(refusal).removeprefix(f"{file}").lstrip(":, ")

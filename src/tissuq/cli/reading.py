@@ -225,10 +225,10 @@ def measured(
     modes: Sequence[str] | None,
     specimens: Sequence[str] | None,
     noise_sd: str | None,
-) -> tuple[dict[str, Any], list[Reading]]:
+) -> tuple[dict[str, Any], list[Reading | None]]:
     """Return the settings of a fit that say what was measured: of the only test, or of each of several.
 
-    And what has been read of every test.
+    And what has been read of every test; None where it is to be read in another mode than it was found in.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def measured(
         for option, stated in (("--mode", modes), ("--specimen", specimens), ("--noise-sd", noise)):
             if stated and len(stated) > 1:
                 raise InputError(f"{option} is given {len(stated)} times for one test; give it once.")
-        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, found
+        return reading | tests[0] | {"noise_sd": noise[0] if noise else None}, list(found)
     if len(tests) > len(files):
         print(*lines_of_tests(list(map(Inspection.of, found))), "", sep="\n")
     stated_noise = noise if noise and len(noise) > 1 else None
@@ -266,7 +266,9 @@ def measured(
             f"neither '{silent}' nor its name says in which loading mode it was measured: give --mode once for each "
             f"file, in their order ({', '.join(loading_modes())})."
         )
-    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}, found
+    pairs = zip(tests, found, strict=True)
+    as_found = [of_test if of_test.experiment.mode.name == test["mode"] else None for test, of_test in pairs]
+    return {"tests": tests, "noise_sd": noise[0] if noise and len(noise) == 1 else None}, as_found
 
 
 def _modes(files: Sequence[Path], modes: Sequence[str] | None) -> Sequence[str | None]:

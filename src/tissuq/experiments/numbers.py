@@ -29,7 +29,7 @@ MARKED = re.compile(r"(?<![\w.,'’])([+-]?\d{1,3})((?:[\u00a0\u202f\u2009'’]\
 MARKS = re.compile("[\u00a0\u202f\u2009'’]")
 CROSS = r"\s*[x×*X]\s*"
 """Between the sides of something."""
-SIDE = rf"{NUMBER.pattern}\s*(?:[^\W\dxX×_]+)?"
+SIDE = rf"{NUMBER.pattern}(?:\s*[^\W\dxX×_]+)?"
 PRODUCT = re.compile(rf"{SIDE}(?:{CROSS}{SIDE})+")
 """Two sides or more, as in ``5 x 2 mm``."""
 

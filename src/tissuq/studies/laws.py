@@ -94,7 +94,7 @@ def run_laws(
     folder: Path = Path(),
     step: Callable[[str], None] = lambda text: None,
     own: Mapping[str, Material] | None = None,
-    found: Sequence[Reading] = (),
+    found: Sequence[Reading | None] = (),
 ) -> LawStudy:
     """Read the file, or those of several tests, and fit every chosen law.
 

@@ -104,7 +104,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
             raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
         return self
 
-    def readings(self, folder: Path = Path(), found: Sequence[Reading] = ()) -> list[Reading]:
+    def readings(self, folder: Path = Path(), found: Sequence[Reading | None] = ()) -> list[Reading]:
         """Return what is read from the file, or those of all tests, unless that is found."""
         tests = self.tests or (self,)
         of_tests = found or repeat(None, len(tests))
@@ -195,7 +195,7 @@ def run_specimen(
     folder: Path = Path(),
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
-    found: Sequence[Reading] = (),
+    found: Sequence[Reading | None] = (),
 ) -> SpecimenStudy:
     """Read the file, or those of several tests, and fit the material with every chosen discrepancy.
 

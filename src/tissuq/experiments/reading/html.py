@@ -10,7 +10,7 @@ from tissuq.experiments.reading.text_file import read_lines
 
 __all__ = ["Html"]
 
-BEGINNINGS = (b"<html", b"<!doctype html", b"<table", b"<meta", b"<head", b"<body")
+BEGINNINGS = (b"<html", b"<!doctype html", b"<table", b"<meta", b"<head", b"<body", b"<!--")
 BYTE_ORDER_MARKS = b"\xef\xbb\xbf\xff\xfe"
 """Their bytes."""
 UNSEEN = frozenset(["script", "style", "title"])
@@ -30,13 +30,14 @@ class Html(FileFormat):
 
     @classmethod
     def recognises(cls, path: str | os.PathLike[str], start: bytes) -> bool:
-        return start.lstrip(BYTE_ORDER_MARKS).replace(b"\0", b"").lstrip().lower().startswith(BEGINNINGS)
+        text = start.lstrip(BYTE_ORDER_MARKS).replace(b"\0", b"").lstrip().lower()
+        return text.startswith(BEGINNINGS) or (text.startswith(b"<?xml") and b"html" in text)
 
     def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
         page = _Page()
         page.feed("\n".join(read_lines(path)))
         page.close()
-        return {"page": [line_of(cells) for cells in page.rows if any(cells)]}
+        return {"page": [line_of(cells) for cells in page.rows if cells]}
 
 
 class _Page(HTMLParser):
@@ -57,18 +58,18 @@ class _Page(HTMLParser):
             self.rows[-1].append("")
             span = dict(attrs).get("colspan") or ""
             self._empty_after = min(int(span), MOST_SPANNED) - 1 if span.isdecimal() and int(span) else 0
-        elif tag == "tr" or (tag in LINES and not self._is_in_cell):
+        elif tag in ("tr", "table") or (tag in LINES and not self._is_in_cell):
             self._end_cell()
-            self.rows.append([])
+            self._begin_line(tag)
 
     def handle_endtag(self, tag: str) -> None:
         if tag in UNSEEN:
             self._unseen = max(0, self._unseen - 1)
         elif tag in CELLS:
             self._end_cell()
-        elif tag == "tr" or (tag in LINES and not self._is_in_cell):
+        elif tag in ("tr", "table") or (tag in LINES and not self._is_in_cell):
             self._end_cell()
-            self.rows.append([])
+            self._begin_line(tag)
 
     def handle_data(self, data: str) -> None:
         text = " ".join(data.split())
@@ -79,6 +80,10 @@ class _Page(HTMLParser):
             row[-1] = f"{row[-1]} {text}".strip()
         else:
             row.append(text)
+
+    def _begin_line(self, tag: str) -> None:
+        """Begin a line, after a blank one where a table begins or ends."""
+        self.rows += [[""], []] if tag == "table" else [[]]
 
     def _end_cell(self) -> None:
         """Add the empty cells that the last one spans."""

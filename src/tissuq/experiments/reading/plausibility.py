@@ -28,10 +28,12 @@ DOUBTFUL_STRAIN = 1.0
 RATIO_ASSUMED = "(a plain ratio assumed: the file states no unit)"
 COMPRESSED_LIMIT = 0.5
 """Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
-TURN_ONE = (
+TURN_ALL = (
     "If the machine counts so, give turn='load' (--turn load); if the deformations have the wrong sign, "
     "turn='deformation' (--turn deformation). Or check which columns are read."
 )
+TURN_ONE = "The other axis has the right sign: change that of this column in the file, or check which columns are read."
+"""What to do about wrong signs on both axes, and on one."""
 NOTABLE_SHARE = 0.1
 """Share of the largest stretch change and stress that rows must reach for their sign to matter."""
 
@@ -72,8 +74,11 @@ def _check_work(measured: MeasuredRows, choices: Sequence[ColumnChoice], compres
     if not len(alike):
         return
     clear = measured.taken(alike)
-    for choice, stretch, stress in zip(choices, clear.stretch, clear.stress, strict=True):
-        _check_signs(clear.table, choice, stretch, stress, compression_positive, is_only=len(choices) == 1)
+    axes = list(zip(choices, clear.stretch, clear.stress, strict=True))
+    are_wrong = [_wrong_sign(stretch, stress, stretch != 1) is not None for _, stretch, stress in axes]
+    advice = "" if len(axes) == 1 else TURN_ALL if all(are_wrong) else TURN_ONE
+    for axis in axes:
+        _check_signs(clear.table, *axis, compression_positive, advice)
 
 
 def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Column, has_unit: bool) -> None:
@@ -118,7 +123,7 @@ def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
 
 
 def _check_signs(
-    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool, *, is_only: bool
+    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool, advice: str
 ) -> None:
     row = _wrong_sign(stretch, stress, stretch < 1)
     if row is not None:
@@ -128,8 +133,8 @@ def _check_signs(
                 f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
                 "(--compression-positive)."
             )
-        if not is_only:
-            raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {TURN_ONE}")
+        if advice:
+            raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {advice}")
         other = "; if the column of stretches holds strain, give it as strain"
         if choice.measure in ("strain", "displacement"):
             other = (
@@ -143,15 +148,13 @@ def _check_signs(
         )
     row = _wrong_sign(stretch, stress, stretch > 1)
     if row is not None:
-        advice = "If the machine counts so, give turn='load' (--turn load), or check which columns are read."
-        if not is_only:
-            advice = TURN_ONE
-        elif choice.measure in ("strain", "displacement"):
+        if not advice and choice.measure in ("strain", "displacement"):
             advice = (
                 f"If this is compression, whose {choice.measure} the machine counts as positive, give "
                 "compression_positive=True (--compression-positive); if it is tension, turn the sign of "
                 f"the {choice.load}: turn='load' (--turn load)."
             )
+        advice = advice or "If the machine counts so, give turn='load' (--turn load), or check which columns are read."
         raise InputError(
             f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
             f"is negative ({stress[row]:g} MPa); tension must be positive. {advice}"

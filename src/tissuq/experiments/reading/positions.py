@@ -52,7 +52,8 @@ def check_positions(table: Table, choice: ColumnChoice, displacement: Column, lo
     raise InputError(
         f"{table.place(choice.deformation, 0)}: begins at {first:g} mm with {size[0]:.0%} of the largest load, so that "
         f"nothing shows where the specimen is undeformed. If it is there, give --zero first {from_first}; if at 0, "
-        f"--zero '0 mm' {from_zero}; if the column holds the length or height of the specimen, --column "
+        f"--zero '0 mm' {from_zero}; if it is undeformed at first, and the load cell reads that without load, "
+        "--load-zero first; if the column holds the length or height of the specimen, --column "
         f"'length={table.key(choice.deformation)}' {of_length}."
     )
 

@@ -16,6 +16,7 @@ BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\
 NOT_TEXT = {
     b"%PDF": "a PDF document",
     b"\x89HDF": "an HDF5 file",
+    b"<?xml": "an XML document",
 }
 CHINESE_WORD = re.compile(r"[\u4e00-\u9fff]{2,}")
 JAPANESE_WORD = re.compile(r"[\u3040-\u30fa\u30fc\u4e00-\u9fff]{2,}")
