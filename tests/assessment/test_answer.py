@@ -8,6 +8,7 @@ import pytest
 import gallery
 import tissuq as tq
 from tissuq.assessment.answer import PRECISE, Verdict
+from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.r_[np.linspace(0.7, 0.98, 8), np.linspace(1.02, 1.6, 12)]
 YEOH = {"C10": 0.5, "C20": 0.1, "C30": 0.0}
@@ -84,3 +85,27 @@ def test_fibres_are_not_taken_into_finite_elements():
     posterior = tq.fit(data, material=material, discrepancy="none", noise_sd=1e-4)
     assert verdicts(posterior)[3] is Verdict.NO
     assert "isotropic" in posterior.answer.uses[3].reason
+
+
+def test_what_is_implausible_in_the_measurements_comes_first():
+    posterior = yeoh(discrepancy="auto")
+    unit = ResultWarning("check the unit: MPa was assumed.", "doubtful-reading", Severity.PROBLEM)
+    answer = posterior.answer_with([unit])
+    assert answer.uses[0].verdict is Verdict.NO
+    assert answer.next_step.shell == unit
+    vague = gallery.fit(
+        tq.simulate("yeoh", YEOH, [1.1, 1.3, 1.5], noise_sd=0.05, seed=1), discrepancy="auto", noise_sd=0.05
+    )
+    assert vague.answer.uses[0].verdict is not Verdict.YES
+    slack = ResultWarning("the first 25 rows carry no load: give --preload auto.")
+    assert "first warning" in vague.answer_with([slack]).next_step.shell
+    assert "design" in vague.answer.next_step.shell
+
+
+def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are_next():
+    data = [tq.datasets.load(f"rubber-treloar-{mode}") for mode in ("uniaxial", "equibiaxial", "planar")]
+    answer = tq.fit(data, discrepancy="auto-first").answer
+    modulus = answer.estimates[0]
+    assert 0.7 * (modulus.high - modulus.low) / 2 / modulus.mean < 1.96 * 0.18
+    assert "spread between specimens" in answer.uses[0].reason
+    assert "further specimens" in answer.next_step.shell

@@ -1,5 +1,7 @@
 """What stands at the head of a run: numbers in the user's unit, problems always, three warnings, no notes."""
 
+from dataclasses import replace
+
 from tissuq.assessment.answer import Answer, Estimate, Step, Use, Verdict
 from tissuq.experiments.units import stress_unit
 from tissuq.report.answer import answer_record, readable_estimates, shown_and_folded
@@ -31,6 +33,19 @@ def test_three_warnings_are_shown_and_notes_folded():
     assert [warning["text"] for warning in shown] == ["0", "1", "2"]
     assert [warning["text"] for warning in folded] == ["3", "4"]
     assert shown_and_folded(record(Severity.NOTE))[0] == []
+
+
+def test_a_note_is_shown_where_the_modulus_cannot_be_reported():
+    vague = record(Severity.NOTE)
+    vague["uses"][0]["verdict"] = "with care"
+    shown, folded = shown_and_folded(vague)
+    assert (len(shown), folded) == (1, [])
+
+
+def test_an_answer_prints_itself_in_its_unit():
+    lines = str(replace(ANSWER, unit="kPa")).splitlines()
+    assert lines[0] == "initial shear modulus 1.46 kPa, 95 % interval 1.23 to 1.69"
+    assert lines[-1] == "Next: posterior.design()"
 
 
 def test_every_problem_is_shown():

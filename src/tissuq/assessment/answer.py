@@ -15,6 +15,7 @@ from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
 from tissuq.experiments.experiment import Curve
+from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
 from tissuq.prediction.bands import Band, predict_band
@@ -28,6 +29,8 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
+NORMAL_HALF_WIDTH, SET_BY_SPREAD = 1.96, 0.7
+"""Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
 GRID_POINTS = 9
 """Stretches at which the width of a band is looked at."""
 
@@ -77,12 +80,26 @@ class Answer:
     uses : tuple of Use
         Reporting the modulus; predicting the measured tests, and other loading modes; finite elements.
     next_step : Step
+    unit : str
+        Unit of stress in which it is printed.
     """
 
     estimates: tuple[Estimate, ...]
     meaning: str
     uses: tuple[Use, ...]
     next_step: Step
+    unit: str = "MPa"
+
+    def __str__(self) -> str:
+        """Return the answer as lines, in its unit, with what to do next as typed in Python."""
+        scale = stress_unit(self.unit).to_mpa
+        lines = [
+            f"{name} {mean / scale:.3g} {self.unit}, 95 % interval {low / scale:.3g} to {high / scale:.3g}"
+            for name, mean, low, high in self.estimates
+        ]
+        lines += [f"The intervals are of {self.meaning}."]
+        lines += [f"{use.verdict.upper()}: {use.purpose}: {use.reason}" for use in self.uses]
+        return "\n".join([*lines, f"Next: {self.next_step.python}"])
 
 
 def answer_of(
@@ -99,7 +116,7 @@ def answer_of(
     ranges : mapping of str to StableRange
         Stable range by loading mode.
     warnings : sequence of ResultWarning
-        Those that the posterior carries.
+        Those that the posterior carries, and those about its measurements where they are known; the severest first.
     inside : (n,) array of bool
         Which measurements are inside their 95 % predictive bands.
     """
@@ -107,16 +124,17 @@ def answer_of(
     codes = {warning.code for warning in warnings}
     uses = [
         Use("report the modulus", *_reporting(solution, stiffness, codes, warnings)),
-        Use("predict these tests", *_own_tests(solution, inside)),
+        Use("predict these tests", *_own_tests(solution, inside, codes)),
     ]
     other_modes = _other_modes(solution, ranges, codes, uses[-1])
     uses += [
         Use("predict other loading modes", *other_modes),
-        Use("simulate with finite elements", *_simulating(solution, ranges, other_modes)),
+        Use("simulate with finite elements", *_simulating(solution, ranges, other_modes, codes)),
     ]
     headline = model.headline
     estimates = [_estimate("initial shear modulus", stiffness), _estimate(headline, solution.marginals[headline])]
-    return Answer(tuple(estimates), model.tolerances.meaning, tuple(uses), _next_step(solution, uses, warnings))
+    step = _next_step(solution, uses, warnings)
+    return Answer(tuple(estimates), model.tolerances.meaning, tuple(uses), step, model.experiment.stress_unit)
 
 
 def _estimate(name: str, marginal: Marginal) -> Estimate:
@@ -131,6 +149,7 @@ def _reporting(
     is_cut = any(w.code == "prior-bound" and any(f"{symbol} (" in w for symbol in symbols) for w in warnings)
     reasons_against = {
         "sampling has not converged": "not-converged" in codes,
+        "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
         "a bound of its prior, not the data, determines it": is_cut,
         "the fitted curve departs from the measured one, and the interval does not include that": (
             "unmodelled-curve" in codes
@@ -142,14 +161,22 @@ def _reporting(
             return Verdict.NO, reason
     carried = abs(shares_of_discrepancy(solution)[1][0])
     low, high = stiffness.hdi()
-    verdict, width = _precision((high - low) / 2 / abs(float(stiffness.quantile(0.5))))
+    half_width = (high - low) / 2 / abs(float(stiffness.quantile(0.5)))
+    verdict, width = _precision(half_width)
     if carried > PRECISE:
         return Verdict.NO, f"the discrepancy carries {carried:.0%} of the initial stiffness, by which it may be off"
     if not solution.model.discrepancy.parameters:
         return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
     if "contradicting-tests" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
+    if _is_spread_of_specimens(solution, half_width):
+        return verdict, f"{width}, nearly all of it the assumed spread between specimens"
     return verdict, width
+
+
+def _is_spread_of_specimens(solution: Solution, half_width: float) -> bool:
+    """Return whether an error that all tests have in common, above all the spread between specimens, sets a width."""
+    return solution.model.common_error * NORMAL_HALF_WIDTH > SET_BY_SPREAD * half_width
 
 
 def _precision(half_width: float) -> tuple[Verdict, str]:
@@ -168,7 +195,7 @@ def _worst(*verdicts: Verdict) -> Verdict:
     return max(verdicts, key=list(Verdict).index)
 
 
-def _own_tests(solution: Solution, inside: NDArray[np.bool_]) -> tuple[Verdict, str]:
+def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[str]) -> tuple[Verdict, str]:
     """Return whether the measured tests are described, over the range in which they were measured."""
     if not solution.is_of_data:
         return Verdict.NO, "no test was measured of what this posterior describes"
@@ -181,7 +208,10 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_]) -> tuple[Verdict, 
     verdict, width = _precision(max(widths))
     if held < MIN_INSIDE * count:
         return Verdict.NO, f"only {counts}"
-    return verdict, f"stress {width} where it was measured, {counts}"
+    sentence = f"stress {width} on average where it was measured, {counts}"
+    if "unmodelled-curve" in codes:
+        return _worst(verdict, Verdict.CARE), f"{sentence}, but the fitted curve departs from the measured one"
+    return verdict, sentence
 
 
 def _band_of(solution: Solution, curve: Curve) -> Band:
@@ -211,7 +241,7 @@ def _other_modes(
     if not others:
         if not ranges:
             return Verdict.CARE, "not looked at for this material"
-        return own_tests.verdict, "uniaxial, equibiaxial and planar stress were measured"
+        return own_tests.verdict, f"uniaxial, equibiaxial and planar stress were measured: {own_tests.reason}"
     try:
         widths = {
             name: _relative_half_width(predict_band(solution, _grid(stable_range), noise=False, mode=name))
@@ -232,7 +262,10 @@ def _grid(stable_range: StableRange) -> NDArray[np.float64]:
 
 
 def _simulating(
-    solution: Solution, ranges: Mapping[str, StableRange], other_modes: tuple[Verdict, str]
+    solution: Solution,
+    ranges: Mapping[str, StableRange],
+    other_modes: tuple[Verdict, str],
+    codes: Collection[str],
 ) -> tuple[Verdict, str]:
     """Return whether draws of material and discrepancy serve finite elements."""
     model = solution.model
@@ -242,6 +275,8 @@ def _simulating(
         return Verdict.NO, "draws as materials are of isotropic ones only"
     if (solution.direction_probability or 0.0) > PROBABLE_DIRECTION:
         return Verdict.NO, "the tissue has a preferred direction, and draws as materials have none"
+    if "unmodelled-curve" in codes:
+        return Verdict.NO, "the fitted curve departs from the measured one"
     if not ranges:
         return Verdict.CARE, "whether it is stable cannot be computed for this material"
     worst = min(ranges.values(), key=lambda stable_range: stable_range.probability)
@@ -250,16 +285,26 @@ def _simulating(
         share += f", least in {worst.mode} loading"
     if worst.probability < MIN_OFTEN_STABLE:
         return Verdict.NO, share
-    verdict = _worst(Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE, other_modes[0])
     if other_modes[0] is Verdict.NO:
-        return verdict, "the stress in other loading modes is not known well enough"
-    return verdict, f"{share}; what leaves the measured strains is extrapolated"
+        return Verdict.NO, "the stress in other loading modes is not known well enough"
+    stable = Verdict.YES if worst.probability >= MIN_STABLE else Verdict.CARE
+    if stable is Verdict.YES and other_modes[0] is Verdict.CARE:
+        return Verdict.CARE, f"no better than other loading modes are known; {share}"
+    return _worst(stable, other_modes[0]), f"{share}; what leaves the measured strains is extrapolated"
 
 
 STEPS: Mapping[str, Step] = {
     "auto": Step(
         "let the data decide how wrong the material is: fit again with --discrepancy auto.",
         'let the data decide how wrong the material is: fit again with discrepancy="auto".',
+    ),
+    "measurements": Step(
+        "act on the first warning: it concerns the measurements themselves.",
+        "act on the first warning: it concerns the measurements themselves.",
+    ),
+    "specimens": Step(
+        "measure further specimens: how much they differ is assumed so far, and sets the width.",
+        "measure further specimens: how much they differ is assumed so far, and sets the width.",
     ),
     "design": Step(
         "see which test would make it narrower: tissuq design {run}",
@@ -289,12 +334,14 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     reporting, _, others, simulating = (use.verdict for use in uses)
     codes = {warning.code for warning in warnings}
     model = solution.model
+    if reporting is not Verdict.YES and "measurements" in codes:
+        return STEPS["measurements"]
     if not model.energy_symbols and model.material.is_isotropic:
         return STEPS["auto"]
     if "unstable" in codes:
         return STEPS["stable"]
     if reporting is not Verdict.YES:
-        return STEPS["design"]
+        return STEPS["specimens" if "spread between specimens" in uses[0].reason else "design"]
     if others is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]

@@ -75,7 +75,8 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
         headers, cells, has_stability = _summary_cells(rows, readable, unit)
     except (OSError, *DAMAGE) as error:
         raise InputError(
-            f"'{folder}' is not the folder of a complete run: {SUMMARY}, {ANSWER} or {RECIPE} is missing or damaged."
+            f"'{folder}' is not the folder of a complete run of tissuq fit or paper: {SUMMARY}, {ANSWER} or {RECIPE} "
+            "is missing, damaged or that of another command, whose page is report.html."
         ) from error
     folded: list[dict[str, str]] = []
     if answer is not None:
@@ -95,7 +96,7 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
         _print_assessment(folder / ASSESSMENT)
     _print_held_out(folder / HELD_OUT_TESTS, headline_of(rows[0]), unit)
     if answer is not None and not details:
-        count = f", {len(folded)} further warnings or notes" if folded else ""
+        count = f", further warnings and notes ({len(folded)})" if folded else ""
         print(f"Stability, shares, weights{count}: tissuq show {shlex.quote(str(folder))} --details")
     print(f"Report: {folder / 'report.html'}")
 
@@ -116,6 +117,8 @@ def print_json(folder: Path) -> None:
         with damage_reported(folder / file):
             if (folder / file).exists():
                 contents[name] = json.loads((folder / file).read_text(encoding="utf-8"))
+    if "answer" in contents:
+        contents["answer"]["next"] = str(contents["answer"]["next"]).format(run=shlex.quote(str(folder)))
     print(json.dumps(contents, indent=2))
 
 

@@ -155,8 +155,13 @@ class Posterior(PosteriorPlots):
         predict other loading modes - with care
         simulate with finite elements - with care
         """
+        return self.answer_with(())
+
+    def answer_with(self, warnings: Sequence[ResultWarning]) -> Answer:
+        """Return `answer` where more is known that was implausible, such as of the file."""
         inside = np.concatenate(self.inside_bands())
-        return answer_of(self.solution, self.stable_ranges, self.warnings, inside)
+        all_warnings = most_severe_first([*warnings, *self.warnings])
+        return answer_of(self.solution, self.stable_ranges, all_warnings, inside)
 
     def assess(self) -> Assessment:
         """Return to what extent the data need the discrepancy, and what it does to the parameters.

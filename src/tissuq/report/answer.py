@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from tissuq.assessment.answer import Answer
+from tissuq.assessment.answer import Answer, Verdict
 from tissuq.experiments.units import StressUnit
 from tissuq.report.tables import interval
 from tissuq.result_warning import ResultWarning, Severity
@@ -67,9 +67,13 @@ def readable_estimates(record: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def shown_and_folded(record: dict[str, Any]) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
-    """Return the warnings to show at once, problems in any case, and the others; they are in order of severity."""
+    """Return the warnings to show at once, problems in any case, and the others; they are in order of severity.
+
+    Notes are folded where the modulus can be reported; otherwise one of them may say why not.
+    """
     warnings: list[dict[str, str]] = record["warnings"]
     severities = [warning["severity"] for warning in warnings]
-    problems, notes = severities.count(Severity.PROBLEM), severities.count(Severity.NOTE)
+    is_reportable = record["uses"][0]["verdict"] == Verdict.YES
+    problems, notes = severities.count(Severity.PROBLEM), severities.count(Severity.NOTE) if is_reportable else 0
     count = min(max(MAX_SHOWN, problems), len(warnings) - notes)
     return warnings[:count], warnings[count:]

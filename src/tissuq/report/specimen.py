@@ -109,7 +109,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
         write_json(folder / HELD_OUT_TESTS, in_unit_of(study.held_out, columns, study.unit))
     write_posteriors(folder, study.posteriors)
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
-    record = answer_record(_title(study), study.main, study.posteriors[study.main].answer, study.unit, study.warnings)
+    record = answer_record(_title(study), study.main, study.answer, study.unit, study.warnings)
     write_json(folder / ANSWER, record)
     if figures:
         write_figures(folder, _figures(study))
@@ -158,7 +158,8 @@ def _with_copied_files(
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:
-    return {"formulation": name, **asdict(assessment), "sentences": assessment.sentences}
+    modulus = [value / stress_unit(assessment.unit).to_mpa for value in assessment.modulus]
+    return {"formulation": name, **asdict(assessment), "modulus": modulus, "sentences": assessment.sentences}
 
 
 def specimen_summary(study: SpecimenStudy) -> list[Row]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import repeat
 from pathlib import Path
 from time import perf_counter
@@ -13,6 +14,7 @@ from typing import Any, Self
 from pydantic import Field, field_validator, model_validator
 
 from tissuq.assessment import Assessment, measurement_warnings
+from tissuq.assessment.answer import Answer
 from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.assumptions import is_doubtful
@@ -169,6 +171,11 @@ class SpecimenStudy:
     def main(self) -> str:
         """The discrepancy whose posterior answers: the one that decides from the data, or the first."""
         return Auto.name if Auto.name in self.posteriors else next(iter(self.posteriors))
+
+    @cached_property
+    def answer(self) -> Answer:
+        """The answer of the main posterior, with what is implausible in the measurements taken into account."""
+        return self.posteriors[self.main].answer_with(self.data_warnings)
 
     @property
     def tolerances(self) -> Tolerances:

@@ -41,7 +41,9 @@
   readout.setAttribute("aria-live", "polite");
   const at = element("input", { type: "range", step: "any" }, element("label", { textContent: "along the curve " }, holder));
   at.addEventListener("input", () => show(nearest(Number(at.value)), true));
-  const switches = element("div", { className: "chart-row" }, holder);
+  const more = element("details", { open: innerWidth > 820 }, holder);
+  element("summary", { textContent: "parts and parameters" }, more);
+  const switches = element("div", { className: "chart-row" }, more);
   for (const part of parts) {
     const label = element("label", {}, switches), box = element("input", { type: "checkbox", checked: part.on }, label);
     element("span", { className: "swatch" }, label).style.background = part.fill || look[part.keys[0]].stroke;
@@ -49,7 +51,7 @@
     box.addEventListener("change", () => { part.on = box.checked; draw(); });
     part.box = box;
   }
-  const sliders = element("div", { className: "chart-row" }, holder);
+  const sliders = element("div", { className: "chart-row" }, more);
   data.parameters.forEach((parameter, index) => {
     const label = element("label", {}, sliders), name = element("span", {}, label);
     const write = () => { name.textContent = `${parameter.name} ${number(values[index])} ${data.unit} `; };
@@ -76,8 +78,8 @@
     if (moves) plot.setCursor({ left: plot.valToPos(view.x[index], "x"), top: 0 }, false);
     else at.value = view.x[index];
     const measured = view.measured[index] == null ? "" : `measured ${number(view.measured[index])}, `;
-    readout.textContent = `${view.control} ${number(view.x[index])}: ${measured}predicted ${number(view.median[index])} ` +
-      `(${number(view.low[index])} to ${number(view.high[index])}), material alone ${number(view.alone[index])} ${data.unit}`;
+    readout.textContent = `${view.control} ${number(view.x[index])}: ${measured}predicted ${number(view.median[index])}, ` +
+      `95 % of measurements ${number(view.low[index])} to ${number(view.high[index])}, material alone ${number(view.alone[index])} ${data.unit}`;
   };
   const pick = () => {
     const fits = item => (!formulation || item.formulation === formulation.value) && (!stress || item.name === stress.value);
