@@ -46,6 +46,8 @@ def test_of_several_results_a_warning_stands_once_with_their_names():
     first, second = (ResultWarning(f"lag {lag}: {{noise}}.", "correlated-residuals", noise="repeats") for lag in (1, 2))
     other = ResultWarning("few.", "few-measurements")
     assert merged({"a": [first, other], "b": [], "c": [second]}) == ['a, c: lag 1: noise="repeats".', "a: few."]
+    cut = [ResultWarning(f"cut by a bound of {symbol}.", "prior-bound") for symbol in ("C01", "C20")]
+    assert merged({"a": [cut[0]], "b": [cut[1]]}) == ["a: cut by a bound of C01.", "b: cut by a bound of C20."]
     assert merged({"a": [first, other]}) == [first, other]
     assert merged({"a": [other]}, named=True) == ["a: few."]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from types import MappingProxyType
@@ -42,6 +43,10 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
     }
 )
 """Every code that a warning has, with what it says; ``docs/warnings.md`` explains each."""
+
+
+NUMBER = re.compile(r"(?<!\w)[-+]?\d[\d.]*(e[-+]?\d+)?")
+"""A number in a sentence, but not one in a name such as C01."""
 
 
 class ResultWarning(str):
@@ -113,16 +118,16 @@ def in_shell(warning: str) -> str:
 
 
 def merged(warnings: Mapping[str, Iterable[ResultWarning]], *, named: bool = False) -> list[ResultWarning]:
-    """Return the warnings about several results, one of each kind with the names of those that it concerns.
+    """Return the warnings about several results, one of each text with the names of those that it concerns.
 
     The numbers in it are those of the first. Of a single result they are as they are, unless it is to be ``named``.
     """
     if len(warnings) == 1 and not named:
         return list(next(iter(warnings.values())))
-    concerned: dict[str, dict[str, ResultWarning]] = {}
+    concerned: dict[tuple[str, str], dict[str, ResultWarning]] = {}
     for name, of_result in warnings.items():
         for warning in of_result:
-            concerned.setdefault(warning.code, {}).setdefault(name, warning)
+            concerned.setdefault((warning.code, NUMBER.sub("", warning)), {}).setdefault(name, warning)
     return [next(iter(by_name.values())).of(by_name) for by_name in concerned.values()]
 
 

@@ -169,6 +169,8 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, if the material is right: its errors are not included"
     if "contradicting-tests" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
+    if "not-near-reference" in codes:
+        return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
     if _is_spread_of_specimens(solution, half_width):
         return verdict, f"{width}, nearly all of it the assumed spread between specimens"
     return verdict, width
@@ -252,6 +254,8 @@ def _other_modes(
     verdict = _worst(*(_precision(width)[0] for width in widths.values()))
     of_modes = ", ".join(f"{name} stress {_percent(width)}" for name, width in widths.items())
     sentence = f"within the strains that were measured: {of_modes}"
+    if not solution.is_of_data:
+        return verdict, f"within the strains that were stated: {of_modes}"
     if len(measured) == 1:
         return _worst(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
     return verdict, sentence
@@ -336,6 +340,8 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     model = solution.model
     if reporting is not Verdict.YES and "measurements" in codes:
         return STEPS["measurements"]
+    if not solution.is_of_data:
+        return STEPS["export"]
     if not model.energy_symbols and model.material.is_isotropic:
         return STEPS["auto"]
     if "unstable" in codes:

@@ -118,7 +118,7 @@ def print_json(folder: Path) -> None:
             if (folder / file).exists():
                 contents[name] = json.loads((folder / file).read_text(encoding="utf-8"))
     if "answer" in contents:
-        contents["answer"]["next"] = str(contents["answer"]["next"]).format(run=shlex.quote(str(folder)))
+        contents["answer"]["next"] = str(contents["answer"]["next"]).replace("{run}", shlex.quote(str(folder)))
     print(json.dumps(contents, indent=2))
 
 
@@ -148,7 +148,7 @@ def _print_answer(answer: dict[str, Any], folder: Path) -> None:
                  subsequent_indent=" " * len(start))
         )  # fmt: skip
     print()
-    step = answer["next"].format(run=shlex.quote(str(folder)))
+    step = answer["next"].replace("{run}", shlex.quote(str(folder)))
     print(fill(step, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
 
 

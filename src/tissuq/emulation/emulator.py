@@ -127,7 +127,8 @@ class Emulator:
         """Return which share of the outputs' variance each parameter explains where all vary over their priors.
 
         Sobol's indices, estimated from the emulator's mean (Saltelli et al. 2010), over all outputs together: variances
-        are summed. With those of few runs, errors of the emulator are part of them.
+        are summed, those of several quantities relative to the spread of each over the runs. With those of few runs,
+        errors of the emulator are part of them.
 
         Returns
         -------
@@ -157,11 +158,11 @@ class Emulator:
             np.column_stack([quantile(column) for quantile, column in zip(quantiles, half.T, strict=True)])
             for half in (cube[:, :size], cube[:, size:])
         )
-        base, new = self._means(one), self._means(other)
+        base, new = self._means(one) / self.basis.scale, self._means(other) / self.basis.scale
         variance = np.concatenate([base, new]).var(axis=0).sum()
         rows = []
         for k in range(size):
-            mixed = self._means(np.where(np.arange(size) == k, other, one))
+            mixed = self._means(np.where(np.arange(size) == k, other, one)) / self.basis.scale
             first = (new * (mixed - base)).mean(axis=0).sum()
             rows.append((first / variance, 0.5 * ((mixed - base) ** 2).mean(axis=0).sum() / variance))
         return pd.DataFrame(rows, pd.Index(self.symbols, name="parameter"), ["first", "total"])

@@ -106,11 +106,13 @@ def _no_parameters_fit(
     best, size = draws[int(misfits.argmin())], len(problem.measured)
     outputs = emulator.runs.good[1]
     is_out = (problem.measured < outputs.min(axis=0)) | (problem.measured > outputs.max(axis=0))
-    if gammaincc(0.5 * size, 0.5 * misfits.min()) > MIN_MISFIT_PROBABILITY and is_out.mean() <= MAX_SHARE_OUT_OF_REACH:
+    is_absorbed = problem.discrepancy.name == "gp" or None in problem.noise_sd.values()  # by what is unknown
+    is_out_of_reach = is_absorbed and is_out.mean() > MAX_SHARE_OUT_OF_REACH
+    if gammaincc(0.5 * size, 0.5 * misfits.min()) > MIN_MISFIT_PROBABILITY and not is_out_of_reach:
         return
     values = best[: len(problem.forward_symbols)]
     predicted = emulator.moments(values[None])[0][0]
-    worst = int(np.argmax(np.abs(problem.measured - predicted)))
+    worst = int(np.argmax(np.abs(problem.measured - predicted) / emulator.basis.scale))
     named = ", ".join(f"{symbol} {value:.3g}" for symbol, value in zip(problem.forward_symbols, values, strict=True))
     yield (
         f"no parameters that the priors allow give the measurements: at the best ({named}) they are "

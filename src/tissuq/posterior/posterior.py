@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.assessment import Assessment, assess
+from tissuq.assessment import Assessment, assess, measurement_warnings
 from tissuq.assessment.answer import Answer, answer_of
 from tissuq.assessment.comparison import scores_of
 from tissuq.assessment.modulus import modulus
@@ -159,8 +159,10 @@ class Posterior(PosteriorPlots):
 
     def answer_with(self, warnings: Sequence[ResultWarning]) -> Answer:
         """Return `answer` where more is known that was implausible, such as of the file."""
-        inside = np.concatenate(self.inside_bands())
-        all_warnings = most_severe_first([*warnings, *self.warnings])
+        of_data = self.solution.is_of_data
+        inside = np.concatenate(self.inside_bands()) if of_data else np.ones(0, dtype=np.bool_)
+        of_test = measurement_warnings(self.model.experiment) if of_data else ()
+        all_warnings = most_severe_first([*warnings, *self.warnings, *of_test])
         return answer_of(self.solution, self.stable_ranges, all_warnings, inside)
 
     def assess(self) -> Assessment:

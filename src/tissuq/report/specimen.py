@@ -193,7 +193,7 @@ def _context(study: SpecimenStudy, summary: list[Row], record: dict[str, Any]) -
     shown, folded = shown_and_folded(record)
     return {
         "chart_data": chart_data(study.posteriors, study.main, study.unit),
-        "answer": record | {"estimates": readable_estimates(record), "next": record["next"].format(run="RUN")},
+        "answer": record | {"estimates": readable_estimates(record), "next": record["next"].replace("{run}", "RUN")},
         "shown_warnings": shown,
         "folded_warnings": folded,
         "headline": study.headline,
