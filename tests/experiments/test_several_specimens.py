@@ -39,7 +39,9 @@ def written(folder, names, labels, rows=20, unloads=False, interleaved=False):
 )
 def test_specimens_of_a_column_are_not_pooled_and_the_advice_reads_one(tmp_path, name, labels, unloads, interleaved):
     path = written(tmp_path, name, labels, unloads=unloads, interleaved=interleaved)
-    with pytest.raises(InputError, match=rf"names several tests.*--only '{name}={labels[0]}'.*--specimen '{name}'"):
+    with pytest.raises(
+        InputError, match=rf"names several tests.*--only '{name}={labels[0]}'.*--specimen-column '{name}'"
+    ):
         tq.read_experiment(path)
     data = tq.read_experiment(path, only={name: labels[1]})
     np.testing.assert_allclose(data.stress, 1.1 * neo_hookean(data.stretch), atol=1e-6)

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.reading.headings import (
@@ -46,6 +48,16 @@ ON_SPECIMEN = re.compile(
     r"伸び計|引伸[计計]|экстензометр|видео|оптич|камер|лазер|датчик деформ"
 )
 """Names of a deformation that is measured on the specimen itself, not by the displacement of the machine."""
+RATIO = re.compile(
+    r"strain|stretch|lambda|hencky|lagrang|^e ?[xyz123]{1,2}\b|^eps|ε|λ|dehnung|d[eé]formation|deformaci|deformazion"
+)
+"""Names of strains and stretches, alone or with further words."""
+NOT_ALONG = re.compile(r"trans|lat|quer|width|vol|shear|rate|max|min|yield|break|fail|set|limit|plastic|residual|^exx")
+"""Names of a strain that is not the one along the test at every row."""
+LARGEST_RATIO = 5.0
+"""Number without a unit beyond which a column is taken for no strain or stretch."""
+MAX_DIFFERENCE = 0.01
+"""Largest difference of two columns, over the range of one, at which they say the same."""
 NORMAL = re.compile(r"normal|axial|^f ?[nz]$|нормальн|осев")
 OSCILLATION = re.compile(
     r"(storage|loss|speicher|verlust|complex|dynamic) ?modul|^[ge](\'{1,2}|′|″|\"| prime)$|tan ?\(?(delta|δ)"
@@ -53,21 +65,65 @@ OSCILLATION = re.compile(
 """Names of what is measured in oscillations."""
 
 
-def check_machine(table: Table, quantities: Sequence[str], displacement: int) -> None:
-    """Ask which is read where an extensometer or a camera measures the specimen beside the machine's displacement."""
+def check_machine(table: Table, quantities: Sequence[str], column_read: int, measure: str) -> None:
+    """Ask which is read where the deformation was measured twice: by the machine, and on the specimen.
+
+    By an extensometer or a camera, as names say; or, beside a displacement, in a column of strains or stretches.
+    """
+    on_specimen = _columns_on_specimen(table, quantities)
+    if column_read in on_specimen or measure not in ("displacement", "strain", "stretch"):
+        return
     roles = {"length": "displacement", "strain": "strain", "pixels": "length"}
-    seen = {column: roles.get(measured_in(table.unit(column))) for column in _columns_on_specimen(table, quantities)}
+    if measure != "displacement":
+        roles = {"": measure, "strain": measure}
+    seen = {column: roles.get(measured_in(table.unit(column))) for column in on_specimen}
+    if measure == "displacement":
+        ratios = (column for column in on_specimen if not measured_in(table.unit(column)))
+        seen |= {column: _ratio_role(table, column) for column in ratios if _is_ratio(table, column)}
+        seen |= {column: _ratio_role(table, column) for column in _ratios(table, quantities, column_read)}
     seen = {column: role for column, role in seen.items() if role}
-    if displacement in _columns_on_specimen(table, quantities) or not seen:
+    if not seen or (measure != "displacement" and all(_is_same(table, column_read, column) for column in seen)):
         return
     labels = " and ".join(map(table.label, seen))
-    choices = [("displacement", displacement), *((str(role), column) for column, role in seen.items())]
+    choices = [(measure, column_read), *((str(role), column) for column, role in seen.items())]
     flags = " or ".join(f'--column {role}="{table.names[column]}"' for role, column in choices)
+    what = "displacement of the machine" if measure == "displacement" else f"{measure} of the machine"
     raise InputError(
-        f"{table.file}: column {table.label(displacement)} is the displacement of the machine, and {labels} was "
+        f"{table.file}: column {table.label(column_read)} is the {what}, and {labels} was "
         "measured on the specimen, by an extensometer or a camera. They give different stretches. Say which is read: "
         f"{flags}."
     )
+
+
+def _ratios(table: Table, quantities: Sequence[str], displacement: int) -> list[int]:
+    """Return columns that by their names hold strains or stretches along the test, beside a displacement."""
+    return [
+        column
+        for column, quantity in enumerate(quantities)
+        if column != displacement
+        and RATIO.search(quantity)
+        and not NOT_ALONG.search(quantity)
+        and measured_in(table.unit(column)) in ("", "strain")
+        and not table.is_constant(column)
+    ]
+
+
+def _is_ratio(table: Table, column: int) -> bool:
+    """Return whether numbers without a unit are so small that they can be strains or stretches."""
+    (values,) = table.numbers([column])
+    return bool(np.abs(values).max() < LARGEST_RATIO)
+
+
+def _ratio_role(table: Table, column: int) -> str:
+    """Return whether numbers of a column are stretches, which begin at one, or strains."""
+    (values,) = table.numbers([column])
+    return "stretch" if abs(values[0] - 1) < abs(values[0]) else "strain"
+
+
+def _is_same(table: Table, first: int, second: int) -> bool:
+    """Return whether two columns say the same."""
+    one, other = table.numbers([first, second])
+    return bool(np.abs(other - one).max() <= MAX_DIFFERENCE * np.ptp(one))
 
 
 def _columns_on_specimen(table: Table, quantities: Sequence[str]) -> list[int]:

@@ -265,8 +265,8 @@ def _choice(
             measure == "strain" and by_unit_alone == "length" and contents.quantities[deformation] in DEFORMATION_NOUNS
         ):
             measure = "displacement"
-        if measure == "displacement":
-            check_machine(table, contents.quantities, deformation)
+        if not is_shear:
+            check_machine(table, contents.quantities, deformation, measure)
     if deformation == stress:
         raise InputError(
             f"{table.file}: column {table.label(stress)} cannot be both {measure} and {load}; "

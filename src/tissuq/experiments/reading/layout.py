@@ -183,9 +183,11 @@ def _with_units_joined(names: Sequence[str]) -> list[str]:
 
 
 def likely_separator(lines: Sequence[str]) -> str:
-    """Return the separator between which most cells are numbers."""
+    """Return the separator between which most cells are numbers; in lines of names with tabs, blanks part words."""
 
     def share_of_numbers(line: str, separator: str) -> float:
+        if separator == WHITESPACE and "\t" in line and WORD.search(line):
+            separator = "\t"
         cells = [cell for cell in split(line, separator) if cell]
         numbers = _count_numbers(cells)
         return numbers / len(cells) if numbers >= 2 else 0.0

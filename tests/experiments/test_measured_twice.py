@@ -1,0 +1,80 @@
+"""Deformations that a file holds twice, of machine and specimen, are asked about; tabs part numbered names."""
+
+import re
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+LENGTH, AREA = 20.0, 10.0  # mm, mm2
+STRAIN = np.linspace(0, 0.3, 31)
+STRETCH = 1 + STRAIN
+STRESS = 2 * 0.05 * (STRETCH - STRETCH**-2)  # MPa
+SIZES = {"length": f"{LENGTH:g} mm", "area": f"{AREA:g} mm2"}
+
+
+def written(path, separator=",", **columns):
+    lines = [separator.join(columns)]
+    lines += [separator.join(f"{value:.7g}" for value in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def asked(path, **options):
+    with pytest.raises(tq.InputError, match="measured on the specimen") as error:
+        tq.read(path, **options)
+    return re.findall(r'--column (\w+)="([^"]+)"', str(error.value))
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "values"),
+    [
+        ("Local strain (%)", "strain", 100 * STRAIN),
+        ("Strain_yy VIC", "strain", STRAIN),
+        ("DIC exx", "strain", STRAIN),
+        ("eps_yy [1] - Engineering", "strain", STRAIN),
+        ("Optical stretch", "stretch", STRETCH),
+    ],
+)
+def test_a_strain_of_the_specimen_beside_the_crosshead_is_asked_about(tmp_path, name, role, values):
+    crosshead = 1.4 * LENGTH * STRAIN  # the grips slip, so that the machine moves farther
+    path = written(tmp_path / "test.csv", **{"Crosshead (mm)": crosshead, "Load (N)": STRESS * AREA, name: values})
+    choices = asked(path, **SIZES)
+    assert choices == [("displacement", "Crosshead (mm)"), (role, name)]
+    specimen = tq.read(path, columns=dict([choices[1]]), area=SIZES["area"])
+    np.testing.assert_allclose(specimen.stretch, STRETCH, rtol=1e-5)
+    np.testing.assert_allclose(specimen.stress, STRESS, rtol=1e-5, atol=1e-9)
+    machine = tq.read(path, columns=dict([choices[0]]), **SIZES)
+    np.testing.assert_allclose(machine.stretch, 1 + 1.4 * STRAIN, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("first", "second"), [("Strain", "DIC strain"), ("Strain (%)", "Optical strain (%)")])
+def test_two_strains_of_which_one_is_of_a_camera_are_asked_about(tmp_path, first, second):
+    scale = 100 if "%" in first else 1
+    columns = {first: 1.4 * scale * STRAIN, second: scale * STRAIN, "Stress (kPa)": 1000 * STRESS}
+    path = written(tmp_path / "test.csv", **columns)
+    assert asked(path) == [("strain", first), ("strain", second)]
+    np.testing.assert_allclose(tq.read(path, columns={"strain": second}).stretch, STRETCH, rtol=1e-5)
+    same = written(tmp_path / "same.csv", **columns | {first: scale * STRAIN})
+    np.testing.assert_allclose(tq.read(same).stretch, STRETCH, rtol=1e-5)
+
+
+def test_strains_across_the_test_and_its_limits_are_not_asked_about(tmp_path):
+    columns = {"Crosshead (mm)": LENGTH * STRAIN, "Load (N)": STRESS * AREA, "Lateral strain (%)": -40 * STRAIN}
+    path = written(tmp_path / "test.csv", **columns)
+    np.testing.assert_allclose(tq.read(path, **SIZES).stretch, STRETCH, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "names", [("Time", "Extension 1", "Load 1"), ("Elapsed Time", "Scan 2 Displacement", "Load 1")]
+)
+def test_tabs_part_names_with_numbers_over_a_row_of_units(tmp_path, names):
+    path = written(
+        tmp_path / "test.txt", "\t", **dict(zip(names, (STRAIN, LENGTH * STRAIN, STRESS * AREA), strict=True))
+    )
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], "s\tmm\tN", *lines[1:]]) + "\n")
+    experiment = tq.read(path, columns={"displacement": names[1], "force": names[2]}, **SIZES)
+    np.testing.assert_allclose(experiment.stretch, STRETCH, rtol=1e-5)
+    np.testing.assert_allclose(experiment.stress, STRESS, rtol=1e-5, atol=1e-9)
