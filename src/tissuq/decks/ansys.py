@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.errors import InputError
 
 __all__ = ["AnsysDeck"]
 
@@ -13,7 +14,12 @@ ELASTIC_TABLES = {"HYPE", "ELAS", "ANEL", "AHYP"}
 OTHER_TABLES = {"DENS", "CTE", "THER", "SPEC", "SDAM"}
 """Tables that stay; any other changes the stress."""
 ELASTIC_CONSTANTS = {"EX", "EY", "EZ", "NUXY", "NUYZ", "NUXZ", "PRXY", "PRYZ", "PRXZ", "GXY", "GYZ", "GXZ"}
+REMARKS = ("/COM", "/TITLE", "/STITLE", "C***")
+"""What the commands of lines begin with whose words are for readers."""
 DATA = ("TBDATA", "TBDAT", "TBPT", "TBTEMP", "TBTEM", "TBEO", "TBFIELD")
+
+
+NOT_A_NUMBER = "a card needs its number in digits: write that in the place of the parameter."
 
 
 class AnsysDeck(DeckFormat):
@@ -67,7 +73,7 @@ class AnsysDeck(DeckFormat):
             if in_table:
                 spans[in_table].append((line.start, line.end))
         return [
-            DeckMaterial("", number, tuple(lines), (), refused.get(number, ""))
+            DeckMaterial("", number, tuple(lines), (), refused.get(number, "" if number.isdecimal() else NOT_A_NUMBER))
             for number, lines in spans.items()
             if lines
         ]
@@ -79,8 +85,11 @@ class AnsysDeck(DeckFormat):
 def _commands(content: bytes) -> list[tuple[Line, list[str]]]:
     """Return the lines with commands, and the words of each, the command in capitals; comments follow a ``!``."""
     commands = []
-    for line in lines_of(content):
-        words = [word.strip() for word in line.text.partition("!")[0].split(",")]
+    for number, line in enumerate(lines_of(content), start=1):
+        text = line.text.partition("!")[0]
+        if "$" in text and not text.strip().upper().startswith(REMARKS):
+            raise InputError(f"line {number} of the ANSYS deck has several commands ($): write each in a line.")
+        words = [word.strip() for word in text.split(",")]
         if words[0]:
             commands.append((line, [words[0].upper(), *words[1:]]))
     return commands
