@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import SequenceMatcher, unified_diff
+from pathlib import Path
 
 import pytest
 
@@ -270,3 +271,18 @@ def test_only_files_that_are_allowed_are_included_from_outside(tmp_path):
         with pytest.raises(tq.InputError, match="--also"):
             Deck.read(file, allowed=())
         assert Deck.read(file, allowed=[tmp_path / "mesh.inp"]).material("T")
+
+
+def test_what_a_file_outside_includes_is_outside_too(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "far").mkdir()
+    names = [str(tmp_path / "far" / name) for name in ("a.inp", "b.inp")]
+    Path(names[0]).write_text("*INCLUDE, INPUT=b.inp\n*INCLUDE, INPUT=c.inp\n")
+    Path(names[1]).write_text("** nothing\n")
+    (tmp_path / "run" / "c.inp").write_text("** nothing\n")
+    file = tmp_path / "run" / "model.inp"
+    file.write_text(f"*INCLUDE, INPUT={names[0]}\n")
+    deck = Deck.read(file)
+    assert (deck.outside, set(deck.files)) == (tuple(names), {"model.inp", "c.inp"})
+    with pytest.raises(tq.InputError, match=r"'a\.inp' includes .*b\.inp"):
+        Deck.read(file, allowed=[Path(names[0])])

@@ -126,7 +126,7 @@ class Deck:
     root : Path
         The folder that holds all of them.
     outside : tuple of str
-        Included files with absolute names, which stay where they are.
+        Included files with absolute names, and those that these include, which stay where they are.
     """
 
     format: DeckFormat
@@ -170,24 +170,28 @@ class Deck:
         deck_format = (
             find(DeckFormat, "format of decks", format, InputError)() if format else _recognised(main, content)
         )
-        files, outside, waiting = {main: content}, [], [main]
+        files, outside, waiting = {main: content}, dict[Path, bytes](), [main]
         while waiting:
             file = waiting.pop()
-            for name in deck_format.includes(files[file]):
-                if os.path.isabs(name):
-                    _check_allowed(Path(os.path.abspath(name)), file, allowed)
-                    outside.append(name)
-                    continue
+            for name in deck_format.includes(files[file] if file in files else outside[file]):
                 beside = [Path(os.path.abspath(folder / name)) for folder in (main.parent, file.parent)]
                 included = next((candidate for candidate in beside if os.path.isfile(candidate)), beside[0])
-                if not included.is_relative_to(main.parent):
+                is_below = included.is_relative_to(main.parent)
+                if os.path.isabs(name) or not is_below:
                     _check_allowed(included, file, allowed)
-                if included not in files:
+                if included in files or included in outside:
+                    continue
+                if not os.path.isabs(name) and (is_below or file in files):
                     files[included] = _content(included, f"file that '{file.name}' includes")
                     waiting.append(included)
+                elif os.path.isfile(included):
+                    outside[included] = _content(included, f"file that '{file.name}' includes")
+                    waiting.append(included)
+                else:
+                    outside[included] = b""
         root = Path(os.path.commonpath([file.parent for file in files]))
         relative = {file.relative_to(root).as_posix(): text for file, text in files.items()}
-        return cls(deck_format, main.relative_to(root).as_posix(), relative, root, tuple(outside))
+        return cls(deck_format, main.relative_to(root).as_posix(), relative, root, tuple(map(str, outside)))
 
     @property
     def job(self) -> str:
