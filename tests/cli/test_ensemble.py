@@ -345,7 +345,8 @@ def test_a_dry_run_of_a_recipe_runs_no_function(cli, here, model):
 
 
 @pytest.mark.parametrize("name", ["../../precious", "..", ".", "/", None])
-def test_making_failures_again_deletes_no_other_folder(cli, here, model, name):
+@pytest.mark.parametrize("is_other", [False, True], ids=["same", "other-quantities"])
+def test_making_failures_again_deletes_no_other_folder(cli, here, model, name, is_other):
     (here / "fails").write_text("3")
     assert cli("ensemble", *model, "--no-figures").status == 0
     (here / "precious").mkdir()
@@ -358,11 +359,14 @@ def test_making_failures_again_deletes_no_other_folder(cli, here, model, name):
                 line.pop("folder") if place is None else line.update(folder=place)
             file.write(json.dumps(line) + "\n")
     (here / "out" / "tasks.new").replace(here / "out" / "tasks.jsonl")
-    said = cli("ensemble", *model, "--no-figures", "--again")
+    (here / "fails").unlink()
+    (here / "mine.py").write_text("def one(folder):\n    return 1\n")
+    others = ["--qoi", "one=mine.py:one"] if is_other else []
+    said = cli("ensemble", *model, "--no-figures", "--again", *others)
     assert said.status == 0, said.err
     assert (here / "precious" / "data.txt").exists()
     assert len(list((here / "out" / "draws").iterdir())) == 6
-    assert len(started(here)) == 6
+    assert len(started(here)) == (6 if is_other else 7)
 
 
 def test_making_the_first_draw_again_leaves_the_other_results(cli, here, model):

@@ -145,7 +145,7 @@ def ensemble(
         check_source(beside / source, folder / POSTERIORS / str(number))
     _write_inputs(prepared, stored, sources, beside, folder)
     if again:
-        forget_failures(folder)
+        forget_failures(prepared, folder)
     processes = max_jobs or os.cpu_count() or 1
     with open_pool(processes, scheduler) as pool:
         study = run_ensemble(

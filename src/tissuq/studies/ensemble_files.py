@@ -68,13 +68,14 @@ def deck_folder(deck: Deck) -> str:
     return deck.main[: deck.main.rfind("/") + 1]
 
 
-def forget_failures(folder: Path) -> int:
+def forget_failures(prepared: PreparedEnsemble, folder: Path) -> int:
     """Take the results of runs that failed off the file of results, and their folders away; return how many."""
+    places = {task.key: task.folder.name for task in prepared.tasks(folder)}
     path = folder / RESULTS
     results = read_results(path)
     failed = {key for key, result in results.items() if result.get("problem") or result.get("misread")}
     for key in failed:
-        name = str(results[key].get("folder", ""))
+        name = places.get(key) or str(results[key].get("folder", ""))  # the latter where quantities are others
         if RUN_FOLDER.fullmatch(name):
             shutil.rmtree(folder / DRAWS / name, ignore_errors=True)
     if failed:
