@@ -189,6 +189,8 @@ def test_two_materials_are_replaced_at_once(tmp_path, block):
         ),
         ("febio", FEBIO.replace(b'"Ogden"', b'"rigid body"'), "2", ["rigid body"]),
         ("ansys", ANSYS.replace(b"TB,HYPER,2", b"TB,HYPER,fat"), "fat", ["number in digits"]),
+        ("ansys", ANSYS + b"fat = 2\nMP,EX,FAT,5\n", "2", ["'FAT', too"]),
+        ("ansys", ANSYS + b"*SET,fat,2\nMP,EX,FAT,5\n", "2", ["'FAT', too"]),
         ("ansys", ANSYS.replace(b"TBDATA,1,0.5", b"$TBDATA,1,0.5"), "2", ["line 6", "several commands"]),
         ("abaqus", ABAQUS.replace(b"1e-9\n", b"1e-9\n*SOLUBILITY\n1.\n*VISCOELASTIC\n"), "Tissue", ["*VISCOELASTIC"]),
     ],

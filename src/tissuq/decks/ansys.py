@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
 from tissuq.errors import InputError
@@ -72,6 +73,8 @@ class AnsysDeck(DeckFormat):
                 in_table = ""
             if in_table:
                 spans[in_table].append((line.start, line.end))
+        for name, number in _parameters(content, {name for name in spans if not name.isdecimal()}):
+            refused[number] = f"commands call it '{name}', too: write its number in the place of that parameter."
         return [
             DeckMaterial("", number, tuple(lines), (), refused.get(number, "" if number.isdecimal() else NOT_A_NUMBER))
             for number, lines in spans.items()
@@ -93,6 +96,17 @@ def _commands(content: bytes) -> list[tuple[Line, list[str]]]:
         if words[0]:
             commands.append((line, [words[0].upper(), *words[1:]]))
     return commands
+
+
+def _parameters(content: bytes, names: Collection[str]) -> list[tuple[str, str]]:
+    """Return the parameters of some names that a file sets to whole numbers, and these."""
+    by_name = {name.upper(): name for name in names}
+    values = []
+    for _, words in _commands(content) if by_name else ():
+        key, _, value = words[0].partition("=") if words[0] != "*SET" else (_word(words, 1), "", _word(words, 2))
+        if key.strip().upper() in by_name and value.strip().isdecimal():
+            values.append((by_name[key.strip().upper()], value.strip()))
+    return values
 
 
 def _word(words: list[str], index: int) -> str:
