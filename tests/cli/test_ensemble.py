@@ -167,7 +167,14 @@ def test_what_is_done_is_not_done_again_and_another_quantity_needs_no_run(cli, h
     assert said.status == 0, said.err
     assert len(started(here)) == 6
     assert float(rows_of(here / "out" / "draws.csv")[0]["size"]) > 100
-    said = cli("ensemble", "--config", "out/run.toml", "--no-figures", "--out", "again", "--max-jobs", 1)
+    repeat = ["ensemble", "--config", "out/run.toml", "--no-figures", "--out", "again", "--max-jobs", 1]
+    said = cli(*repeat)
+    assert said.status == 2
+    assert "--qoi size=quantities/mine.py:size" in said.err
+    assert "--command" in said.err
+    assert len(started(here)) == 6
+    command = model[model.index("--command") + 1]
+    said = cli(*repeat, "--qoi", "size=quantities/mine.py:size", "--command", command)
     assert said.status == 0, said.err
     assert len(started(here)) == 12
     first, again = ((here / name / "quantities.csv").read_text(encoding="utf-8") for name in ("out", "again"))
@@ -305,6 +312,9 @@ def test_what_cannot_be_used_gets_one_message_and_leaves_nothing(cli, here, mode
         (["--also", "umat.f"], ["umat.f"]),
         (["--qoi", "C10=RF1@TOP"], ["cannot be called 'C10'"]),
         (["--command", "no-such-program {job}"], ["no program 'no-such-program'"]),
+        (["--command", "sh {job.x}"], ["is not understood", "{job}"]),
+        (["--command", "sh {job[x]}"], ["is not understood", "{job}"]),
+        (["--command", "sh {job:d}"], ["is not understood", "{job}"]),
         (["--format", "table"], ["do not go into a deck"]),
     ],
 )
@@ -321,3 +331,124 @@ def test_without_a_model_or_a_question_it_says_what_to_give(cli, here, model):
     assert "has no run" in cli("ensemble", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP").err
     assert "give --material NAME" in cli("ensemble", "run", "model.inp").err
     assert "give --qoi" in cli("ensemble", "run", "model.inp", "--material", "TISSUE").err
+
+
+def test_a_dry_run_of_a_recipe_runs_no_function(cli, here, model):
+    (here / "mine.py").write_text("def size(folder):\n    return 1\n")
+    assert cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size").status == 0
+    copy = here / "out" / "quantities" / "mine.py"
+    copy.write_text(f"open({str(here / 'ran')!r}, 'w')\n" + copy.read_text())
+    said = cli("ensemble", "--config", "out/run.toml", "--dry-run")
+    assert said.status == 0, said.err
+    assert "+*HYPERELASTIC" in said.out
+    assert not (here / "ran").exists()
+
+
+@pytest.mark.parametrize("name", ["../../precious", "..", ".", "/", None])
+@pytest.mark.parametrize("is_other", [False, True], ids=["same", "other-quantities"])
+def test_making_failures_again_deletes_no_other_folder(cli, here, model, name, is_other):
+    (here / "fails").write_text("3")
+    assert cli("ensemble", *model, "--no-figures").status == 0
+    (here / "precious").mkdir()
+    (here / "precious" / "data.txt").write_text("1")
+    place = name if name != "/" else str(here / "precious")
+    lines = (json.loads(line) for line in (here / "out" / "tasks.jsonl").read_text(encoding="utf-8").splitlines())
+    with (here / "out" / "tasks.new").open("w", encoding="utf-8") as file:
+        for line in lines:
+            if line["problem"]:
+                line.pop("folder") if place is None else line.update(folder=place)
+            file.write(json.dumps(line) + "\n")
+    (here / "out" / "tasks.new").replace(here / "out" / "tasks.jsonl")
+    (here / "fails").unlink()
+    (here / "mine.py").write_text("def one(folder):\n    return 1\n")
+    others = ["--qoi", "one=mine.py:one"] if is_other else []
+    said = cli("ensemble", *model, "--no-figures", "--again", *others)
+    assert said.status == 0, said.err
+    assert (here / "precious" / "data.txt").exists()
+    assert len(list((here / "out" / "draws").iterdir())) == 6
+    assert len(started(here)) == (6 if is_other else 7)
+
+
+def test_making_the_first_draw_again_leaves_the_other_results(cli, here, model):
+    (here / "fails").write_text("1")
+    assert cli("ensemble", *model, "--no-figures", "--no-keep").status == 0
+    (here / "fails").unlink()
+    said = cli("ensemble", *model, "--no-figures", "--no-keep", "--again")
+    assert said.status == 0, said.err
+    assert len(started(here)) == 7
+
+
+def test_a_function_that_cannot_read_is_told_with_the_option_that_reads_again(cli, here, model):
+    (here / "mine.py").write_text(f"def size(folder):\n    return float(open({str(here / 'size.txt')!r}).read())\n")
+    for _ in range(2):
+        said = cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size")
+        assert said.status == 2
+        assert "FileNotFoundError" in said.err
+        assert "--again" in said.err
+    (here / "size.txt").write_text("3")
+    said = cli("ensemble", *model, "--no-figures", "--qoi", "size=mine.py:size", "--again")
+    assert said.status == 0, said.err
+
+
+def test_files_of_one_name_are_refused(cli, here, model):
+    for name in "ab":
+        (here / name).mkdir()
+        (here / name / "q.py").write_text("def f(folder):\n    return 1\n")
+        (here / name / "d.txt").write_text(name)
+    said = cli("ensemble", *model, "--qoi", "x=a/q.py:f", "--qoi", "y=b/q.py:f")
+    assert (said.status, "called 'q.py' (--qoi)" in said.err) == (2, True)
+    said = cli("ensemble", *model, "--also", "a/d.txt", "--also", "b/d.txt")
+    assert (said.status, "called 'd.txt'" in said.err) == (2, True)
+    assert not (here / "out").exists()
+    assert cli("ensemble", *model, "--no-figures", "--qoi", "x=a/q.py:f", "--qoi", "y=a/q.py:f").status == 0
+
+
+@pytest.mark.parametrize("is_absolute", [True, False])
+def test_a_file_outside_of_the_folder_of_the_model_is_used_only_if_named_and_not_mixed(cli, here, model, is_absolute):
+    (here / "deck").mkdir()
+    outside = here / "more.inp"
+    outside.write_text("** nothing\n")
+    name = outside.as_posix() if is_absolute else "../more.inp"
+    deck = DECK.replace("*STEP", f"*INCLUDE, INPUT={name}\n*STEP")
+    (here / "deck" / "model.inp").write_text(deck, encoding="utf-8")
+    words = ["ensemble", *(f"deck/{word}" if word == "model.inp" else word for word in model), "--no-figures"]
+    said = cli(*words)
+    assert said.status == 2
+    assert f"--also {outside}" in said.err
+    assert not (here / "out").exists()
+    assert cli(*words, "--also", outside).status == 0
+    assert cli(*words, "--also", "more.inp").status == 0
+    command = model[model.index("--command") + 1]
+    repeat = ["ensemble", "--config", "out/run.toml", "--command", command, "--out", "again", "--no-figures"]
+    said = cli(*repeat)
+    assert (said.status, f"--also {outside}" in said.err) == ((2, True) if is_absolute else (0, False)), said.err
+    assert cli(*repeat, *(["--also", outside] if is_absolute else [])).status == 0
+    outside.write_text("** something\n")
+    said = cli(*words, "--also", outside)
+    assert (said.status, "another model" in said.err) == (2, True)
+    assert len(started(here)) == 12
+
+
+def test_a_draw_whose_results_are_cut_short_fails_alone(cli, here, model):
+    text = (here / "stub.py").read_text()
+    cut = "    if 'complete-4' in folder.name:\n        table = Path(f'{job}.dat')\n"
+    cut += "        table.write_text(table.read_text().replace(' 0.0\\n', '\\n'))\n"
+    (here / "stub.py").write_text(text.replace("    rows = [", cut + "    rows = ["))
+    said = cli("ensemble", *model, "--no-figures")
+    assert said.status == 0, said.err
+    (row,) = rows_of(here / "out" / "failures.csv")
+    assert row["number"] == "4"
+    assert "cut short or damaged" in row["problem"]
+
+
+def test_a_set_of_a_set_that_is_nowhere_is_refused_before_a_run(cli, here, model):
+    (here / "model.inp").write_text(DECK.replace("*STEP", "*NSET, NSET=ENDS\nTOP, BASE\n*STEP"), encoding="utf-8")
+    said = cli("ensemble", *model)
+    assert (said.status, "'ENDS' has 'BASE'" in said.err) == (2, True)
+    assert not started(here)
+
+
+def test_a_material_of_ansys_that_a_parameter_numbers_is_refused(cli, here, model):
+    (here / "m.cdb").write_text("/PREP7\nfat=2\nMP,EX,1,5.0\nMP,EX,fat,10\n/SOLU\n")
+    said = cli("ensemble", "run", "m.cdb", "--material", "fat", "--qoi", "x=q.py:f", "--command", "true", "--dry-run")
+    assert (said.status, "number in digits" in said.err) == (2, True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from difflib import SequenceMatcher, unified_diff
+from pathlib import Path
 
 import pytest
 
@@ -187,6 +188,11 @@ def test_two_materials_are_replaced_at_once(tmp_path, block):
             ["TB,PRONY", "out of the deck"],
         ),
         ("febio", FEBIO.replace(b'"Ogden"', b'"rigid body"'), "2", ["rigid body"]),
+        ("ansys", ANSYS.replace(b"TB,HYPER,2", b"TB,HYPER,fat"), "fat", ["number in digits"]),
+        ("ansys", ANSYS + b"fat = 2\nMP,EX,FAT,5\n", "2", ["'FAT', too"]),
+        ("ansys", ANSYS + b"*SET,fat,2\nMP,EX,FAT,5\n", "2", ["'FAT', too"]),
+        ("ansys", ANSYS.replace(b"TBDATA,1,0.5", b"$TBDATA,1,0.5"), "2", ["line 6", "several commands"]),
+        ("abaqus", ABAQUS.replace(b"1e-9\n", b"1e-9\n*SOLUBILITY\n1.\n*VISCOELASTIC\n"), "Tissue", ["*VISCOELASTIC"]),
     ],
 )
 def test_what_cannot_be_replaced_is_refused(tmp_path, code, content, wanted, words):
@@ -200,6 +206,8 @@ def test_what_cannot_be_replaced_is_refused(tmp_path, code, content, wanted, wor
     [
         ("model.inp", b"*INCLUDE, INPUT=mesh.inp\n", "that 'model.inp' includes"),
         ("model.feb", b"<febio_spec><Material></febio_spec>", "no XML"),
+        ("model.inp", b"*INCLUDE, INPUT=a\0b\n", r"a\\x00b' cannot be read"),
+        ("model.inp", b"*INCLUDE, INPUT=" + b"a" * 5000 + b"\n", "cannot be read"),
         ("model.xyz", b"hello\n", "--deck"),
         ("model.inp", b"hello\n", "--deck"),
     ],
@@ -233,3 +241,50 @@ def test_the_diff_is_that_of_the_whole_files(tmp_path, block):
         before, after = (content.decode().splitlines() for content in (text, changed["model.inp"]))
         wanted = unified_diff(before, after, "model.inp (the model)", "model.inp (a draw)", lineterm="")
         assert deck.diff(changed).splitlines() == list(wanted)
+
+
+def test_an_option_between_those_of_a_material_does_not_hide_its_elasticity(tmp_path, block):
+    content = ABAQUS.replace(b"1e-9\n", b"1e-9\n*SOLUBILITY\n1.\n")
+    (after,) = written(tmp_path, "abaqus", content).with_materials({"Tissue": block("calculix")}).values()
+    assert b"*HyperElastic" not in after
+    assert after.count(b"*HYPERELASTIC") == 1
+    assert b"1e-9\n*SOLUBILITY\n1.\n** what follows goes\n*HYPERELASTIC" in after
+
+
+def test_a_density_in_a_comment_is_none(tmp_path, block):
+    density = b"<density>1.5e-9</density>"
+    content = FEBIO.replace(density, b"<!-- <density>7</density> --><density >1.5e-9</density>")
+    (after,) = written(tmp_path, "febio", content).with_materials({"2": block("febio", 2)}).values()
+    assert re.findall(rb"<density.*?</density>", after) == [b"<density >1.5e-9</density>"]
+    (after,) = (
+        written(tmp_path, "febio", FEBIO.replace(density, b"<!-- <density>7</density> -->"))
+        .with_materials({"2": block("febio", 2)})
+        .values()
+    )
+    assert b"<density>7" not in after
+
+
+def test_only_files_that_are_allowed_are_included_from_outside(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "mesh.inp").write_bytes(b"*NODE\n1, 0., 0., 0.\n")
+    file = tmp_path / "run" / "model.inp"
+    for name in ("../mesh.inp", str(tmp_path / "mesh.inp")):
+        file.write_text(f"*INCLUDE, INPUT={name}\n*MATERIAL, NAME=T\n")
+        with pytest.raises(tq.InputError, match="--also"):
+            Deck.read(file, allowed=())
+        assert Deck.read(file, allowed=[tmp_path / "mesh.inp"]).material("T")
+
+
+def test_what_a_file_outside_includes_is_outside_too(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "far").mkdir()
+    names = [str(tmp_path / "far" / name) for name in ("a.inp", "b.inp")]
+    Path(names[0]).write_text("*INCLUDE, INPUT=b.inp\n*INCLUDE, INPUT=c.inp\n")
+    Path(names[1]).write_text("** nothing\n")
+    (tmp_path / "run" / "c.inp").write_text("** nothing\n")
+    file = tmp_path / "run" / "model.inp"
+    file.write_text(f"*INCLUDE, INPUT={names[0]}\n")
+    deck = Deck.read(file)
+    assert (deck.outside, set(deck.files)) == (tuple(names), {"model.inp", "c.inp"})
+    with pytest.raises(tq.InputError, match=r"'a\.inp' includes .*b\.inp"):
+        Deck.read(file, allowed=[Path(names[0])])

@@ -43,3 +43,17 @@ def test_a_draw_that_fails_without_its_discrepancy_stays_in_the_band():
     wanted = np.cov(complete[rows, 1], alone[rows, 1])[0, 1] / complete[rows, 1].var(ddof=1)
     np.testing.assert_allclose(table["parameters"][1], wanted)
     np.testing.assert_allclose(table["parameters"] + table["discrepancy"], 1)
+
+
+def test_short_times_are_told_apart():
+    """Of steps of a microsecond, as in a model of an impact."""
+    times, rows = on_common_times([([1e-9, 2e-9], [1, 2]), ([1e-9, 4e-9], [1, 4])])
+    assert len(times) == TIMES
+    assert np.isnan(rows[0][-1])
+
+
+def test_the_share_beyond_is_a_whole_per_cent():
+    curve = {"complete": np.ones((50, 1))}
+    beyond = (np.ones(1), np.ones((50, 1)))
+    (text,) = ModelEnsemble({"q": np.ones(1)}, {"q": curve}, beyond, (), (), 0.0).warnings
+    assert "At the end 100 % of the elements" in text

@@ -7,6 +7,7 @@ import pytest
 
 from tissuq.decks import parse_quantity
 from tissuq.decks.abaqus import node_sets
+from tissuq.decks.calculix_results import Frd
 from tissuq.decks.quantity import Results
 from tissuq.errors import InputError
 
@@ -121,3 +122,42 @@ def test_sets_of_nodes_are_those_of_the_manual():
     deck = b"*NODE, NSET=All\n1, 0., 0., 0.\n2, 0., 0., 0.\n*NSET, NSET=Some\n1,\n*nset, nset=Row, generate\n2, 8, 3\n"
     deck += b"*NSET, NSET=BOTH\nSome, 9\nrow\n"
     assert node_sets([deck]) == {"ALL": {1, 2}, "SOME": {1}, "ROW": {2, 5, 8}, "BOTH": {1, 2, 5, 8, 9}}
+
+
+def test_sets_may_name_those_of_later_files_and_one_another():
+    files = [b"*NSET, NSET=A\nB, 1\n*NSET, NSET=C\nA\n", b"*NSET, NSET=B\n2\n"]
+    assert node_sets(files) == {"A": {1, 2}, "B": {2}, "C": {1, 2}}
+    assert node_sets([b"*NSET, NSET=A\nB, 1\n*NSET, NSET=B\nA, 2\n"]) == {"A": {1, 2}, "B": {1, 2}}
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"*NSET, NSET=A\nNONE, 1\n", "'A' has 'NONE'"),
+        (b"*NSET, NSET=A, GENERATE\n1, 5, 0\n", "'A' are not understood"),
+        (b"*NSET, NSET=A, GENERATE\n1, five\n", "'A' are not understood"),
+        (b"*NSET, NSET=A, GENERATE\n1\n", "'A' are not understood"),
+        (b"*NODE, NSET=A\none, 0., 0., 0.\n", "'A' are not understood"),
+    ],
+)
+def test_sets_that_are_not_understood_are_named(content, words):
+    with pytest.raises(InputError, match=words):
+        node_sets([content])
+
+
+@pytest.mark.parametrize("text", ["U1@TOP", "U@TOP", "S11@EALL"])
+def test_a_table_without_its_last_columns_is_damaged(tmp_path, text):
+    cut = "\n".join(line if "(" in line else line.rpartition(" ")[0] for line in TABLES.splitlines())
+    (tmp_path / "job.dat").write_text(cut)
+    with pytest.raises(InputError, match="cut short"):
+        parse_quantity("q", text).read(Results(tmp_path, "job"))
+
+
+def test_nodes_without_a_number_are_told_with_their_set(tmp_path):
+    values = np.array([1.0, np.nan])
+    frd = Frd(np.array([1, 2]), np.zeros((2, 3)), {}, {}, {"DISP": [(1.0, {f"D{axis}": values for axis in (1, 2, 3)})]})
+    results = Results(tmp_path, "job", node_sets={"ONE": {1}})
+    results.__dict__["frd"] = frd
+    with pytest.raises(InputError, match=r"U1@ALL:mean.*'ALL'"):
+        parse_quantity("q", "U1@ALL").read(results)
+    assert parse_quantity("q", "U1@ONE").read(results).values.tolist() == [1.0]

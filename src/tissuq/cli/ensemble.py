@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +24,7 @@ from tissuq.cli.options import (
     write_campaign_recipe,
 )
 from tissuq.errors import InputError
-from tissuq.studies.settings import load_settings
+from tissuq.studies.settings import is_inside, load_settings
 
 if TYPE_CHECKING:
     from tissuq.studies.ensemble import EnsembleSettings, PreparedEnsemble
@@ -101,7 +102,8 @@ def ensemble(
     from tissuq.report.ensemble import readable_quantities, write_ensemble
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import check_source
-    from tissuq.studies.ensemble import EnsembleSettings, forget_failures, prepare_ensemble, run_ensemble
+    from tissuq.studies.ensemble import EnsembleSettings, prepare_ensemble, run_ensemble
+    from tissuq.studies.ensemble_files import forget_failures
     from tissuq.studies.stream import open_pool
 
     if run is not None and model is None and run.is_file():
@@ -121,6 +123,8 @@ def ensemble(
             raise InputError(f"give {option}: what the model is asked for.")
     settings = load_settings(EnsembleSettings, config, options)
     beside = config.parent if config else Path()
+    if config:
+        _check_named_again(config, settings, options, dry_run)
     sources = list(dict.fromkeys(settings.materials.values()))
     named = beside if config else Path(sources[0])
     folder = out or Path("runs") / f"{named.resolve().name}-{Path(settings.model).stem}"
@@ -128,18 +132,20 @@ def ensemble(
         for source in sources:
             check_apart(folder, beside / source)
     with progress() as step:
-        prepared = prepare_ensemble(settings, beside, own_law(fitted_law), step, runs_here=not (dry_run or scheduler))
+        prepared = prepare_ensemble(
+            settings, beside, own_law(fitted_law), step, runs_here=not (dry_run or scheduler), is_dry=dry_run
+        )
     if dry_run:
         print(prepared.diff())
         print_explanations(prepared.card_warnings)
         return
-    stored = _stored(prepared, sources)
+    stored = _stored(prepared, sources, beside)
     check_folder(folder, stored, free=frozenset({"quantities"}))
     for number, source in enumerate(sources, start=1):
         check_source(beside / source, folder / POSTERIORS / str(number))
     _write_inputs(prepared, stored, sources, beside, folder)
     if again:
-        forget_failures(folder)
+        forget_failures(prepared, folder)
     processes = max_jobs or os.cpu_count() or 1
     with open_pool(processes, scheduler) as pool:
         study = run_ensemble(
@@ -153,17 +159,38 @@ def ensemble(
     print(f"Report: {folder / 'report.html'}")
 
 
-def _stored(prepared: PreparedEnsemble, sources: list[str]) -> EnsembleSettings:
+def _check_named_again(config: Path, settings: EnsembleSettings, options: dict[str, Any], dry_run: bool) -> None:
+    """Refuse to run programs, or to read files elsewhere, that a recipe names and the command line does not."""
+    from tissuq.mechanics.user_law import LAW
+
+    missing = []
+    if not dry_run:
+        if settings.command and not options["command"]:
+            missing.append(f"--command {shlex.quote(settings.command)}")
+        for name, text in settings.quantities.items():
+            if LAW.fullmatch(text) and name not in (options["quantities"] or {}):
+                missing.append(f"--qoi {shlex.quote(f'{name}={text}')}")
+    inside = config.parent.resolve()
+    if options["also"] is None and not all(is_inside(inside / file, inside) for file in settings.also):
+        missing += [f"--also {shlex.quote(file)}" for file in settings.also]
+    if missing:
+        raise InputError(
+            f"'{config}' names programs that would be run, or files outside of its folder. They are used only if named "
+            f"here, too; if you know them, add {' '.join(missing)}."
+        )
+
+
+def _stored(prepared: PreparedEnsemble, sources: list[str], beside: Path) -> EnsembleSettings:
     """Return the settings with the names that runs and files have in the folder of the ensemble."""
     from tissuq.report.simulation import SOURCE
-    from tissuq.studies.ensemble import MODEL, deck_folder
+    from tissuq.studies.ensemble_files import MODEL, stored_place
 
     settings = prepared.settings
     places = {source: f"{POSTERIORS}/{number}/{SOURCE}" for number, source in enumerate(sources, start=1)}
     changes = {
         "model": f"{MODEL}/{prepared.deck.main}",
         "materials": {name: places[source] for name, source in settings.materials.items()},
-        "also": [f"{MODEL}/{deck_folder(prepared.deck)}{Path(file).name}" for file in settings.also],
+        "also": [stored_place(prepared.deck, beside / file) for file in settings.also],
     }
     return settings.model_copy(update=changes)
 
@@ -174,7 +201,7 @@ def _write_inputs(
     """Write recipe and copies of all that an ensemble starts from, so that it can be repeated."""
     from tissuq.report.ensemble import copy_functions
     from tissuq.report.simulation import copy_source
-    from tissuq.studies.ensemble import copy_model
+    from tissuq.studies.ensemble_files import copy_model
 
     folder.mkdir(parents=True, exist_ok=True)
     copy_model(prepared, beside, folder)

@@ -7,19 +7,23 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.errors import InputError
 
 __all__ = ["AbaqusDeck", "Keyword", "keywords_of"]
 
 ELASTICITY = {"ELASTIC", "HYPERELASTIC", "HYPERFOAM", "ANISOTROPICHYPERELASTIC", "USERMATERIAL", "DEPVAR"}
 """Options of a material that a card replaces."""
-INDEPENDENT = {"DENSITY", "DAMPING", "EXPANSION", "CONDUCTIVITY", "SPECIFICHEAT", "PERMEABILITY", "POROUSBULKMODULI"}
-"""Options of a material that stay as they are."""
 DEPENDENT = {
     "VISCOELASTIC", "PLASTIC", "MULLINSEFFECT", "CREEP", "HYSTERESIS", "CYCLICHARDENING", "RATEDEPENDENT",
     "DEFORMATIONPLASTICITY", "NOCOMPRESSION", "NOTENSION", "LOWDENSITYFOAM", "DAMAGEINITIATION", "DAMAGEEVOLUTION",
     "UNIAXIALTESTDATA", "BIAXIALTESTDATA", "PLANARTESTDATA", "VOLUMETRICTESTDATA", "SIMPLESHEARTESTDATA",
 }  # fmt: skip
 """Options of a material that change its stress, or would be read together with another card."""
+ENDS = {
+    "MATERIAL", "STEP", "PART", "ENDPART", "ASSEMBLY", "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE", "NODE", "ELEMENT",
+    "NSET", "ELSET", "SURFACE", "SURFACEINTERACTION", "CONNECTORBEHAVIOR", "BOUNDARY", "AMPLITUDE", "INITIALCONDITIONS",
+}  # fmt: skip
+"""Keywords below which no option of a material stands, as well as those of sections."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,8 @@ def _joined(word: str) -> str:
 class AbaqusDeck(DeckFormat):
     """``*MATERIAL, NAME=...`` in any case: of its options those that say its elasticity are replaced.
 
-    The line with its name stays, and so do density, damping and the like.
+    The line with its name stays, and so do density, damping and other options that are not known to change its
+    stress.
     """
 
     name = "abaqus"
@@ -107,28 +112,54 @@ def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:
                 f"*{option.name} belongs to the elasticity that the deck has, and would be read with that of the "
                 "draws. Take it out of the deck, or give its effect to the material that is fitted."
             )
-        elif option.name not in INDEPENDENT:
+        elif option.name in ENDS or option.name.endswith("SECTION"):
             break
     return DeckMaterial(head.parameters.get("NAME", ""), "", tuple(spans or [(head.end, head.end)]), refused=refused)
 
 
 def node_sets(files: Sequence[bytes]) -> dict[str, set[int]]:
-    """Return the sets of nodes that decks define, by their names in capitals."""
+    """Return the sets of nodes that decks define, by their names in capitals, in whatever order they stand.
+
+    Raises
+    ------
+    InputError
+        When a set names one that no file defines, or its numbers are not understood.
+    """
     sets: dict[str, set[int]] = {}
+    parts: dict[str, set[str]] = {}
     for content in files:
         for keyword in keywords_of(content):
             name = keyword.parameters.get("NSET", "").upper()
             if keyword.name not in ("NSET", "NODE") or not name:
                 continue
-            rows = [[word.strip() for word in row.split(",") if word.strip()] for row in keyword.data]
-            members = sets.setdefault(name, set())
-            if keyword.name == "NODE":
-                members |= {int(row[0]) for row in rows}
-            elif "GENERATE" in keyword.parameters:
-                for row in rows:
-                    first, last, *step = map(int, row)
-                    members |= set(range(first, last + 1, *step))
-            else:
-                for word in (word for row in rows for word in row):
-                    members |= {int(word)} if word.isdigit() else sets.get(word.upper(), set())
+            members, names = sets.setdefault(name, set()), parts.setdefault(name, set())
+            try:
+                numbers, others = _members(keyword)
+            except (ValueError, TypeError) as error:
+                raise InputError(f"the numbers of the set of nodes '{name}' are not understood ({error}).") from error
+            members |= numbers
+            names |= others
+    for name, others in parts.items():
+        for unknown in sorted(others - set(sets)):
+            raise InputError(f"the set of nodes '{name}' has '{unknown}', which no file of the deck defines.")
+    while any(not sets[part] <= sets[name] for name, others in parts.items() for part in others):
+        for name, others in parts.items():
+            sets[name].update(*(sets[part] for part in others))
     return sets
+
+
+def _members(keyword: Keyword) -> tuple[set[int], set[str]]:
+    """Return the numbers of nodes below a keyword, and the names of sets, in capitals."""
+    rows = [[word.strip() for word in row.split(",") if word.strip()] for row in keyword.data]
+    if keyword.name == "NODE":
+        return {int(row[0]) for row in rows if row}, set()
+    words = [word for row in rows for word in row]
+    if "GENERATE" not in keyword.parameters:
+        return {int(word) for word in words if word.isdecimal()}, {
+            word.upper() for word in words if not word.isdecimal()
+        }
+    numbers: set[int] = set()
+    for row in rows:
+        first, last, step = (*map(int, row), 1)[:3]
+        numbers |= set(range(first, last + 1, step))
+    return numbers, set()

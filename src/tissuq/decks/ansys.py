@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.errors import InputError
 
 __all__ = ["AnsysDeck"]
 
@@ -13,7 +15,12 @@ ELASTIC_TABLES = {"HYPE", "ELAS", "ANEL", "AHYP"}
 OTHER_TABLES = {"DENS", "CTE", "THER", "SPEC", "SDAM"}
 """Tables that stay; any other changes the stress."""
 ELASTIC_CONSTANTS = {"EX", "EY", "EZ", "NUXY", "NUYZ", "NUXZ", "PRXY", "PRYZ", "PRXZ", "GXY", "GYZ", "GXZ"}
+REMARKS = ("/COM", "/TITLE", "/STITLE", "C***")
+"""What the commands of lines begin with whose words are for readers."""
 DATA = ("TBDATA", "TBDAT", "TBPT", "TBTEMP", "TBTEM", "TBEO", "TBFIELD")
+
+
+NOT_A_NUMBER = "a card needs its number in digits: write that in the place of the parameter."
 
 
 class AnsysDeck(DeckFormat):
@@ -66,8 +73,10 @@ class AnsysDeck(DeckFormat):
                 in_table = ""
             if in_table:
                 spans[in_table].append((line.start, line.end))
+        for name, number in _parameters(content, {name for name in spans if not name.isdecimal()}):
+            refused[number] = f"commands call it '{name}', too: write its number in the place of that parameter."
         return [
-            DeckMaterial("", number, tuple(lines), (), refused.get(number, ""))
+            DeckMaterial("", number, tuple(lines), (), refused.get(number, "" if number.isdecimal() else NOT_A_NUMBER))
             for number, lines in spans.items()
             if lines
         ]
@@ -79,11 +88,25 @@ class AnsysDeck(DeckFormat):
 def _commands(content: bytes) -> list[tuple[Line, list[str]]]:
     """Return the lines with commands, and the words of each, the command in capitals; comments follow a ``!``."""
     commands = []
-    for line in lines_of(content):
-        words = [word.strip() for word in line.text.partition("!")[0].split(",")]
+    for number, line in enumerate(lines_of(content), start=1):
+        text = line.text.partition("!")[0]
+        if "$" in text and not text.strip().upper().startswith(REMARKS):
+            raise InputError(f"line {number} of the ANSYS deck has several commands ($): write each in a line.")
+        words = [word.strip() for word in text.split(",")]
         if words[0]:
             commands.append((line, [words[0].upper(), *words[1:]]))
     return commands
+
+
+def _parameters(content: bytes, names: Collection[str]) -> list[tuple[str, str]]:
+    """Return the parameters of some names that a file sets to whole numbers, and these."""
+    by_name = {name.upper(): name for name in names}
+    values = []
+    for _, words in _commands(content) if by_name else ():
+        key, _, value = words[0].partition("=") if words[0] != "*SET" else (_word(words, 1), "", _word(words, 2))
+        if key.strip().upper() in by_name and value.strip().isdecimal():
+            values.append((by_name[key.strip().upper()], value.strip()))
+    return values
 
 
 def _word(words: list[str], index: int) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import unified_diff
 from pathlib import Path, PurePosixPath
@@ -125,7 +126,7 @@ class Deck:
     root : Path
         The folder that holds all of them.
     outside : tuple of str
-        Included files with absolute names, which stay where they are.
+        Included files with absolute names, and those that these include, which stay where they are.
     """
 
     format: DeckFormat
@@ -135,7 +136,7 @@ class Deck:
     outside: tuple[str, ...] = ()
 
     @classmethod
-    def read(cls, path: str | Path, format: str | None = None) -> Deck:
+    def read(cls, path: str | Path, format: str | None = None, allowed: Collection[Path] | None = None) -> Deck:
         r"""Return the deck in a file.
 
         Parameters
@@ -144,11 +145,13 @@ class Deck:
         format : str, optional
             ``"abaqus"`` (CalculiX, too), ``"febio"``, ``"ls-dyna"`` or ``"ansys"``; unless given, what the file looks
             like.
+        allowed : collection of Path, optional
+            Files outside of the folder of the deck that it may include, absolute; unless given, all.
 
         Raises
         ------
         InputError
-            When a file is missing, or is of no known format.
+            When a file is missing, is of no known format, or may not be included.
 
         Examples
         --------
@@ -167,21 +170,28 @@ class Deck:
         deck_format = (
             find(DeckFormat, "format of decks", format, InputError)() if format else _recognised(main, content)
         )
-        files, outside, waiting = {main: content}, [], [main]
+        files, outside, waiting = {main: content}, dict[Path, bytes](), [main]
         while waiting:
             file = waiting.pop()
-            for name in deck_format.includes(files[file]):
-                if os.path.isabs(name):
-                    outside.append(name)
-                    continue
+            for name in deck_format.includes(files[file] if file in files else outside[file]):
                 beside = [Path(os.path.abspath(folder / name)) for folder in (main.parent, file.parent)]
-                included = next((candidate for candidate in beside if candidate.is_file()), beside[0])
-                if included not in files:
+                included = next((candidate for candidate in beside if os.path.isfile(candidate)), beside[0])
+                is_below = included.is_relative_to(main.parent)
+                if os.path.isabs(name) or not is_below:
+                    _check_allowed(included, file, allowed)
+                if included in files or included in outside:
+                    continue
+                if not os.path.isabs(name) and (is_below or file in files):
                     files[included] = _content(included, f"file that '{file.name}' includes")
                     waiting.append(included)
+                elif os.path.isfile(included):
+                    outside[included] = _content(included, f"file that '{file.name}' includes")
+                    waiting.append(included)
+                else:
+                    outside[included] = b""
         root = Path(os.path.commonpath([file.parent for file in files]))
         relative = {file.relative_to(root).as_posix(): text for file, text in files.items()}
-        return cls(deck_format, main.relative_to(root).as_posix(), relative, root, tuple(outside))
+        return cls(deck_format, main.relative_to(root).as_posix(), relative, root, tuple(map(str, outside)))
 
     @property
     def job(self) -> str:
@@ -246,8 +256,18 @@ class Deck:
 def _content(file: Path, what: str) -> bytes:
     try:
         return file.read_bytes()
-    except OSError as error:
-        raise InputError(f"the {what} '{file}' cannot be read: {error.strerror}.") from error
+    except (OSError, ValueError) as error:  # the latter of a NUL in its name
+        reason, readable = getattr(error, "strerror", None) or error, repr(str(file))[1:-1]
+        raise InputError(f"the {what} '{readable}' cannot be read: {reason}.") from error
+
+
+def _check_allowed(included: Path, file: Path, allowed: Collection[Path] | None) -> None:
+    """Refuse a file outside of the folder of a deck unless it is one of those that may be included."""
+    if allowed is not None and included not in allowed:
+        raise InputError(
+            f"'{file.name}' includes '{included}', outside of the folder of the model: if that is meant, add "
+            f"--also {shlex.quote(str(included))}."
+        )
 
 
 def _recognised(file: Path, content: bytes) -> DeckFormat:

@@ -56,6 +56,7 @@ class _Parsed:
         self._start = 0
         self._attributes: dict[str, str] = {}
         self._words = ""
+        self._density = (0, 0)
         self._parser = ParserCreate()
         self._parser.StartElementHandler = self._open
         self._parser.EndElementHandler = self._close
@@ -70,6 +71,9 @@ class _Parsed:
             self.includes.append(attributes["from"])
         if name == "material" and self._stack[-1:] == ["Material"]:
             self._start, self._attributes = self._parser.CurrentByteIndex, attributes
+            self._density = (0, 0)
+        if name == "density" and self._stack[-2:] == ["Material", "material"]:
+            self._density = (self._parser.CurrentByteIndex, 0)
         self._stack.append(name)
         self._words = ""
 
@@ -80,20 +84,23 @@ class _Parsed:
         self._stack.pop()
         if name == "Include":
             self.includes.append(self._words.strip())
+        if name == "density" and self._stack[-2:] == ["Material", "material"]:
+            self._density = (self._density[0], self._end())
         if name == "material" and self._stack[-1:] == ["Material"]:
-            at = self._parser.CurrentByteIndex
-            end = self.content.index(b">", at) + 1  # of the closing tag, or of one that closes itself
-            text = decoded(self.content[self._start : end])
-            self.materials.append(_material(text, self._attributes, (self._start, end)))
+            end = self._end()
+            text, density = (decoded(self.content[slice(*span)]) for span in ((self._start, end), self._density))
+            self.materials.append(_material(text, density, self._attributes, (self._start, end)))
+
+    def _end(self) -> int:
+        """Return where the element ends that is being closed: its closing tag, or one that closes itself."""
+        return self.content.index(b">", self._parser.CurrentByteIndex) + 1
 
 
-def _material(text: str, attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
+def _material(text: str, density: str, attributes: dict[str, str], span: tuple[int, int]) -> DeckMaterial:
     head = text[: text.index(">") + 1]
     if head.endswith("/>"):
         head = head[:-2].rstrip() + ">"
-    density = DENSITY.search(text)
     refused = "" if attributes.get("type") != SHARED else "it is a rigid body."
     return DeckMaterial(
-        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, density[0] if density else ""),
-        refused,
+        attributes.get("name", ""), attributes.get("id", ""), (span,), (head, density), refused,
     )  # fmt: skip

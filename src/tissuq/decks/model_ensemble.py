@@ -151,7 +151,8 @@ def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
     present = [pair for pair in pairs if pair is not None and len(pair[0])]
     longest = max((times for times, _ in present), key=lambda times: (times[-1], len(times)))
     is_prefix = all(
-        len(times) <= len(longest) and np.allclose(times, longest[: len(times)], rtol=SAME_TIME) for times, _ in present
+        len(times) <= len(longest) and np.allclose(times, longest[: len(times)], rtol=SAME_TIME, atol=0)
+        for times, _ in present
     )
     common = longest if is_prefix else np.linspace(max(times[0] for times, _ in present), longest[-1], TIMES)
     rows = np.full((len(pairs), len(common)), np.nan)
@@ -160,7 +161,7 @@ def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
             row[: len(pair[1])] = pair[1]
         elif pair is not None and len(pair[0]):
             row[:] = np.interp(common, pair[0], pair[1], right=np.nan)
-            row[-1] = pair[1][-1] if np.isclose(pair[0][-1], common[-1], rtol=SAME_TIME) else np.nan
+            row[-1] = pair[1][-1] if np.isclose(pair[0][-1], common[-1], rtol=SAME_TIME, atol=0) else np.nan
     return common, rows
 
 
@@ -194,8 +195,8 @@ def _failed(ensemble: ModelEnsemble) -> list[str]:
         more = f" and {count - MAX_DRAWS_NAMED} more" if count > MAX_DRAWS_NAMED else ""
         texts.append(
             f"{count} of {ensemble.draws} {FAMILIES[family]} failed ({named}{more}; first reason: "
-            f"{failures[0].problem}). failures.csv has all of them with the solver's last lines. Each time shows only "
-            "the draws that reached it, which may no longer be a fair sample."
+            f"{failures[0].problem}). failures.csv has all of them with the solver's last lines; --again makes them "
+            "again. Each time shows only the draws that reached it, which may no longer be a fair sample."
         )
     return texts
 
@@ -207,7 +208,7 @@ def _beyond(ensemble: ModelEnsemble) -> list[str]:
     if share < MIN_SHARE_BEYOND:
         return []
     return [
-        f"At the end {100 * share:.2g} % of the elements are strained beyond what was measured (I1 or I2). There a "
+        f"At the end {100 * share:.0f} % of the elements are strained beyond what was measured (I1 or I2). There a "
         "card goes on as its form does, with an error that no number here holds: measure further, or load the model "
         "less."
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
@@ -18,11 +18,11 @@ import numpy as np
 from tissuq.decks.abaqus import AbaqusDeck, node_sets
 from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
-from tissuq.decks.quantity import Quantity, Results
+from tissuq.decks.quantity import Component, Quantity, Results
 from tissuq.decks.solver import LOG, Solver
 from tissuq.errors import InputError
 
-__all__ = ["DONE", "FIELDS", "SCRATCH", "ModelRun", "carried_out"]
+__all__ = ["DONE", "FIELDS", "SCRATCH", "ModelRun", "carried_out", "sets_of"]
 
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
@@ -107,7 +107,7 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
         stored = _solved(task)
     deck = task.deck
     job_folder = task.folder / PurePosixPath(task.main).parent
-    sets = node_sets(list(deck.files.values())) if isinstance(deck.format, AbaqusDeck) else {}
+    sets = sets_of(deck, task.quantities)
     results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets)
     curves, misread = _curves(task, results)
     beyond = None
@@ -116,6 +116,18 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     if not task.keep:
         _strip(task.folder)
     return {**stored, "curves": curves, "misread": misread, "beyond": beyond, "folder": task.folder.name}
+
+
+def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
+    """Return the sets of nodes of a deck where a quantity is that of a set.
+
+    Raises
+    ------
+    InputError
+        When they are not understood.
+    """
+    is_needed = any(isinstance(quantity, Component) for quantity in quantities)
+    return node_sets(list(deck.files.values())) if is_needed and isinstance(deck.format, AbaqusDeck) else {}
 
 
 def _digest(*parts: object) -> str:

@@ -165,6 +165,18 @@ class Component(Quantity):
         return f"{word}@{self.set_name}:{self.how}"
 
     def read(self, results: Results) -> Curve:
+        try:
+            curve = self._read(results)
+        except (ValueError, LookupError) as error:
+            raise InputError(f"{self.text}: the results of '{results.job}' are cut short or damaged.") from error
+        if not np.isfinite(curve.values).all():
+            raise InputError(
+                f"{self.text}: the results of '{results.job}' have no number at some nodes of the set "
+                f"'{self.set_name}'; ask for a set whose nodes are all written."
+            )
+        return curve
+
+    def _read(self, results: Results) -> Curve:
         for what in KINDS[self.kind].tables:
             table = results.tables.get((what, self.set_name))
             if table is not None and (self.how == "sum" or not what.startswith("total")):

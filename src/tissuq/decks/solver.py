@@ -71,7 +71,7 @@ class Solver(ABC):
         text = self.command or self.template
         try:
             return [word.format(job=job, deck=deck) for word in shlex.split(text)]
-        except (ValueError, LookupError) as error:
+        except (ValueError, LookupError, AttributeError, TypeError) as error:
             names = " and ".join(f"{{{name}}}" for name in PLACEHOLDERS)
             raise InputError(
                 f"the command '{text}' is not understood ({error}); {names} stand for the deck."

@@ -19,7 +19,8 @@ from tissuq.finite_elements.spread import band_probability
 from tissuq.report.ensemble_figures import ensemble_figures, write_fields
 from tissuq.report.run_folder import write_figures, write_page
 from tissuq.report.tables import significant, write_csv
-from tissuq.studies.ensemble import DRAWS, EnsembleStudy
+from tissuq.studies.ensemble import EnsembleStudy
+from tissuq.studies.ensemble_files import DRAWS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import filecmp
-import json
+import os
 import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
@@ -17,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
-from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out
+from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out, sets_of
 from tissuq.errors import InputError
 from tissuq.export import Cards, CardSettings, card_format
 from tissuq.finite_elements.simulation import COMPLETE, MATERIAL_ONLY
@@ -26,17 +25,12 @@ from tissuq.mechanics.user_law import LAW
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.ensemble import Ensemble, Sampling
 from tissuq.studies.earlier_run import load
+from tissuq.studies.ensemble_files import DRAWS, MODEL, extra_files
 from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
 
 __all__ = [
-    "DRAWS", "MODEL", "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "copy_model", "forget_failures",
-    "prepare_ensemble", "run_ensemble",
+    "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "prepare_ensemble", "run_ensemble",
 ]  # fmt: skip
-
-MODEL = "model"
-"""Folder with copies of the files of the model."""
-DRAWS = "draws"
-"""Folder with a folder for each run."""
 
 
 class EnsembleSettings(BaseModel):
@@ -157,6 +151,7 @@ def prepare_ensemble(
     step: Callable[[str], None] = lambda text: None,
     *,
     runs_here: bool = True,
+    is_dry: bool = False,
 ) -> PreparedEnsemble:
     """Return deck, solver, quantities and cards of an ensemble; nothing is run.
 
@@ -171,6 +166,8 @@ def prepare_ensemble(
         Told what is being done.
     runs_here : bool
         Whether the solver is to be run by this machine.
+    is_dry : bool
+        Whether nothing is to be run at all, functions of the user's included.
 
     Raises
     ------
@@ -179,11 +176,12 @@ def prepare_ensemble(
         used.
     """
     settings.card_settings()
-    deck = Deck.read(beside / settings.model, settings.deck)
+    named = {Path(os.path.abspath(beside / name)) for name in settings.also}
+    deck = Deck.read(beside / settings.model, settings.deck, named)
     solver = solver_for(deck.format.name, settings.solver, settings.command)
     if runs_here:
         solver.check_installed()
-    _extra_files(deck, settings, beside)
+    extra_files(deck, settings.also, beside)
     quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
     replaced = {name: deck.material(name) for name in settings.materials}
     if len(set(replaced.values())) < len(replaced):
@@ -205,15 +203,17 @@ def prepare_ensemble(
     for name, ensemble in ensembles.items():
         step(f"cards of {name}")
         number = replaced[name].number
-        card_settings = settings.card_settings(number=int(number) if number.isdigit() else 1)
+        card_settings = settings.card_settings(number=int(number) if number.isdecimal() else 1)
         cards[COMPLETE][name] = formatting.cards(ensemble, card_settings)
         if not cards[COMPLETE][name].blocks:
             raise InputError(f"cards of the format '{settings.card_format}' do not go into a deck.")
         if is_shared:
             cards[MATERIAL_ONLY][name] = formatting.cards(ensemble.alone, card_settings)
     _check_names(quantities, ensembles)
+    _check_functions(quantities)
     prepared = PreparedEnsemble(settings, deck, solver, quantities, ensembles, cards)
-    for quantity in quantities:
+    sets_of(deck, quantities)
+    for quantity in quantities if not is_dry else ():
         quantity.check()
     return prepared
 
@@ -262,60 +262,16 @@ def run_ensemble(
     unique = list({task.key: task for task in tasks}.values())
     with progress(len(unique)) as step:
         if unique[0].key not in read_results(folder / RESULTS):
-            run_tasks(unique[:1], carried_out, folder, pool=pool)
+            run_tasks(unique[:1], carried_out, folder, pool=pool, others_stay=True)
         first = read_results(folder / RESULTS)[unique[0].key]
         if first["misread"] and not first["problem"]:
-            raise InputError(first["misread"])
+            raise InputError(
+                f"{first['misread']} This is kept as the result of draw 1: when the reason is gone, the same command "
+                "with --again makes it again."
+            )
         results = run_tasks(unique, carried_out, folder, pool=pool, limit=limit, step=step)
-    by_key = {result["key"]: result for result in results}
+    by_key = {task.key: {**result, "folder": task.folder.name} for task, result in zip(unique, results, strict=True)}
     return EnsembleStudy(prepared, gathered(tasks, [by_key[task.key] for task in tasks]))
-
-
-def copy_model(prepared: PreparedEnsemble, beside: Path, folder: Path) -> None:
-    """Copy the files of the model into the folder of an ensemble, or see that they are those that lie there.
-
-    Raises
-    ------
-    InputError
-        When the folder holds another model.
-    """
-    deck, stored = prepared.deck, folder / MODEL
-    extra = _extra_files(deck, prepared.settings, beside)
-    if stored.is_dir():
-        stored_files = {name: (stored / name).read_bytes() for name in deck.files if (stored / name).is_file()}
-        if stored_files != deck.files or not all(
-            filecmp.cmp(stored / name, file, False) for name, file in extra.items()
-        ):
-            raise InputError(f"'{folder}' holds an ensemble of another model; choose another folder with --out.")
-        return
-    scratch = folder / f"{MODEL}.new"
-    shutil.rmtree(scratch, ignore_errors=True)
-    for name, content in deck.files.items():
-        (scratch / name).parent.mkdir(parents=True, exist_ok=True)
-        (scratch / name).write_bytes(content)
-    for name, file in extra.items():
-        shutil.copyfile(file, scratch / name)
-    scratch.rename(stored)
-
-
-def deck_folder(deck: Deck) -> str:
-    """Return the folder of the deck's main file within its root, with a slash at the end unless it is the root."""
-    return deck.main[: deck.main.rfind("/") + 1]
-
-
-def forget_failures(folder: Path) -> int:
-    """Take the results of runs that failed off the file of results, and their folders away; return how many."""
-    path = folder / RESULTS
-    results = read_results(path)
-    failed = {key for key, result in results.items() if result.get("problem") or result.get("misread")}
-    for key in failed:
-        shutil.rmtree(folder / DRAWS / str(results[key]["folder"]), ignore_errors=True)
-    if failed:
-        lines = (json.dumps(result) + "\n" for key, result in results.items() if key not in failed)
-        scratch = path.with_suffix(".new")
-        scratch.write_text("".join(lines), encoding="utf-8")
-        scratch.replace(path)
-    return len(failed)
 
 
 def _check_names(quantities: tuple[Quantity, ...], ensembles: Mapping[str, Ensemble]) -> None:
@@ -326,15 +282,17 @@ def _check_names(quantities: tuple[Quantity, ...], ensembles: Mapping[str, Ensem
             raise InputError(f"a quantity cannot be called '{quantity.name}', as a column of the draws: rename it.")
 
 
-def _extra_files(deck: Deck, settings: EnsembleSettings, beside: Path) -> dict[str, Path]:
-    """Return the files that go with the deck, by their places in its folder."""
-    extra = {deck_folder(deck) + Path(name).name: beside / name for name in settings.also}
-    for name, file in extra.items():
-        if not file.is_file():
-            raise InputError(f"there is no file '{file}' to go with the model (--also).")
-        if name in deck.files:
-            raise InputError(f"'{file}' would take the place of a file of the model (--also).")
-    return extra
+def _check_functions(quantities: tuple[Quantity, ...]) -> None:
+    """Refuse functions in different files of one name, which a recipe could not tell apart."""
+    files: dict[str, Path] = {}
+    for quantity in quantities:
+        if isinstance(quantity, FunctionQuantity):
+            file = Path(quantity.location.rpartition(":")[0])
+            first = files.setdefault(file.name, file)
+            if first.resolve() != file.resolve():
+                raise InputError(
+                    f"two files of quantities are called '{file.name}' (--qoi): '{first}' and '{file}'; rename one."
+                )
 
 
 def _quantity(name: str, text: str, beside: Path) -> Quantity:

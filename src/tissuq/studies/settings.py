@@ -13,7 +13,7 @@ from tissuq.errors import InputError, TissuqError
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["DAMAGE", "RECIPE", "damage_reported", "load_settings", "looked_up", "setting_of"]
+__all__ = ["DAMAGE", "RECIPE", "damage_reported", "is_inside", "load_settings", "looked_up", "setting_of"]
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
@@ -90,14 +90,15 @@ def _check_inside(recipe: Path, settings: Any) -> None:
     for name, value in settings.items() if isinstance(settings, dict) else ():
         for entry in value if isinstance(value, list) else [value]:
             _check_inside(recipe, entry)
-            if name in ("file", "files") and isinstance(entry, str) and not _is_inside(folder / entry, folder):
+            if name in ("file", "files") and isinstance(entry, str) and not is_inside(folder / entry, folder):
                 raise InputError(
                     f"{recipe} names the file '{entry}', which does not lie in the folder of that run. Give the file "
                     f"itself, or call the configuration another name than {RECIPE} if it is your own."
                 )
 
 
-def _is_inside(file: Path, folder: Path) -> bool:
+def is_inside(file: Path, folder: Path) -> bool:
+    """Return whether a file lies in a folder, which is resolved, with all links followed."""
     try:
         return file.resolve().is_relative_to(folder)
     except (OSError, ValueError, RuntimeError):  # such as a NUL or a circle of links

@@ -189,6 +189,7 @@ def run_tasks(
     pool: Executor | None = None,
     limit: int | None = None,
     step: Step = silent,
+    others_stay: bool = False,
 ) -> list[dict[str, Any]]:
     """Carry out what is not done yet, and return the results of all tasks, in their order.
 
@@ -208,6 +209,8 @@ def run_tasks(
         Tasks that are carried out at the same time, where they may be fewer than the pool has workers.
     step : callable
         Told of every task that is done: its label, and whether it was done now or before.
+    others_stay : bool
+        Leave the results of other tasks in the file.
     """
     path = folder / RESULTS
     done = read_results(path)
@@ -223,9 +226,10 @@ def run_tasks(
             os.fsync(file.fileno())
             step(task.label, True)
     results = [done[task.key] for task in tasks]
-    scratch = path.with_suffix(".new")
-    scratch.write_text("".join(json.dumps(result_row) + "\n" for result_row in results), encoding="utf-8")
-    scratch.replace(path)
+    if not others_stay:
+        scratch = path.with_suffix(".new")
+        scratch.write_text("".join(json.dumps(result_row) + "\n" for result_row in results), encoding="utf-8")
+        scratch.replace(path)
     return results
 
 
