@@ -92,7 +92,7 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     unit = ResultWarning("check the unit: MPa was assumed.", "doubtful-reading", Severity.PROBLEM)
     answer = posterior.answer_with([unit])
     assert answer.uses[0].verdict is Verdict.NO
-    assert answer.next_step.shell == unit
+    assert answer.next_step.shell == "act on the first warning: it says what to do."
     vague = gallery.fit(
         tq.simulate("yeoh", YEOH, [1.1, 1.3, 1.5], noise_sd=0.05, seed=1), discrepancy="auto", noise_sd=0.05
     )

@@ -46,7 +46,7 @@ def test_a_run_becomes_the_cards_of_its_posterior(cli, here, run):
     typical = min(rows, key=lambda row: float(row["from_median"]))["file"]
     assert f"median stresses: {typical}\n" in said.out
     text = (here / "cards" / "specimen-calculix" / "draw-2.inp").read_text()
-    assert "run specimen of tissuq fit, sobol draws from seed 3" in " ".join(text.split())
+    assert "run specimen of tissuq, sobol draws from seed 3" in " ".join(text.split())
 
 
 def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):

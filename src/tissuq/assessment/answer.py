@@ -302,6 +302,7 @@ STEPS: Mapping[str, Step] = {
         "let the data decide how wrong the material is: fit again with --discrepancy auto.",
         'let the data decide how wrong the material is: fit again with discrepancy="auto".',
     ),
+    "problem": Step("act on the first warning: it says what to do.", "act on the first warning: it says what to do."),
     "measurements": Step(
         "act on the first warning: it concerns the measurements themselves.",
         "act on the first warning: it concerns the measurements themselves.",
@@ -332,9 +333,8 @@ STEPS: Mapping[str, Step] = {
 
 def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[ResultWarning]) -> Step:
     """Return the one thing to do next."""
-    for warning in warnings:
-        if warning.severity is Severity.PROBLEM:
-            return Step(warning.shell, str(warning))
+    if any(warning.severity is Severity.PROBLEM for warning in warnings):
+        return STEPS["problem"]
     reporting, _, others, simulating = (use.verdict for use in uses)
     codes = {warning.code for warning in warnings}
     model = solution.model
