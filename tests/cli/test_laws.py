@@ -47,9 +47,8 @@ def test_a_law_is_fitted_as_that_of_the_library(cli, law, specimen):
     own = cli("fit", specimen, "--material", "law.py:exponential", *FIT, "--out", "own")
     known = cli("fit", specimen, "--material", "demiray", *FIT, "--prior", "b=uniform(0.1,20)", "--out", "known")
     assert (own.status, known.status) == (0, 0)
-    rows = [
-        next(line.split() for line in said.out.splitlines() if line.split()[:1] == ["none"]) for said in (own, known)
-    ]
+    tables = [cli("show", run, "--details").out.splitlines() for run in ("own", "known")]
+    rows = [next(line.split() for line in table if line.split()[:1] == ["none"]) for table in tables]
     assert rows[0][:5] == rows[1][:5]  # the evidence also tells that mu of demiray is positive
 
 
