@@ -253,10 +253,9 @@ def _other_modes(
         return Verdict.NO, str(error)
     verdict = _worst(*(_precision(width)[0] for width in widths.values()))
     of_modes = ", ".join(f"{name} stress {_percent(width)}" for name, width in widths.items())
-    sentence = f"within the strains that were measured: {of_modes}"
-    if not solution.is_of_data:
-        return verdict, f"within the strains that were stated: {of_modes}"
-    if len(measured) == 1:
+    origin = "measured" if solution.is_of_data else "stated"
+    sentence = f"within the strains that were {origin}: {of_modes}"
+    if solution.is_of_data and len(measured) == 1:
         return _worst(verdict, Verdict.CARE), f"{sentence}; only one mode was measured"
     return verdict, sentence
 

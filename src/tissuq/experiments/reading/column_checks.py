@@ -11,9 +11,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.headings import (
-    heading,
-)
+from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -78,18 +76,19 @@ def check_machine(table: Table, quantities: Sequence[str], column_read: int, mea
         roles = {"": measure, "strain": measure}
     seen = {column: roles.get(measured_in(table.unit(column))) for column in on_specimen}
     if measure == "displacement":
-        ratios = (column for column in on_specimen if not measured_in(table.unit(column)))
-        seen |= {column: _ratio_role(table, column) for column in ratios if _is_ratio(table, column)}
-        seen |= {column: _ratio_role(table, column) for column in _ratios(table, quantities, column_read)}
+        unitless = {
+            column for column in on_specimen if not measured_in(table.unit(column)) and _is_ratio(table, column)
+        }
+        ratios = unitless.union(_ratios(table, quantities, column_read))
+        seen |= {column: _ratio_role(table, column) for column in sorted(ratios)}
     seen = {column: role for column, role in seen.items() if role}
     if not seen or (measure != "displacement" and all(_is_same(table, column_read, column) for column in seen)):
         return
     labels = " and ".join(map(table.label, seen))
     choices = [(measure, column_read), *((str(role), column) for column, role in seen.items())]
     flags = " or ".join(f'--column {role}="{table.names[column]}"' for role, column in choices)
-    what = "displacement of the machine" if measure == "displacement" else f"{measure} of the machine"
     raise InputError(
-        f"{table.file}: column {table.label(column_read)} is the {what}, and {labels} was "
+        f"{table.file}: column {table.label(column_read)} is the {measure} of the machine, and {labels} was "
         "measured on the specimen, by an extensometer or a camera. They give different stretches. Say which is read: "
         f"{flags}."
     )
