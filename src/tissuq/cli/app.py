@@ -13,6 +13,7 @@ import typer
 from tissuq.cli import (
     calibrate,
     catalogue,
+    design,
     ensemble,
     fit,
     inspect,
@@ -63,7 +64,7 @@ app.command("predict", cls=Renamed)(runs.predict)
 app.command("population", cls=Renamed)(fit.population)
 app.command("calibrate")(calibrate.calibrate)
 app.command("compare")(runs.compare)
-app.command("design", cls=Renamed)(runs.design)
+app.command("design", cls=Renamed)(design.design)
 app.command("export", cls=Renamed)(runs.export)
 app.command("structure", cls=Renamed)(structure.structure)
 app.command("ensemble")(ensemble.ensemble)

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from tissuq.cli.options import Config, Figures, Force, Seed, campaign_progress, not_converged, once_each, parse_prior
+from tissuq.cli.options import Config, Figures, Force, Seed, campaign_progress, not_converged
 from tissuq.errors import InputError
+from tissuq.studies.option_texts import priors
 from tissuq.studies.settings import load_settings
 
 __all__ = ["calibrate"]
@@ -84,7 +85,7 @@ def calibrate(
         "noise_sd": _noise(noise_sd), "zero_load": zero_load, "runs": runs, "refine": refine, "design": design,
         "kernel": kernel, "trend": trend, "method": method, "material": material,
         "range": stretches, "mode": mode, "unit": unit, "every": every, "sheet": _column(sheet),
-        "skip_rows": skip_rows, "seed": seed, "priors": once_each("--prior", map(parse_prior, prior or [])) or None,
+        "skip_rows": skip_rows, "seed": seed, "priors": priors(prior or []) or None,
     }  # fmt: skip
     if not (prior or config):
         raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5).")

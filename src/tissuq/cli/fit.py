@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from tissuq.cli import reading
-from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, once_each, parse_prior, progress
+from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, progress
 from tissuq.cli.reading import one_noise
 from tissuq.errors import InputError
 from tissuq.result_warning import Severity
+from tissuq.studies.option_texts import priors
 from tissuq.studies.settings import load_settings, setting_of
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ def fit(
     measured, found = reading.measured([] if config else files, read_as, mode, specimen, noise_sd)
     options |= measured
     if prior:
-        options["priors"] = once_each("--prior", map(parse_prior, prior))
+        options["priors"] = priors(prior)
     if not file and not config:
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
     if config and len(files) > 1:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import MISSING, fields
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tissuq.cli.progress import campaign_progress, progress
 from tissuq.errors import InputError
+from tissuq.studies.option_texts import once_each
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -33,7 +30,6 @@ __all__ = [
     "not_converged",
     "once_each",
     "own_law",
-    "parse_prior",
     "progress",
     "write_campaign_recipe",
 ]
@@ -57,37 +53,6 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an existing folder
 NOT_CONVERGED = 3
 
 
-def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the pairs of a repeatable option as a dictionary, each name given once."""
-    values_by_name: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in values_by_name:
-            raise InputError(f"{option} is given twice for '{name}'; give it once.")
-        values_by_name[name] = value
-    return values_by_name
-
-
-def parse_prior(text: str) -> tuple[str, dict[str, Any]]:
-    """Return the symbol and the prior of a text like ``C10=uniform(0, 5)``."""
-    from tissuq.parameters.priors import Prior
-    from tissuq.registry import find
-
-    match = re.fullmatch(r"\s*(\w+)\s*=\s*([\w-]+)\s*\(([^()]*)\)\s*", text)
-    if match is None:
-        raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
-    symbol, distribution, numbers = match.groups()
-    arguments = fields(find(Prior, "prior distribution", distribution, InputError))
-    try:
-        values = [float(number) for number in numbers.split(",")] if numbers.strip() else []
-    except ValueError as error:
-        raise InputError(f"prior '{text}': the arguments must be numbers, with a decimal point.") from error
-    names, needed = [field.name for field in arguments], sum(field.default is MISSING for field in arguments)
-    if not needed <= len(values) <= len(names):
-        optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
-        raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
-    return symbol, {"distribution": distribution, **dict(zip(names, values, strict=False))}
-
-
 def own_law(material: str | None) -> Material | None:
     """Return the law in a file that ``--user-law`` names for a run whose material is one."""
     from tissuq.mechanics import material_named
@@ -98,57 +63,6 @@ def own_law(material: str | None) -> Material | None:
             "law in your own file."
         )
     return material_named(material, laws=True) if material else None
-
-
-@contextmanager
-def progress(total: int | None = None) -> Iterator[Callable[[str], None]]:
-    """Show the steps of a long run on a terminal; give the function that announces the next step."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=total)
-        started = 0
-
-        def step(text: str) -> None:
-            nonlocal started
-            bar.update(task, description=text, completed=started)
-            started += 1
-
-        yield step
-
-
-@contextmanager
-def campaign_progress(total: int) -> Iterator[Callable[[str, bool], None]]:
-    """Show how much of a campaign is done and how long it will still take; give the function to call after each task.
-
-    Tasks that an earlier run had done count as done, but not in the estimate of the time.
-    """
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        shown = bar.add_task("", total=total)
-        start, finished, computed = monotonic(), 0, 0
-
-        def step(text: str, is_new: bool) -> None:
-            nonlocal finished, computed
-            finished, computed = finished + 1, computed + is_new
-            seconds_left = (monotonic() - start) / computed * (total - finished) if computed else None
-            bar.update(shown, description=f"{_duration(seconds_left)}{text}", completed=finished)
-
-        yield step
-
-
-def _duration(seconds: float | None) -> str:
-    if seconds is None:
-        return ""
-    minutes, remaining = divmod(round(seconds), 60)
-    return f"{minutes // 60} h {minutes % 60:02d} min left, " if minutes >= 60 else f"{minutes}:{remaining:02d} left, "
 
 
 def not_converged(names: list[str]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -18,7 +17,6 @@ from tissuq.cli.options import (
     RunDiscrepancy,
     RunFolder,
     RunMaterial,
-    Seed,
     not_converged,
     own_law,
     progress,
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
 
     from tissuq.posterior.ensemble import Sampling
 
-__all__ = ["compare", "design", "export", "predict", "show"]
+__all__ = ["compare", "export", "predict", "show"]
 
 
 @partial(reading.reads_files, names={"stress_type": "data_stress_type", "stretch_range": "data_stretch"})
@@ -112,80 +110,6 @@ def predict(
     print_warnings(prediction.warnings)
     print(f"Report: {target / 'report.html'}")
     not_converged(["the fit"] if prediction.posterior.solution.is_approximate else [])
-
-
-def design(
-    run: RunFolder = None,
-    target: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Quantity to become less uncertain: modulus (initial shear modulus), a parameter, or a stress as "
-            "MODE:STRETCH, such as planar:1.5; repeat for more [modulus]."
-        ),
-    ] = None,
-    candidate: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="A test as 'MODE LOW:HIGH POINTS', such as 'planar 1:1.5 20'; repeat for more [every mode of one "
-            "stretch, in several ranges]."
-        ),
-    ] = None,
-    points: Annotated[
-        list[int] | None,
-        typer.Option(
-            "--measurements",
-            help="Measurements of every default test; repeat for more [as many as the data, 10 to 40].",
-        ),
-    ] = None,
-    specimen: Annotated[
-        str | None,
-        typer.Option(
-            "--next-specimen",
-            help="The next test is of the same specimen or of the other ones [same, unless there are several].",
-        ),
-    ] = None,
-    discrepancy: RunDiscrepancy = None,
-    material: RunMaterial = None,
-    seed: Seed = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the ranking [runs/RUN-design].")] = None,
-    config: Config = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> None:
-    """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
-    from tissuq.report.design import HEADERS, heading, readable_design, write_design
-    from tissuq.report.run_folder import check_apart, check_target, run_folder
-    from tissuq.studies.design import DesignSettings, run_design
-
-    if run is None and config is None:
-        raise InputError("give the RUN folder of a fit, or --config run.toml.")
-    options: dict[str, Any] = {
-        "run": str(run.absolute()) if run else None, "targets": target or None, "candidates": candidate or None,
-        "points": points or None, "specimen": specimen, "discrepancy": discrepancy, "seed": seed,
-    }  # fmt: skip
-    law = own_law(material)
-    settings = load_settings(DesignSettings, config, options)
-    beside = config.parent if config else Path()
-    run_path = (beside / settings.run).resolve()
-    folder = out or Path("runs") / f"{run_path.name}-design"
-    check_apart(folder, run_path)
-    check_target(folder, force=force)
-    with progress() as step:
-        study = run_design(settings, beside, step, law)
-        step("writing")
-        recipe = settings.model_copy(update={"run": os.path.relpath(run_path, folder.resolve())})
-        with run_folder(folder, force=force) as scratch:
-            write_design(study, recipe, scratch, figures=figures)
-    for aim in study.targets:
-        print_rows(
-            heading(study, aim)[0].upper() + heading(study, aim)[1:],
-            HEADERS,
-            readable_design(study, aim),
-        )
-    print_explanations(study.explanations)
-    print_warnings(study.warnings)
-    print(f"Report: {folder / 'report.html'}")
 
 
 def export(

@@ -17,12 +17,11 @@ from tissuq.cli.options import (
     campaign_progress,
     check_folder,
     not_converged,
-    once_each,
-    parse_prior,
     progress,
     write_campaign_recipe,
 )
 from tissuq.errors import InputError
+from tissuq.studies.option_texts import priors
 from tissuq.studies.settings import load_settings
 
 __all__ = ["paper", "study"]
@@ -59,7 +58,7 @@ def paper(
         "sampler": sampler, "replicates": replicates,
     }  # fmt: skip
     if prior:
-        options["priors"] = once_each("--prior", map(parse_prior, prior))
+        options["priors"] = priors(prior)
     settings = load_settings(PaperSettings, config, options)
     check_target(out, force=force)
     with progress(steps_of(settings)) as step:

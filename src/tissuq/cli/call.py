@@ -1,0 +1,150 @@
+"""A command as it was typed, and how it is carried out: settings, run, folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from tissuq.cli.progress import progress
+from tissuq.errors import InputError
+from tissuq.studies.option import Settings, option
+from tissuq.studies.settings import load_settings
+
+if TYPE_CHECKING:
+    from tissuq.mechanics import Material
+
+__all__ = ["Call", "Configured", "OfRun", "Running", "Written"]
+
+Kind = TypeVar("Kind", bound=Settings)
+How = TypeVar("How", bound="Running")
+Study = TypeVar("Study")
+RECIPE_HELP = "run.toml of an earlier run to repeat."
+
+
+class Running(Settings):
+    """Options of a command on which its numbers do not depend."""
+
+
+class Configured(Running):
+    """A command that an earlier recipe repeats."""
+
+    config: Path | None = option(None, RECIPE_HELP)
+
+
+class Written(Configured):
+    """A command that writes a folder, whole or not at all."""
+
+    out: Path | None = option(None, "Folder for the run [runs/NAME].")
+    figures: bool = option(True, "Draw the figures.")
+    force: bool = option(False, "Replace an existing folder of the same kind.")
+
+
+class OfRun(Written):
+    """A command that begins from a run of ``tissuq fit``."""
+
+    user_law: str | None = option(
+        None, "law.py:Name of the run, if its material is your own law; its code runs only if named here."
+    )
+
+
+@dataclass(frozen=True)
+class Call(Generic[Kind, How]):
+    """A command as it was typed.
+
+    Attributes
+    ----------
+    name : str
+    kind : type of Settings
+    stated : dict
+        The settings that were typed.
+    typed : mapping of str to str
+        The option of each, as it was typed.
+    how : Running
+        The other options.
+    """
+
+    name: str
+    kind: type[Kind]
+    stated: dict[str, Any]
+    typed: Mapping[str, str]
+    how: How
+
+    @property
+    def config(self) -> Path | None:
+        """The file of settings, if one was named."""
+        return self.how.config if isinstance(self.how, Configured) else None
+
+    @property
+    def beside(self) -> Path:
+        """The folder from which relative names count: that of the file of settings, or the current one."""
+        return self.config.parent if self.config else Path()
+
+    @cached_property
+    def settings(self) -> Kind:
+        """The settings, those that were typed before those in a file."""
+        return self.loaded()
+
+    def loaded(self, rivals: tuple[str, ...] = (), **changes: Any) -> Kind:
+        """Return the settings with changes to what was typed; of rivals only one can be set."""
+        return load_settings(self.kind, self.config, self.stated | changes, rivals, self.typed)
+
+    def check_source(self, setting: str, what: str, earlier: str) -> None:
+        """Refuse a call with neither or both of a source of data, which is a setting, and a file of settings."""
+        if bool(self.stated.get(setting)) == bool(self.config):
+            raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
+
+    @cached_property
+    def law(self) -> Material | None:
+        """The user's own law that a run is of."""
+        from tissuq.mechanics import material_named
+
+        name = self.how.user_law if isinstance(self.how, OfRun) else None
+        if name is not None and ".py:" not in name:
+            raise InputError(
+                f"'{name}' is not of the form law.py:Name. --user-law is only needed for a run whose material is a law "
+                "in your own file."
+            )
+        return material_named(name, laws=True) if name else None
+
+    def target(self, usual: Path, *, apart_from: Path | None = None) -> Path:
+        """Return the folder that is to be written, once it may be; ``usual`` unless another is named."""
+        from tissuq.report.run_folder import check_apart, check_target
+
+        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        folder = self.how.out or usual
+        if apart_from is not None:
+            check_apart(folder, apart_from)
+        check_target(folder, force=self.how.force)
+        return folder
+
+    def carried_out(
+        self,
+        target: Path,
+        run: Callable[[Callable[[str], None]], Study],
+        write: Callable[[Study, Path, bool], None],
+        steps: int | None = None,
+    ) -> Study:
+        """Return what a run gives, once it is written into the target folder.
+
+        Parameters
+        ----------
+        target : Path
+        run : callable
+            Gets what is to be told of each step.
+        write : callable
+            Gets the study, the folder, and whether to draw figures.
+        steps : int, optional
+            Their number, where it is known.
+        """
+        from tissuq.report.run_folder import run_folder
+
+        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        with progress(steps) as step:
+            study = run(step)
+            step("writing")
+            with run_folder(target, force=self.how.force) as folder:
+                write(study, folder, self.how.figures)
+        return study

@@ -1,0 +1,123 @@
+"""A command of the command line, made from the settings that it declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from inspect import Parameter, Signature
+from typing import Annotated, Any, TypeVar
+
+import typer
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from tissuq.cli.call import Call, Running
+from tissuq.studies.option import Option, Settings, options_of
+from tissuq.studies.settings import load_settings
+
+__all__ = ["command", "settings_of"]
+
+Kind = TypeVar("Kind", bound=Settings)
+How = TypeVar("How", bound=Running)
+
+SETTINGS: dict[str, type[Settings]] = {}
+"""The settings of every command, by the name of its function."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A parameter of a command: where its value belongs, and how it is read.
+
+    ``path`` are the names of the setting and of its entry, if any.
+    """
+
+    name: str
+    path: tuple[str, ...]
+    option: Option
+    info: FieldInfo
+    help: str
+    reads: Any
+    is_required: bool = False
+
+    @property
+    def typed(self) -> str:
+        """The parameter as a person types it."""
+        return self.name.upper() if self.option.is_argument else f"--{self.name.replace('_', '-')}"
+
+    @property
+    def parameter(self) -> Parameter:
+        """What Typer reads."""
+        if self.option.is_argument:
+            kind: Any = typer.Argument(help=self.help)
+        else:
+            negative = self.option.negative or ("no-" + self.name if self.info.default is True else "")
+            names = "/".join(f"--{name.replace('_', '-')}" for name in (self.name, negative) if name)
+            kind = typer.Option(names, help=self.help, rich_help_panel=self.option.group or None)
+        reads = self.reads if self.is_required else self.reads | None
+        default = Parameter.empty if self.is_required else None
+        return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[reads, kind])
+
+
+def command(settings: type[Kind], running: type[How]) -> Callable[[Callable[[Call[Kind, How]], None]], Any]:
+    """Make a command of what carries out a `Call`.
+
+    Parameters
+    ----------
+    settings : type of Settings
+        What its result depends on: its options, and what its ``run.toml`` may hold.
+    running : type of Running
+        Its other options.
+    """
+
+    def decorate(carry_out: Callable[[Call[Kind, How]], None]) -> Any:
+        has_config = "config" in running.model_fields
+        of_settings = list(_slots(settings, is_optional=has_config))
+        of_running = list(_slots(running))
+
+        def run(**values: Any) -> None:
+            stated, typed = _stated(of_settings, values)
+            how, typed_how = _stated(of_running, values)
+            checked = load_settings(running, None, how, typed=typed_how)
+            carry_out(Call(carry_out.__name__, settings, stated, typed, checked))
+
+        run.__doc__, run.__name__ = carry_out.__doc__, carry_out.__name__
+        parameters = {slot.name: slot.parameter for slot in (*of_settings, *of_running)}
+        run.__signature__ = Signature(list(parameters.values()))  # type: ignore[attr-defined]  # what Typer reads
+        SETTINGS[carry_out.__name__] = settings
+        return run
+
+    return decorate
+
+
+def settings_of(name: str) -> type[Settings] | None:
+    """Return the settings that a command declares."""
+    return SETTINGS.get(name)
+
+
+def _slots(kind: type[BaseModel], *, is_optional: bool = False) -> Iterator[Slot]:
+    """Give the parameters of a command for some settings; with a configuration file all are optional."""
+    for name, option, info in options_of(kind):
+        if option.help:
+            shown = option.name.replace("-", "_") or name
+            is_required = info.is_required() and not is_optional
+            yield Slot(shown, (name,), option, info, option.explained(info), option.read_as(info), is_required)
+        for entry, text in option.entries.items():
+            yield Slot(entry, (name, entry), Option(text, group=option.group), info, text, str)
+        for slot in _slots(option.of) if option.of is not None else ():
+            yield replace(slot, name=option.renamed.get(slot.name, slot.name), path=(name, *slot.path))
+
+
+def _stated(slots: list[Slot], values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the settings that are typed, and how each was typed."""
+    stated: dict[str, Any] = {}
+    typed: dict[str, str] = {}
+    for slot in slots:
+        value = values[slot.name]
+        if value is None or value == []:
+            continue
+        inner = stated
+        for name in slot.path[:-1]:
+            inner = inner.setdefault(name, {})
+        inner[slot.path[-1]] = slot.option.parse(value) if slot.option.parse else value
+        typed[".".join(slot.path)] = slot.typed
+    return stated, typed

@@ -1,0 +1,45 @@
+"""``tissuq design``: which test to make next."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from tissuq.cli.call import Call, OfRun
+from tissuq.cli.command import command
+from tissuq.errors import InputError
+from tissuq.studies.design_settings import DesignSettings
+from tissuq.studies.option import option
+
+__all__ = ["design"]
+
+
+class DesignOptions(OfRun):
+    """How a ranking is written."""
+
+    out: Path | None = option(None, "Folder for the ranking [runs/RUN-design].")
+
+
+@command(DesignSettings, DesignOptions)
+def design(call: Call[DesignSettings, DesignOptions]) -> None:
+    """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
+    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
+    from tissuq.report.design import HEADERS, heading, readable_design, write_design
+    from tissuq.studies.design import DesignStudy, run_design
+
+    if not (call.config or call.stated):
+        raise InputError("give the RUN folder of a fit, or --config run.toml.")
+    run = (call.beside / call.settings.run).resolve()
+    target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
+    recipe = call.settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
+
+    def write(study: DesignStudy, folder: Path, figures: bool) -> None:
+        write_design(study, recipe, folder, figures=figures)
+
+    study = call.carried_out(target, lambda step: run_design(call.settings, call.beside, step, call.law), write)
+    for aim in study.targets:
+        title = heading(study, aim)
+        print_rows(title[0].upper() + title[1:], HEADERS, readable_design(study, aim))
+    print_explanations(study.explanations)
+    print_warnings(study.warnings)
+    print(f"Report: {target / 'report.html'}")
