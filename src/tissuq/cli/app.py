@@ -6,23 +6,29 @@ import signal
 import sys
 from io import TextIOWrapper
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from tissuq.cli import (
     calibrate,
     catalogue,
+    compare,
     design,
     ensemble,
+    export,
     fit,
     inspect,
+    paper,
+    population,
+    predict,
     project,
-    runs,
+    show,
     structure,
     study,
 )
-from tissuq.cli.former_names import Renamed
+from tissuq.cli.command import Command
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
@@ -31,8 +37,26 @@ INTERRUPTED = 130
 """The exit status that Typer gives to Ctrl-C."""
 TERMINATED = 128 + signal.SIGTERM
 
+
+class Commands(TyperGroup):
+    """The commands, which help lists by what they are for."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands under their headings, each with the beginning of what it does."""
+        limit = formatter.width - 6 - max(map(len, self.commands))
+        rows: dict[str, list[tuple[str, str]]] = {}
+        for name, command in self.commands.items():
+            if not command.hidden:
+                heading = str(getattr(command, "rich_help_panel", ""))
+                rows.setdefault(heading, []).append((name, command.get_short_help_str(limit)))
+        for heading, of_heading in rows.items():
+            with formatter.section(heading):
+                formatter.write_dl(of_heading)
+
+
 app = typer.Typer(
     name="tissuq",
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -56,27 +80,25 @@ def _tissuq(
     """Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
 
-app.command("init")(project.init)
-app.command("paper", cls=Renamed)(study.paper)
-app.command("inspect")(inspect.inspect)
-app.command("fit")(fit.fit)
-app.command("predict", cls=Renamed)(runs.predict)
-app.command("population", cls=Renamed)(fit.population)
-app.command("calibrate")(calibrate.calibrate)
-app.command("compare")(runs.compare)
-app.command("design", cls=Renamed)(design.design)
-app.command("export", cls=Renamed)(runs.export)
-app.command("structure", cls=Renamed)(structure.structure)
-app.command("ensemble")(ensemble.ensemble)
-app.command("simulate", cls=Renamed, hidden=True, deprecated=True)(structure.structure)
-app.command("show")(runs.show)
-app.command("materials")(catalogue.materials)
-app.command("modes")(catalogue.modes)
-app.command("check")(catalogue.check)
-app.command("discrepancies")(catalogue.discrepancies)
-app.add_typer(study.study)
-app.command("datasets")(catalogue.datasets)
-app.command("doctor")(project.doctor)
+COMMANDS: dict[str, dict[str, Any]] = {
+    "Start here": {"init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show},
+    "After a fit": {
+        "predict": predict.predict, "compare": compare.compare, "design": design.design, "export": export.export,
+        "structure": structure.structure, "ensemble": ensemble.ensemble,
+    },
+    "Several specimens, expensive models": {"population": population.population, "calibrate": calibrate.calibrate},
+    "How far to trust it": {"paper": paper.paper, "check": catalogue.check},
+    "What there is": {
+        "materials": catalogue.materials, "modes": catalogue.modes, "discrepancies": catalogue.discrepancies,
+        "datasets": catalogue.datasets, "doctor": project.doctor,
+    },
+}  # fmt: skip
+"""The commands, under the headings of the help."""
+for heading, commands in COMMANDS.items():
+    for name, function in commands.items():
+        app.command(name, cls=Command, rich_help_panel=heading)(function)
+app.add_typer(study.study, rich_help_panel="How far to trust it")
+app.command("simulate", cls=Command, hidden=True, deprecated=True)(structure.structure)
 
 
 def main() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+
+import typer
 
 from tissuq.cli.progress import progress
 from tissuq.errors import InputError
@@ -16,12 +18,14 @@ from tissuq.studies.settings import load_settings
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
 
-__all__ = ["Call", "Configured", "OfRun", "Running", "Written"]
+__all__ = ["Call", "Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Written", "not_converged"]
 
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound="Running")
 Study = TypeVar("Study")
-RECIPE_HELP = "run.toml of an earlier run to repeat."
+Whole = TypeVar("Whole", bound=Settings)
+NOT_CONVERGED = 3
+"""The exit status where sampling has not converged."""
 
 
 class Running(Settings):
@@ -31,7 +35,7 @@ class Running(Settings):
 class Configured(Running):
     """A command that an earlier recipe repeats."""
 
-    config: Path | None = option(None, RECIPE_HELP)
+    config: Path | None = option(None, "run.toml of an earlier run to repeat.")
 
 
 class Written(Configured):
@@ -42,12 +46,25 @@ class Written(Configured):
     force: bool = option(False, "Replace an existing folder of the same kind.")
 
 
-class OfRun(Written):
+class LawOfRun(Running):
     """A command that begins from a run of ``tissuq fit``."""
 
     user_law: str | None = option(
         None, "law.py:Name of the run, if its material is your own law; its code runs only if named here."
     )
+
+
+class OfRun(LawOfRun, Written):
+    """A command that begins from such a run, and writes a folder."""
+
+
+class Campaign(Configured):
+    """A command whose folder grows, and which goes on where it was stopped."""
+
+    config: Path | None = option(None, "TOML file of the campaign.")
+    out: Path | None = option(None, "Folder of the campaign [runs/NAME].")
+    workers: int = option(1, "Processes on this machine.", ge=1)
+    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
 
 
 @dataclass(frozen=True)
@@ -89,7 +106,15 @@ class Call(Generic[Kind, How]):
 
     def loaded(self, rivals: tuple[str, ...] = (), **changes: Any) -> Kind:
         """Return the settings with changes to what was typed; of rivals only one can be set."""
-        return load_settings(self.kind, self.config, self.stated | changes, rivals, self.typed)
+        return self.loaded_as(self.kind, rivals, **changes)
+
+    def loaded_as(self, kind: type[Whole], rivals: tuple[str, ...] = (), **changes: Any) -> Whole:
+        """Return `loaded` settings of another class, which may add what only a file can say."""
+        return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
+
+    def with_config(self, file: Path) -> Self:
+        """Return the call as if the file of settings had been named."""
+        return replace(self, how=self.how.model_copy(update={"config": file}))
 
     def check_source(self, setting: str, what: str, earlier: str) -> None:
         """Refuse a call with neither or both of a source of data, which is a setting, and a file of settings."""
@@ -101,7 +126,7 @@ class Call(Generic[Kind, How]):
         """The user's own law that a run is of."""
         from tissuq.mechanics import material_named
 
-        name = self.how.user_law if isinstance(self.how, OfRun) else None
+        name = self.how.user_law if isinstance(self.how, LawOfRun) else None
         if name is not None and ".py:" not in name:
             raise InputError(
                 f"'{name}' is not of the form law.py:Name. --user-law is only needed for a run whose material is a law "
@@ -124,7 +149,7 @@ class Call(Generic[Kind, How]):
         self,
         target: Path,
         run: Callable[[Callable[[str], None]], Study],
-        write: Callable[[Study, Path, bool], None],
+        write: Callable[..., None],
         steps: int | None = None,
     ) -> Study:
         """Return what a run gives, once it is written into the target folder.
@@ -135,7 +160,7 @@ class Call(Generic[Kind, How]):
         run : callable
             Gets what is to be told of each step.
         write : callable
-            Gets the study, the folder, and whether to draw figures.
+            Gets the study, the ``folder``, and whether to draw ``figures``.
         steps : int, optional
             Their number, where it is known.
         """
@@ -146,5 +171,16 @@ class Call(Generic[Kind, How]):
             study = run(step)
             step("writing")
             with run_folder(target, force=self.how.force) as folder:
-                write(study, folder, self.how.figures)
+                write(study, folder=folder, figures=self.how.figures)
         return study
+
+
+def not_converged(names: list[str]) -> None:
+    """End with status 3 when sampling has not converged anywhere."""
+    if names:
+        typer.echo(
+            f"tissuq: sampling has NOT converged for {', '.join(names)}; do not use these results. "
+            "Try another method, narrower priors or another seed.",
+            err=True,
+        )
+        raise typer.Exit(NOT_CONVERGED)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from inspect import Parameter, Signature
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from typer.core import TyperCommand
 
 from tissuq.cli.call import Call, Running
+from tissuq.cli.former_names import todays_names
 from tissuq.studies.option import Option, Settings, options_of
 from tissuq.studies.settings import load_settings
 
-__all__ = ["command", "settings_of"]
+__all__ = ["Command", "Slot", "command", "settings_of", "slots_of", "stated"]
 
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound=Running)
@@ -44,6 +46,10 @@ class Slot:
         """The parameter as a person types it."""
         return self.name.upper() if self.option.is_argument else f"--{self.name.replace('_', '-')}"
 
+    def in_group(self, name: str) -> Self:
+        """Return the parameter in a group, unless it is in one."""
+        return replace(self, option=replace(self.option, group=self.option.group or name))
+
     @property
     def parameter(self) -> Parameter:
         """What Typer reads."""
@@ -71,22 +77,42 @@ def command(settings: type[Kind], running: type[How]) -> Callable[[Callable[[Cal
 
     def decorate(carry_out: Callable[[Call[Kind, How]], None]) -> Any:
         has_config = "config" in running.model_fields
-        of_settings = list(_slots(settings, is_optional=has_config))
-        of_running = list(_slots(running))
+        of_settings = list(slots_of(settings, is_optional=has_config))
+        of_running = [slot.in_group("Running") for slot in slots_of(running)]
 
         def run(**values: Any) -> None:
-            stated, typed = _stated(of_settings, values)
-            how, typed_how = _stated(of_running, values)
+            how, typed_how = stated(of_running, values)
             checked = load_settings(running, None, how, typed=typed_how)
-            carry_out(Call(carry_out.__name__, settings, stated, typed, checked))
+            carry_out(Call(carry_out.__name__, settings, *stated(of_settings, values), checked))
 
         run.__doc__, run.__name__ = carry_out.__doc__, carry_out.__name__
-        parameters = {slot.name: slot.parameter for slot in (*of_settings, *of_running)}
-        run.__signature__ = Signature(list(parameters.values()))  # type: ignore[attr-defined]  # what Typer reads
+        slots = sorted((*of_running, *of_settings), key=lambda slot: not slot.option.is_argument)
+        run.__signature__ = Signature([slot.parameter for slot in slots])  # type: ignore[attr-defined]  # what Typer reads
         SETTINGS[carry_out.__name__] = settings
         return run
 
     return decorate
+
+
+class Command(TyperCommand):
+    """A command that takes its options under their former names, too, and whose help lists options by their group."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return what Click leaves of the arguments, former names replaced."""
+        return super().parse_args(ctx, todays_names(self.name or "", args))
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments, options, and options of a group under its name."""
+        records: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
+        for parameter in self.get_params(ctx):
+            is_argument = parameter.param_type_name == "argument"
+            group = "Arguments" if is_argument else getattr(parameter, "rich_help_panel", None) or "Options"
+            if record := parameter.get_help_record(ctx):
+                records.setdefault(group, []).append(record)
+        for group, rows in records.items():
+            if rows:
+                with formatter.section(group):
+                    formatter.write_dl(rows)
 
 
 def settings_of(name: str) -> type[Settings] | None:
@@ -94,30 +120,32 @@ def settings_of(name: str) -> type[Settings] | None:
     return SETTINGS.get(name)
 
 
-def _slots(kind: type[BaseModel], *, is_optional: bool = False) -> Iterator[Slot]:
+def slots_of(kind: type[BaseModel], *, is_optional: bool = False) -> Iterator[Slot]:
     """Give the parameters of a command for some settings; with a configuration file all are optional."""
     for name, option, info in options_of(kind):
         if option.help:
             shown = option.name.replace("-", "_") or name
+            path = (name, option.entry) if option.entry else (name,)
             is_required = info.is_required() and not is_optional
-            yield Slot(shown, (name,), option, info, option.explained(info), option.read_as(info), is_required)
+            yield Slot(shown, path, option, info, option.explained(info), option.read_as(info), is_required)
         for entry, text in option.entries.items():
             yield Slot(entry, (name, entry), Option(text, group=option.group), info, text, str)
-        for slot in _slots(option.of) if option.of is not None else ():
-            yield replace(slot, name=option.renamed.get(slot.name, slot.name), path=(name, *slot.path))
+        for slot in slots_of(option.of) if option.of is not None else ():
+            if shown := option.renamed.get(slot.name, slot.name):
+                yield replace(slot, name=shown, path=(name, *slot.path))
 
 
-def _stated(slots: list[Slot], values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+def stated(slots: Iterable[Slot], values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the settings that are typed, and how each was typed."""
-    stated: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     typed: dict[str, str] = {}
     for slot in slots:
-        value = values[slot.name]
+        value = values.get(slot.name)
         if value is None or value == []:
             continue
-        inner = stated
+        inner = settings
         for name in slot.path[:-1]:
             inner = inner.setdefault(name, {})
         inner[slot.path[-1]] = slot.option.parse(value) if slot.option.parse else value
         typed[".".join(slot.path)] = slot.typed
-    return stated, typed
+    return settings, typed

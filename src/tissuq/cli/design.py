@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 
 from tissuq.cli.call import Call, OfRun
@@ -25,7 +26,7 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
     from tissuq.cli.tables import print_explanations, print_rows, print_warnings
     from tissuq.report.design import HEADERS, heading, readable_design, write_design
-    from tissuq.studies.design import DesignStudy, run_design
+    from tissuq.studies.design import run_design
 
     if not (call.config or call.stated):
         raise InputError("give the RUN folder of a fit, or --config run.toml.")
@@ -33,10 +34,11 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
     recipe = call.settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
 
-    def write(study: DesignStudy, folder: Path, figures: bool) -> None:
-        write_design(study, recipe, folder, figures=figures)
-
-    study = call.carried_out(target, lambda step: run_design(call.settings, call.beside, step, call.law), write)
+    study = call.carried_out(
+        target,
+        lambda step: run_design(call.settings, call.beside, step, call.law),
+        partial(write_design, recipe=recipe),
+    )
     for aim in study.targets:
         title = heading(study, aim)
         print_rows(title[0].upper() + title[1:], HEADERS, readable_design(study, aim))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from types import NoneType
 from typing import Any, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
 __all__ = ["Option", "Settings", "argument", "option", "options_of"]
@@ -17,6 +18,18 @@ class Settings(BaseModel):
     """Settings whose fields are declared by `option` and `argument`, or are for files alone."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    @field_validator("*")
+    @classmethod
+    def _one_of_choices(cls, value: Any, info: ValidationInfo) -> Any:
+        declared = cls.model_fields[str(info.field_name)].json_schema_extra
+        if value is not None and isinstance(declared, Option) and declared.choices:
+            module, _, name = declared.choices.partition(":")
+            choices = get_args(getattr(import_module(module), name))
+            if value not in choices:
+                first = ", ".join(map(repr, choices[:-1]))
+                raise ValueError(f"must be {first} or {choices[-1]!r}, not {value!r}")
+        return value
 
 
 @dataclass(frozen=True)
@@ -37,12 +50,16 @@ class Option:
         What the command line reads, where that does not follow from the type of the setting.
     parse : callable, optional
         Turns what was read into the value of the setting.
+    choices : str
+        The literal type of its values, as MODULE:NAME, which is imported when a value is checked.
+    entry : str
+        The entry of the setting, a dictionary, that the option is.
     entries : mapping of str to str
         Options that are entries of the setting, which is a dictionary, and their helps.
     of : type of BaseModel, optional
         Further settings that the setting, a dictionary, holds: their options are options of the command.
     renamed : mapping of str to str
-        Their names, where the command has another use for them.
+        Their names, where the command has another use for them; an empty one for an option that it has not.
     group : str
         The heading under which help lists it.
     is_argument : bool
@@ -55,6 +72,8 @@ class Option:
     unit: str = ""
     takes: Any = None
     parse: Callable[[Any], Any] | None = None
+    choices: str = ""
+    entry: str = ""
     entries: Mapping[str, str] = field(default_factory=dict)
     of: type[BaseModel] | None = None
     renamed: Mapping[str, str] = field(default_factory=dict)
@@ -104,6 +123,8 @@ def option(
     unit: str = "",
     takes: Any = None,
     parse: Callable[[Any], Any] | None = None,
+    choices: str = "",
+    entry: str = "",
     entries: Mapping[str, str] | None = None,
     of: type[BaseModel] | None = None,
     renamed: Mapping[str, str] | None = None,
@@ -121,7 +142,9 @@ def option(
     >>> Throw().draws, [option.explained(info) for _, option, info in options_of(Throw)]
     (64, ['Number of draws [64].'])
     """
-    declared = Option(help, name, negative, unit, takes, parse, entries or {}, of, renamed or {}, group, is_argument)
+    declared = Option(
+        help, name, negative, unit, takes, parse, choices, entry, entries or {}, of, renamed or {}, group, is_argument
+    )
     start = {"default": default} if default_factory is None else {"default_factory": default_factory}
     return Field(**start, description=help or None, json_schema_extra=declared, **limits)
 

@@ -9,7 +9,10 @@ from typing import Any
 
 from tissuq.errors import InputError
 
-__all__ = ["column", "number_or_text", "once_each", "pairs_of", "priors", "range_of", "sd_or_unknown", "tolerances"]
+__all__ = [
+    "column", "noises", "number_or_text", "once_each", "one_noise", "pairs_of", "priors", "range_of", "sd_or_unknown",
+    "tolerances",
+]  # fmt: skip
 
 
 def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
@@ -64,6 +67,27 @@ def sd_or_unknown(text: str) -> float | str:
     if isinstance(value, str) and value != "unknown":
         raise InputError(f"--noise-sd must be a number or unknown, not '{text}'.")
     return value
+
+
+def noises(text: str) -> list[float | str]:
+    """Return the standard deviations of the noise of every file, with commas, or 'unknown'."""
+    if text == "unknown":
+        return [text]
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'. For several files, one "
+            "for each with commas."
+        ) from error
+
+
+def one_noise(text: str) -> float | str:
+    """Return the standard deviation of the noise of all files: a number, or 'unknown'."""
+    values = noises(text)
+    if len(values) > 1:
+        raise InputError(f"--noise-sd is given {len(values)} times for a population; give it once for all specimens.")
+    return values[0]
 
 
 def range_of(option: str, example: str) -> Callable[[str], tuple[float, float]]:

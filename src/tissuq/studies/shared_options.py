@@ -8,7 +8,7 @@ from typing import Any
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
 
-__all__ = ["RunSettings", "seed"]
+__all__ = ["RunSettings", "sampling", "seed"]
 
 
 class RunSettings(Settings):
@@ -21,3 +21,8 @@ class RunSettings(Settings):
 def seed() -> Any:
     """Declare the seed of random numbers."""
     return option(0, "Seed of the random numbers.", ge=0, le=MAX_SEED)
+
+
+def sampling() -> Any:
+    """Declare how draws spread through a posterior."""
+    return option("sobol", "How draws spread: sobol, latin or random.", choices="tissuq.posterior.ensemble:Sampling")
