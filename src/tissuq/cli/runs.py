@@ -153,9 +153,10 @@ def design(
     force: Force = False,
 ) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
-    from tissuq.report.design import HEADERS, heading, readable_design, write_design
+    from tissuq.report.design import design_result
     from tissuq.report.run_folder import check_apart, check_target, run_folder
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.design import DesignSettings, run_design
 
     if run is None and config is None:
@@ -175,17 +176,10 @@ def design(
         study = run_design(settings, beside, step, law)
         step("writing")
         recipe = settings.model_copy(update={"run": os.path.relpath(run_path, folder.resolve())})
+        result = design_result(study, recipe)
         with run_folder(folder, force=force) as scratch:
-            write_design(study, recipe, scratch, figures=figures)
-    for aim in study.targets:
-        print_rows(
-            heading(study, aim)[0].upper() + heading(study, aim)[1:],
-            HEADERS,
-            readable_design(study, aim),
-        )
-    print_explanations(study.explanations)
-    print_warnings(study.warnings)
-    print(f"Report: {folder / 'report.html'}")
+            write_result(result, scratch, figures=figures)
+    print_result(result.record(), folder)
 
 
 def export(
@@ -324,8 +318,12 @@ def show(
 ) -> None:
     """Print the answer of a run and where its report lies."""
     from tissuq.cli.tables import print_json, print_summary
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import read_record
 
     if as_json:
         print_json(run_folder)
+    elif record := read_record(run_folder):
+        print_result(record, run_folder, details=details)
     else:
         print_summary(run_folder, details=details)
