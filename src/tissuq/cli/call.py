@@ -17,6 +17,7 @@ from tissuq.studies.settings import load_settings
 
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
+    from tissuq.report.result import Result
 
 __all__ = ["Call", "Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Written", "not_converged"]
 
@@ -149,21 +150,43 @@ class Call(Generic[Kind, How]):
         self,
         target: Path,
         run: Callable[[Callable[[str], None]], Study],
-        write: Callable[..., None],
+        result_of: Callable[[Study], Result],
         steps: int | None = None,
     ) -> Study:
-        """Return what a run gives, once it is written into the target folder.
+        """Return what a run gives, once its result is written into the target folder, and printed.
 
         Parameters
         ----------
         target : Path
         run : callable
             Gets what is to be told of each step.
-        write : callable
-            Gets the study, the ``folder``, and whether to draw ``figures``.
+        result_of : callable
+            Makes the result of the study.
         steps : int, optional
             Their number, where it is known.
         """
+        from tissuq.report.terminal import print_result
+        from tissuq.report.writer import write_result
+
+        records: list[dict[str, Any]] = []
+
+        def write(study: Study, *, folder: Path, figures: bool) -> None:
+            result = result_of(study)
+            write_result(result, folder, figures=figures)
+            records.append(result.record())
+
+        study = self.written(target, run, write, steps)
+        print_result(records[0], target)
+        return study
+
+    def written(
+        self,
+        target: Path,
+        run: Callable[[Callable[[str], None]], Study],
+        write: Callable[..., None],
+        steps: int | None = None,
+    ) -> Study:
+        """Return what a run gives, once ``write`` has put it into a ``folder``, with ``figures`` or without."""
         from tissuq.report.run_folder import run_folder
 
         assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)

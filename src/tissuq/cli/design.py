@@ -24,8 +24,7 @@ class DesignOptions(OfRun):
 @command(DesignSettings, DesignOptions)
 def design(call: Call[DesignSettings, DesignOptions]) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
-    from tissuq.report.design import HEADERS, heading, readable_design, write_design
+    from tissuq.report.design import design_result
     from tissuq.studies.design import run_design
 
     if not (call.config or call.stated):
@@ -34,14 +33,8 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
     recipe = call.settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
 
-    study = call.carried_out(
+    call.carried_out(
         target,
         lambda step: run_design(call.settings, call.beside, step, call.law),
-        partial(write_design, recipe=recipe),
+        partial(design_result, recipe=recipe),
     )
-    for aim in study.targets:
-        title = heading(study, aim)
-        print_rows(title[0].upper() + title[1:], HEADERS, readable_design(study, aim))
-    print_explanations(study.explanations)
-    print_warnings(study.warnings)
-    print(f"Report: {target / 'report.html'}")

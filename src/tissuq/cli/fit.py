@@ -82,7 +82,7 @@ def _fit_one(
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import run_specimen
 
-    study = call.carried_out(
+    study = call.written(
         target,
         lambda step: run_specimen(settings, call.beside, step, law, found),
         partial(write_specimen_run, sources=sources),
@@ -104,7 +104,7 @@ def _compare_laws(
     from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
     from tissuq.studies.laws import run_laws
 
-    study = call.carried_out(
+    study = call.written(
         target,
         lambda step: run_laws(settings, call.beside, step, own, found),
         partial(write_law_run, sources=sources),

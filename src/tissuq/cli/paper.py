@@ -33,7 +33,7 @@ def paper(call: Call[PaperOptions, PaperRunning]) -> None:
     low, high = call.how.stretch_range or (None, None)
     settings = call.loaded_as(PaperSettings, stretch_low=low, stretch_high=high)
     target = call.target(call.how.out)
-    study = call.carried_out(target, lambda step: run_paper(settings, step), write_paper_run, steps_of(settings))
+    study = call.written(target, lambda step: run_paper(settings, step), write_paper_run, steps_of(settings))
     print_summary(target)
     print_warnings(study.warnings)
     not_converged(study.not_converged)

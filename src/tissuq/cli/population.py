@@ -31,7 +31,7 @@ def population(call: Call[PopulationSettings, PopulationOptions]) -> None:
     settings, material = call.loaded(rivals=("noise", "noise_sd")), call.stated.get("material")
     law = material_named(material, laws=True) if material else None
     target = call.target(Path("runs") / "population")
-    study = call.carried_out(
+    study = call.written(
         target,
         lambda step: run_population(settings, call.beside, step, law),
         partial(write_population_run, beside=call.beside),

@@ -43,7 +43,7 @@ def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
     source = beside / settings.run
     named = source if source.name.strip(".") else source.resolve()  # "." and ".." have no name of their own
     target = call.target(named.parent / f"{named.name}-{settings.mode_in(beside)}", apart_from=source)
-    prediction = call.carried_out(
+    prediction = call.written(
         target,
         lambda step: run_prediction(settings, beside, step, law),
         partial(write_prediction_run, settings=settings, target=target, beside=beside, law=call.how.user_law),

@@ -19,8 +19,12 @@ def show(
 ) -> None:
     """Print the answer of a run and where its report lies."""
     from tissuq.cli.tables import print_json, print_summary
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import read_record
 
     if as_json:
         print_json(run_folder)
+    elif record := read_record(run_folder):
+        print_result(record, run_folder, details=details)
     else:
         print_summary(run_folder, details=details)
