@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from io import TextIOWrapper
-from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -24,18 +22,16 @@ from tissuq.cli import (
     population,
     predict,
     project,
+    schema,
     show,
     structure,
     study,
 )
 from tissuq.cli.command import Command
+from tissuq.cli.stopping import INTERRUPTED, TERMINATED, Stopped, end_on_request
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
-
-INTERRUPTED = 130
-"""The exit status that Typer gives to Ctrl-C."""
-TERMINATED = 128 + signal.SIGTERM
 
 
 class Commands(TyperGroup):
@@ -90,7 +86,7 @@ COMMANDS: dict[str, dict[str, Any]] = {
     "How far to trust it": {"paper": paper.paper, "check": catalogue.check},
     "What there is": {
         "materials": catalogue.materials, "modes": catalogue.modes, "discrepancies": catalogue.discrepancies,
-        "datasets": catalogue.datasets, "doctor": project.doctor,
+        "datasets": catalogue.datasets, "doctor": project.doctor, "schema": schema.schema,
     },
 }  # fmt: skip
 """The commands, under the headings of the help."""
@@ -103,7 +99,7 @@ app.command("simulate", cls=Command, hidden=True, deprecated=True)(structure.str
 
 def main() -> None:
     """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
-    signal.signal(signal.SIGTERM, _stop)
+    end_on_request()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that shows no ± shows a ? instead
@@ -116,12 +112,6 @@ def main() -> None:
         typer.echo(f"tissuq: {error}. Check the path, its permissions and the space on the disk.", err=True)
         sys.exit(2)
     except SystemExit as end:
-        if end.code in (INTERRUPTED, TERMINATED):
-            typer.echo("tissuq: stopped; no run was written (the same command resumes a campaign).", err=True)
+        if end.code in (INTERRUPTED, TERMINATED) and not isinstance(end, Stopped):
+            typer.echo("tissuq: stopped; no run was written.", err=True)
         raise
-
-
-def _stop(number: int, _: FrameType | None) -> None:
-    """End on a request to terminate as on an error, so that nothing half written is left."""
-    signal.signal(number, signal.SIG_IGN)
-    sys.exit(TERMINATED)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from tissuq.cli.call import Call, Written, not_converged
 from tissuq.cli.command import command
-from tissuq.cli.progress import campaign_progress
 from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.option import option
@@ -38,10 +37,11 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     _check_named_again(call, settings)
     target = call.target(Path("runs") / Path(settings.file).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
-    with campaign_progress(settings.runs + settings.refine) as step:
+    with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
         study = run_calibration(settings, call.beside, runs_in=runs_in, workers=call.how.workers, step=step)
     with run_folder(target, force=call.how.force) as folder:
         write_calibration_run(study, folder, call.beside, figures=call.how.figures)
+        call.monitor.write_log(folder, study.warnings)
     title = f"{settings.forward_model.name}: {len(study.calibration.runs)} runs"
     print_rows(title, HEADERS, readable_calibration(study.calibration))
     print(f"Emulator, {study.calibration.check}")

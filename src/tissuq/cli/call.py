@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TextIO, TypeVar
 
 import typer
 
-from tissuq.cli.progress import progress
+from tissuq.cli.progress import Monitor
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, option
 from tissuq.studies.settings import load_settings
@@ -36,6 +38,8 @@ class Running(Settings):
 class Configured(Running):
     """A command that an earlier recipe repeats."""
 
+    quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.")
+    verbose: bool = option(False, "Tell how long every stage took.")
     config: Path | None = option(None, "run.toml of an earlier run to repeat.")
 
 
@@ -82,6 +86,10 @@ class Call(Generic[Kind, How]):
         The option of each, as it was typed.
     how : Running
         The other options.
+    monitor : Monitor
+        Is told how the command gets on.
+    out : file
+        Where the answer goes, also with --quiet.
     """
 
     name: str
@@ -89,6 +97,8 @@ class Call(Generic[Kind, How]):
     stated: dict[str, Any]
     typed: Mapping[str, str]
     how: How
+    monitor: Monitor = field(default_factory=Monitor)
+    out: TextIO = field(default_factory=lambda: sys.stdout)
 
     @property
     def config(self) -> Path | None:
@@ -116,6 +126,11 @@ class Call(Generic[Kind, How]):
     def with_config(self, file: Path) -> Self:
         """Return the call as if the file of settings had been named."""
         return replace(self, how=self.how.model_copy(update={"config": file}))
+
+    def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:
+        """Return what shows the tasks of a campaign, which are kept in a folder as they are done."""
+        self.monitor.folder = folder
+        return self.monitor.campaign
 
     def check_source(self, setting: str, what: str, earlier: str) -> None:
         """Refuse a call with neither or both of a source of data, which is a setting, and a file of settings."""
@@ -177,7 +192,14 @@ class Call(Generic[Kind, How]):
 
         study = self.written(target, run, write, steps)
         print_result(records[0], target)
+        self.answer(records[0]["numbers"])
         return study
+
+    def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:
+        """Print the numbers of a result, with --quiet alone, which leaves all else out."""
+        for number in numbers if self.monitor.is_quiet else ():
+            remark = f", {number['remark']}" if number["remark"] else ""
+            print(f"{number['name']}: {number['text']}{remark}", file=self.out)
 
     def written(
         self,
@@ -190,11 +212,12 @@ class Call(Generic[Kind, How]):
         from tissuq.report.run_folder import run_folder
 
         assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
-        with progress(steps) as step:
+        with self.monitor.steps(steps) as step:
             study = run(step)
             step("writing")
             with run_folder(target, force=self.how.force) as folder:
                 write(study, folder=folder, figures=self.how.figures)
+                self.monitor.write_log(folder, getattr(study, "warnings", ()))
         return study
 
 

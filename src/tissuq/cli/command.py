@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import dataclass, replace
 from inspect import Parameter, Signature
+from io import StringIO
 from typing import Annotated, Any, Self, TypeVar
 
 import typer
@@ -12,8 +14,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.core import TyperCommand
 
-from tissuq.cli.call import Call, Running
+from tissuq.cli.call import Call, Configured, Running
 from tissuq.cli.former_names import todays_names
+from tissuq.cli.progress import Monitor
+from tissuq.cli.stopping import stopping
 from tissuq.studies.option import Option, Settings, options_of
 from tissuq.studies.settings import load_settings
 
@@ -83,7 +87,11 @@ def command(settings: type[Kind], running: type[How]) -> Callable[[Callable[[Cal
         def run(**values: Any) -> None:
             how, typed_how = stated(of_running, values)
             checked = load_settings(running, None, how, typed=typed_how)
-            carry_out(Call(carry_out.__name__, settings, *stated(of_settings, values), checked))
+            is_quiet = isinstance(checked, Configured) and checked.quiet
+            monitor = Monitor(is_quiet, isinstance(checked, Configured) and checked.verbose)
+            call = Call(carry_out.__name__, settings, *stated(of_settings, values), checked, monitor)
+            with stopping(monitor), redirect_stdout(StringIO()) if is_quiet else nullcontext():
+                carry_out(call)
 
         run.__doc__, run.__name__ = carry_out.__doc__, carry_out.__name__
         slots = sorted((*of_running, *of_settings), key=lambda slot: not slot.option.is_argument)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from tissuq.cli.call import Call, Configured, LawOfRun
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
-from tissuq.cli.progress import campaign_progress, progress
 from tissuq.errors import InputError
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.option import argument, option
@@ -61,7 +60,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
         for source in sources:
             check_apart(folder, beside / source)
     runs_here = not (how.dry_run or how.scheduler)
-    with progress() as step:
+    with call.monitor.steps() as step:
         prepared = prepare_ensemble(settings, beside, call.law, step, runs_here=runs_here, is_dry=how.dry_run)
     if how.dry_run:
         print(prepared.diff())
@@ -77,9 +76,10 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     with open_pool(how.max_jobs or os.cpu_count() or 1, how.scheduler) as pool:
         study = run_ensemble(
             prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
-            retries=how.retries, keep=how.keep, progress=campaign_progress,
+            retries=how.retries, keep=how.keep, progress=call.campaign_in(folder),
         )  # fmt: skip
     write_ensemble(study, folder, figures=how.figures)
+    call.monitor.write_log(folder, study.warnings)
     print_rows(f"Model '{prepared.deck.main}' with {settings.draws} draws, at the end", *readable_quantities(study))
     print_explanations(prepared.card_warnings)
     print_warnings(study.warnings)

@@ -3,28 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+from tissuq.cli.call import Call, Running
+from tissuq.cli.command import command
+from tissuq.studies.option import Settings, argument, option
 
 __all__ = ["show"]
 
 
-def show(
-    run_folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
-    details: Annotated[
-        bool, typer.Option("--details", help="Also stability, what the discrepancy does, and all warnings.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Everything as one JSON object, for programs.")] = False,
-) -> None:
+class ShownRun(Settings):
+    """What is shown."""
+
+    run_folder: Path = argument(..., "Folder of a run.")
+
+
+class ShowOptions(Running):
+    """How it is shown."""
+
+    details: bool = option(False, "Also stability, what the discrepancy does, and all warnings.")
+    as_json: bool = option(False, "Everything as one JSON object, for programs.", name="json")
+    pdf: Path | None = option(None, "Print the report into this file instead, with Chromium.")
+
+
+@command(ShownRun, ShowOptions)
+def show(call: Call[ShownRun, ShowOptions]) -> None:
     """Print the answer of a run and where its report lies."""
+    from tissuq.cli.pdf import write_pdf
     from tissuq.cli.tables import print_json, print_summary
     from tissuq.report.terminal import print_result
     from tissuq.report.writer import read_record
 
-    if as_json:
-        print_json(run_folder)
-    elif record := read_record(run_folder):
-        print_result(record, run_folder, details=details)
+    folder = call.settings.run_folder
+    if call.how.pdf is not None:
+        write_pdf(folder / "report.html", call.how.pdf)
+        print(call.how.pdf)
+    elif call.how.as_json:
+        print_json(folder)
+    elif record := read_record(folder):
+        print_result(record, folder, details=call.how.details)
     else:
-        print_summary(run_folder, details=details)
+        print_summary(folder, details=call.how.details)

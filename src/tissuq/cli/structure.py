@@ -9,7 +9,6 @@ from pathlib import Path
 from tissuq.cli.call import Call, Configured, LawOfRun
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
-from tissuq.cli.progress import campaign_progress, progress
 from tissuq.studies.option import option
 from tissuq.studies.simulation_settings import SimulationSettings
 
@@ -45,7 +44,7 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
         check_apart(folder, source)
     check_folder(folder, stored_settings)
     check_source(source, folder)
-    with progress() as step, warnings.catch_warnings(record=True) as raised:
+    with call.monitor.steps() as step, warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always", UserWarning)
         posteriors = load_posteriors(settings, beside, law, step)
 
@@ -54,9 +53,11 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
         copy_source(source, folder)
 
     processes = 1 if law else call.how.workers or os.cpu_count() or 1  # others cannot load a law from a file
+    campaign = call.campaign_in(folder)
     with open_pool(processes, call.how.scheduler) as pool:
-        study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign_progress)
+        study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign)
     write_simulation(study, folder, figures=call.how.figures)
+    call.monitor.write_log(folder, study.warnings)
     print_rows(f"Case '{named}' with {settings.draws} draws", *readable_forces(study))
     print_warnings([*dict.fromkeys(str(warning.message) for warning in raised), *study.warnings])
     print(f"Report: {folder / 'report.html'}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import typer
 from tissuq.cli.call import Call, Campaign
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import Command, command
-from tissuq.cli.progress import campaign_progress
 from tissuq.errors import InputError
 from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, TissueOptions
 from tissuq.studies.option import option
@@ -47,7 +47,7 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
 
     name = call.how.preset
     if name == "sbc" and call.config is None:
-        _calibrate(Call("sbc", SbcOptions, call.stated, call.typed, call.how))
+        _calibrate(replace(call, kind=SbcOptions))  # type: ignore[arg-type]
         return
     if (call.config is None) == (name is None):
         raise InputError(f"give --config FILE.toml, or --preset with one of {', '.join(PRESETS)}, sbc.")
@@ -106,6 +106,8 @@ def _carry_out(
     from tissuq.studies.stream import open_pool
 
     check_folder(folder, settings)
-    with open_pool(call.how.workers, call.how.scheduler) as pool, campaign_progress(total) as step:
+    with open_pool(call.how.workers, call.how.scheduler) as pool, call.campaign_in(folder)(total) as step:
         write_campaign_recipe(folder, settings)
-        return run(settings, folder, pool=pool, step=step)
+        results = run(settings, folder, pool=pool, step=step)
+    call.monitor.write_log(folder)
+    return results
