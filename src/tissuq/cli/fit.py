@@ -79,6 +79,7 @@ def _fit_one(
 ) -> None:
     """Fit one material, write the run and print its summary."""
     from tissuq.cli.tables import print_summary
+    from tissuq.report.answer import answer_record, readable_estimates
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import run_specimen
 
@@ -88,6 +89,11 @@ def _fit_one(
         partial(write_specimen_run, sources=sources),
     )
     print_summary(target, study.experiment)
+    record = answer_record(study.experiment.name, study.main, study.answer, study.unit, ())
+    call.answer([
+        {"name": estimate["name"], "text": estimate["value"], "remark": f"95 % interval {estimate['interval']}"}
+        for estimate in readable_estimates(record)
+    ])  # fmt: skip
     _print_omissions(study)
 
 
