@@ -129,11 +129,11 @@ def _settings(name: str) -> dict[str, str]:
     from tissuq.cli.command import settings_of, slots_of
 
     kind = settings_of(name)
-    told = {}
+    remarks = {}
     for slot in slots_of(kind) if kind is not None else ():
         setting, unit = ".".join(slot.path), f" in {slot.option.unit}" if slot.option.unit else ""
-        told[slot.name] = f"<code>{setting}</code>{unit}" if setting != slot.name or unit else ""
-    return told
+        remarks[slot.name] = f"<code>{setting}</code>{unit}" if setting != slot.name or unit else ""
+    return remarks
 
 
 def _slug(name: str) -> str:

@@ -5,7 +5,7 @@ import json
 import jsonschema
 import pytest
 
-from tissuq.cli.command import SETTINGS
+from tissuq.cli.command import CONFIGURED
 from tissuq.cli.schema import schema_of
 
 
@@ -20,7 +20,7 @@ def test_the_schema_names_types_defaults_units_and_options(cli):
     assert schema["required"] == ["run"]
 
 
-@pytest.mark.parametrize("name", sorted(SETTINGS))
+@pytest.mark.parametrize("name", sorted(CONFIGURED))
 def test_every_schema_is_one(name):
     jsonschema.Draft202012Validator.check_schema(schema_of(name))
 
@@ -33,6 +33,14 @@ def test_a_recipe_keeps_to_the_schema_and_an_unknown_setting_does_not(cli, here,
     jsonschema.validate(recipe, schema_of("fit"))
     with pytest.raises(jsonschema.ValidationError, match="materail"):
         jsonschema.validate(recipe | {"materail": "yeoh"}, schema_of("fit"))
+
+
+def test_a_file_may_hold_more_than_the_command_line_says():
+    properties = schema_of("paper")["properties"]
+    assert {"truth", "stretch_low"} <= set(properties)
+    assert properties["points"]["option"] == "--measurements"
+    assert "option" not in properties["truth"]
+    assert schema_of("coverage")["required"] == ["designs"]
 
 
 def test_a_command_without_settings_has_no_schema(cli):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tissuq.cli.call import Call, Written, not_converged
+from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
+from tissuq.cli.running import Written
 from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.option import option

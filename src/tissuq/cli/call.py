@@ -13,63 +13,23 @@ from typing import TYPE_CHECKING, Any, Generic, Self, TextIO, TypeVar
 import typer
 
 from tissuq.cli.progress import Monitor
+from tissuq.cli.running import Configured, LawOfRun, Running, Written
 from tissuq.errors import InputError
-from tissuq.studies.option import Settings, option
+from tissuq.studies.option import Settings
 from tissuq.studies.settings import load_settings
 
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
     from tissuq.report.result import Result
 
-__all__ = ["Call", "Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Written", "not_converged"]
+__all__ = ["Call", "not_converged"]
 
 Kind = TypeVar("Kind", bound=Settings)
-How = TypeVar("How", bound="Running")
+How = TypeVar("How", bound=Running)
 Study = TypeVar("Study")
 Whole = TypeVar("Whole", bound=Settings)
 NOT_CONVERGED = 3
 """The exit status where sampling has not converged."""
-
-
-class Running(Settings):
-    """Options of a command on which its numbers do not depend."""
-
-
-class Configured(Running):
-    """A command that an earlier recipe repeats."""
-
-    quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.")
-    verbose: bool = option(False, "Tell how long every stage took.")
-    config: Path | None = option(None, "run.toml of an earlier run to repeat.")
-
-
-class Written(Configured):
-    """A command that writes a folder, whole or not at all."""
-
-    out: Path | None = option(None, "Folder for the run [runs/NAME].")
-    figures: bool = option(True, "Draw the figures.")
-    force: bool = option(False, "Replace an existing folder of the same kind.")
-
-
-class LawOfRun(Running):
-    """A command that begins from a run of ``tissuq fit``."""
-
-    user_law: str | None = option(
-        None, "law.py:Name of the run, if its material is your own law; its code runs only if named here."
-    )
-
-
-class OfRun(LawOfRun, Written):
-    """A command that begins from such a run, and writes a folder."""
-
-
-class Campaign(Configured):
-    """A command whose folder grows, and which goes on where it was stopped."""
-
-    config: Path | None = option(None, "TOML file of the campaign.")
-    out: Path | None = option(None, "Folder of the campaign [runs/NAME].")
-    workers: int = option(1, "Processes on this machine.", ge=1)
-    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
 
 
 @dataclass(frozen=True)
@@ -78,7 +38,6 @@ class Call(Generic[Kind, How]):
 
     Attributes
     ----------
-    name : str
     kind : type of Settings
     stated : dict
         The settings that were typed.
@@ -92,7 +51,6 @@ class Call(Generic[Kind, How]):
         Where the answer goes, also with --quiet.
     """
 
-    name: str
     kind: type[Kind]
     stated: dict[str, Any]
     typed: Mapping[str, str]
@@ -150,12 +108,12 @@ class Call(Generic[Kind, How]):
             )
         return material_named(name, laws=True) if name else None
 
-    def target(self, usual: Path, *, apart_from: Path | None = None) -> Path:
-        """Return the folder that is to be written, once it may be; ``usual`` unless another is named."""
+    def target(self, default: Path, *, apart_from: Path | None = None) -> Path:
+        """Return the folder that is to be written, once it may be; ``default`` unless another is named."""
         from tissuq.report.run_folder import check_apart, check_target
 
         assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
-        folder = self.how.out or usual
+        folder = self.how.out or default
         if apart_from is not None:
             check_apart(folder, apart_from)
         check_target(folder, force=self.how.force)

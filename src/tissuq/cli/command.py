@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import nullcontext, redirect_stdout
 from dataclasses import dataclass, replace
+from importlib import import_module
 from inspect import Parameter, Signature
 from io import StringIO
 from typing import Annotated, Any, Self, TypeVar
@@ -14,20 +15,21 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from typer.core import TyperCommand
 
-from tissuq.cli.call import Call, Configured, Running
+from tissuq.cli.call import Call
 from tissuq.cli.former_names import todays_names
 from tissuq.cli.progress import Monitor
+from tissuq.cli.running import Configured, Running
 from tissuq.cli.stopping import stopping
 from tissuq.studies.option import Option, Settings, options_of
 from tissuq.studies.settings import load_settings
 
-__all__ = ["Command", "Slot", "command", "settings_of", "slots_of", "stated"]
+__all__ = ["CONFIGURED", "Command", "Slot", "command", "settings_of", "slots_of", "stated"]
 
 Kind = TypeVar("Kind", bound=Settings)
 How = TypeVar("How", bound=Running)
 
-SETTINGS: dict[str, type[Settings]] = {}
-"""The settings of every command, by the name of its function."""
+CONFIGURED: dict[str, tuple[type[Settings], str]] = {}
+"""The settings of every command that takes a file of them, by its name, and where the class is that a file is of."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,9 @@ class Slot:
         return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[reads, kind])
 
 
-def command(settings: type[Kind], running: type[How]) -> Callable[[Callable[[Call[Kind, How]], None]], Any]:
+def command(
+    settings: type[Kind], running: type[How], whole: str = ""
+) -> Callable[[Callable[[Call[Kind, How]], None]], Any]:
     """Make a command of what carries out a `Call`.
 
     Parameters
@@ -77,6 +81,8 @@ def command(settings: type[Kind], running: type[How]) -> Callable[[Callable[[Cal
         What its result depends on: its options, and what its ``run.toml`` may hold.
     running : type of Running
         Its other options.
+    whole : str
+        MODULE:NAME of the class of what its file may hold, where that is more than its options.
     """
 
     def decorate(carry_out: Callable[[Call[Kind, How]], None]) -> Any:
@@ -89,14 +95,15 @@ def command(settings: type[Kind], running: type[How]) -> Callable[[Callable[[Cal
             checked = load_settings(running, None, how, typed=typed_how)
             is_quiet = isinstance(checked, Configured) and checked.quiet
             monitor = Monitor(is_quiet, isinstance(checked, Configured) and checked.verbose)
-            call = Call(carry_out.__name__, settings, *stated(of_settings, values), checked, monitor)
+            call = Call(settings, *stated(of_settings, values), checked, monitor)
             with stopping(monitor), redirect_stdout(StringIO()) if is_quiet else nullcontext():
                 carry_out(call)
 
         run.__doc__, run.__name__ = carry_out.__doc__, carry_out.__name__
         slots = sorted((*of_running, *of_settings), key=lambda slot: not slot.option.is_argument)
         run.__signature__ = Signature([slot.parameter for slot in slots])  # type: ignore[attr-defined]  # what Typer reads
-        SETTINGS[carry_out.__name__] = settings
+        if has_config:
+            CONFIGURED[carry_out.__name__] = settings, whole
         return run
 
     return decorate
@@ -124,8 +131,13 @@ class Command(TyperCommand):
 
 
 def settings_of(name: str) -> type[Settings] | None:
-    """Return the settings that a command declares."""
-    return SETTINGS.get(name)
+    """Return the class of what the file of a command may hold, None where it takes no file."""
+    kind, whole = CONFIGURED.get(name, (None, ""))
+    if not whole:
+        return kind
+    module, _, of_file = whole.partition(":")
+    of_whole_file: type[Settings] = getattr(import_module(module), of_file)
+    return of_whole_file
 
 
 def slots_of(kind: type[BaseModel], *, is_optional: bool = False) -> Iterator[Slot]:

@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tissuq.cli.call import Call, Running
+from tissuq.cli.call import Call
 from tissuq.cli.command import command
+from tissuq.cli.running import Running
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.settings import DAMAGE

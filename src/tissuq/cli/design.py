@@ -6,8 +6,9 @@ import os
 from functools import partial
 from pathlib import Path
 
-from tissuq.cli.call import Call, OfRun
+from tissuq.cli.call import Call
 from tissuq.cli.command import command
+from tissuq.cli.running import OfRun
 from tissuq.errors import InputError
 from tissuq.studies.design_settings import DesignSettings
 from tissuq.studies.option import option

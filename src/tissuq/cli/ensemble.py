@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tissuq.cli.call import Call, Configured, LawOfRun
+from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
+from tissuq.cli.running import Configured, LawOfRun
 from tissuq.errors import InputError
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.option import argument, option

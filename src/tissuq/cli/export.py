@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from tissuq.cli.call import Call, LawOfRun
+from tissuq.cli.call import Call
 from tissuq.cli.command import command
+from tissuq.cli.running import LawOfRun
 from tissuq.studies.card_settings import ExportSettings
 from tissuq.studies.option import option
 

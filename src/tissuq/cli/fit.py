@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tissuq.cli import reading
-from tissuq.cli.call import Call, Written, not_converged
+from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
+from tissuq.cli.running import Written
 from tissuq.errors import InputError
 from tissuq.result_warning import Severity
 from tissuq.studies.measured_file import ReadingSettings

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.cli.ask import ask_about
-from tissuq.cli.call import Call, Running
+from tissuq.cli.call import Call
 from tissuq.cli.command import command
 from tissuq.cli.reading import files_of, find_tests
+from tissuq.cli.running import Running
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import argument, option

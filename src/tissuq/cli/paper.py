@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tissuq.cli.call import Call, Written, not_converged
+from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
+from tissuq.cli.running import Written
 from tissuq.studies.campaign_settings import PaperOptions
 from tissuq.studies.option import option
 from tissuq.studies.option_texts import range_of
@@ -22,7 +23,7 @@ class PaperRunning(Written):
     out: Path = option(Path("runs/paper"), "Folder for the run [runs/paper].")
 
 
-@command(PaperOptions, PaperRunning)
+@command(PaperOptions, PaperRunning, "tissuq.validation.paper:PaperSettings")
 def paper(call: Call[PaperOptions, PaperRunning]) -> None:
     """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
     from tissuq.cli.tables import print_summary, print_warnings

@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from tissuq.cli.call import Call, Written, not_converged
+from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
+from tissuq.cli.running import Written
 from tissuq.studies.option import option
 from tissuq.studies.population_settings import PopulationSettings
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from tissuq.cli.call import Call, OfRun, not_converged
+from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
 from tissuq.cli.reading import resolve
+from tissuq.cli.running import OfRun
 from tissuq.errors import InputError
 from tissuq.studies.option import option
 from tissuq.studies.prediction_settings import PredictionSettings, run_prediction

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import shlex
 import sys
@@ -26,6 +27,8 @@ PATIENCE = 3.0
 """Seconds after which a step is told of where there is no terminal."""
 TASKS_APART = 10.0
 """Seconds between lines about the tasks of a campaign."""
+SWITCH = "TISSUQ_PROGRESS"
+"""The environment variable that says ``off`` where such lines would be in the way."""
 
 
 @dataclass
@@ -77,7 +80,7 @@ class Monitor:
                 bar.update(shown, description=f"{_left(seconds_left)}{text}", completed=done)
                 done += 1
                 number = f"{done} of {total}: " if total else ""
-                if not self._has_terminal:
+                if self._tells_lines:
                     timed.wait(f"{number}{_left(seconds_left)}{text}")
 
             yield step
@@ -90,17 +93,17 @@ class Monitor:
         Tasks that an earlier run had done count as done, but not in the estimate of the time.
         """
         self._begin(f"{total} tasks")
-        self.tasks, self.tasks_done, computed, begun, told = total, 0, 0, monotonic(), monotonic()
+        self.tasks, self.tasks_done, computed, begun, last_told = total, 0, 0, monotonic(), monotonic()
         with self._bar(total) as bar:
             shown = bar.add_task("", total=total)
 
             def step(text: str, is_new: bool) -> None:
-                nonlocal computed, told
+                nonlocal computed, last_told
                 self.tasks_done, computed = self.tasks_done + 1, computed + is_new
                 seconds_left = (monotonic() - begun) / computed * (total - self.tasks_done) if computed else None
                 bar.update(shown, description=f"{_left(seconds_left)}{text}", completed=self.tasks_done)
-                if not self._has_terminal and monotonic() - told > TASKS_APART:
-                    told = monotonic()
+                if self._tells_lines and monotonic() - last_told > TASKS_APART:
+                    last_told = monotonic()
                     self._say(f"{self.tasks_done} of {total}, {_left(seconds_left)}{text}")
 
             yield step
@@ -143,6 +146,10 @@ class Monitor:
     @property
     def _has_terminal(self) -> bool:
         return sys.stderr.isatty()
+
+    @property
+    def _tells_lines(self) -> bool:
+        return not self._has_terminal and os.environ.get(SWITCH) != "off"
 
     def _bar(self, total: int | None) -> Progress:
         from rich.console import Console

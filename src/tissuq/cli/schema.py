@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from tissuq.cli.call import Call, Running
-from tissuq.cli.command import command, settings_of, slots_of
+from tissuq.cli.call import Call
+from tissuq.cli.command import CONFIGURED, command, settings_of, slots_of
+from tissuq.cli.running import Running
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument
 
@@ -35,9 +36,7 @@ def schema_of(name: str) -> dict[str, Any]:
     """
     kind = settings_of(name)
     if kind is None:
-        raise InputError(
-            f"there is no command '{name}' that takes --config; choose fit, predict, population or another."
-        )
+        raise InputError(f"no command '{name}' takes --config; choose one of {', '.join(sorted(CONFIGURED))}.")
     whole = kind.model_json_schema()
     for slot in slots_of(kind):
         if len(slot.path) == 1:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tissuq.cli.call import Call, Running
+from tissuq.cli.call import Call
 from tissuq.cli.command import command
+from tissuq.cli.running import Running
 from tissuq.studies.option import Settings, argument, option
 
 __all__ = ["show"]

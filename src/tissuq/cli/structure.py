@@ -6,9 +6,10 @@ import os
 import warnings
 from pathlib import Path
 
-from tissuq.cli.call import Call, Configured, LawOfRun
+from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
+from tissuq.cli.running import Configured, LawOfRun
 from tissuq.studies.option import option
 from tissuq.studies.simulation_settings import SimulationSettings
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import typer
 
-from tissuq.cli.call import Call, Campaign
+from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import Command, command
+from tissuq.cli.running import Campaign
 from tissuq.errors import InputError
 from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, TissueOptions
 from tissuq.studies.option import option
@@ -37,7 +38,7 @@ def _study() -> None:
 
 
 @study.command("coverage", cls=Command)
-@command(CoverageOptions, CoverageRunning)
+@command(CoverageOptions, CoverageRunning, "tissuq.validation.coverage:CoverageSettings")
 def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
     from tissuq.cli.tables import print_rows
@@ -61,7 +62,7 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
 
 
 @study.command("sbc", cls=Command)
-@command(SbcOptions, Campaign)
+@command(SbcOptions, Campaign, "tissuq.validation.sbc:SbcSettings")
 def sbc(call: Call[SbcOptions, Campaign]) -> None:
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
     _calibrate(call)
@@ -84,7 +85,7 @@ def _calibrate(call: Call[SbcOptions, Any]) -> None:
 
 
 @study.command("tissues", cls=Command)
-@command(TissueOptions, Campaign)
+@command(TissueOptions, Campaign, "tissuq.validation.tissues:TissueSettings")
 def tissues(call: Call[TissueOptions, Campaign]) -> None:
     """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
     from tissuq.cli.tables import print_rows

@@ -16,6 +16,12 @@ NoiseKnown = tuple[Literal["known", "unknown"], ...]
 NOISE = "known or unknown to the fits."
 
 
+def _discrepancies() -> tuple[str, ...]:
+    from tissuq.model.discrepancy import discrepancies
+
+    return tuple(discrepancies())
+
+
 class PaperOptions(Settings):
     """The study of the paper; stresses in MPa."""
 
@@ -55,7 +61,10 @@ class SbcOptions(Settings):
     seed: int = seed()
     material: str = option("neo-hookean", "The material that is calibrated.")
     formulations: tuple[str, ...] = option(
-        (), "Discrepancy; repeat for more [all of them].", name="discrepancy", min_length=1
+        help="Discrepancy; repeat for more [all of them].",
+        default_factory=_discrepancies,
+        name="discrepancy",
+        min_length=1,
     )
 
 

@@ -18,7 +18,7 @@ from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import material_named
-from tissuq.model.discrepancy import discrepancies, discrepancy_named
+from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
@@ -68,7 +68,6 @@ class SbcSettings(SbcOptions):
     of the design.
     """
 
-    formulations: tuple[str, ...] = Field(default_factory=lambda: tuple(discrepancies()), min_length=1)
     design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
     priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
 
