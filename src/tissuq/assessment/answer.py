@@ -14,7 +14,7 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import TissuqError
-from tissuq.experiments.experiment import Curve, Experiment
+from tissuq.experiments.curve import Curve
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.experiments.numbers import NUMBER, number_in
-from tissuq.experiments.reading.layout import FEWEST_ROWS, split
-from tissuq.experiments.reading.table import Table, padded
+from tissuq.experiments.reading.layout import FEWEST_ROWS
+from tissuq.experiments.reading.table import Table
 
 __all__ = ["blocks_of"]
 
@@ -34,7 +33,7 @@ def blocks_of(table: Table, filled: Collection[int]) -> list[Table]:
     ]
     if not gaps:
         return [table]
-    cells = [padded(split(row, table.separator), len(table.names)) for row in table.rows]
+    cells = table.cells()
     numbers = _numbers(cells)
     starts = [row for row in gaps if _begins_anew(numbers, row) and not _is_named(cells, row)]
     bounds = list(pairwise([0, *starts, len(table.rows)]))
@@ -42,7 +41,7 @@ def blocks_of(table: Table, filled: Collection[int]) -> list[Table]:
         return [table]
     note = "tests are parted where the table begins anew after a blank line; --table chooses one."
     parts = [table.taken(np.arange(start, stop)) for start, stop in bounds]
-    return [replace(part, notes=(*part.notes, note)) for part in parts]
+    return [part.noted(note) for part in parts]
 
 
 def _is_named(cells: Sequence[Sequence[str]], row: int) -> bool:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -19,15 +17,13 @@ from tissuq.experiments.reading.recognition import (
     LOADS,
     OTHER_MEASURE,
     SHEARS,
+    ColumnChoice,
     Contents,
     say_which,
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import PRESSURE
 from tissuq.experiments.units import measured_in
-
-if TYPE_CHECKING:
-    from tissuq.experiments.reading.columns import ColumnChoice
 
 __all__ = ["SPREAD_ROLES", "check_machine", "check_roles", "check_test", "check_together", "with_types"]
 
@@ -235,7 +231,7 @@ def _check_lines_above(table: Table, column: int, kind: str) -> None:
 
 def check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_shear: bool) -> None:
     """Refuse a shear stress where nothing is sheared, and amplitudes of oscillations, which are no curve."""
-    quantities = [heading(name).quantity for name in table.names]
+    quantities = table.quantities
     if is_shear and not mapping.keys() & LOADS and NORMAL.search(quantities[stress]):
         raise InputError(
             f"{table.place(stress)} is normal to the sheared planes, and no column is recognised as a shear stress, a "

@@ -6,7 +6,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments import units
-from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import FORCE, Quantity
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 from tissuq.errors import InputError
@@ -21,7 +20,6 @@ from tissuq.experiments.reading.column_checks import (
 from tissuq.experiments.reading.headings import (
     AXES,
     COMPONENTS,
-    heading,
     measure_in,
     of_spread,
     on_axis,
@@ -36,6 +34,7 @@ from tissuq.experiments.reading.recognition import (
     DEFORMATIONS_OF_UNITS,
     LENGTHENINGS,
     LOADS,
+    ColumnChoice,
     Contents,
     ambiguous,
     columns_there_are,
@@ -48,40 +47,11 @@ from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOU
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
 __all__ = [
-    "ColumnChoice",
     "about_stress",
     "choose_columns",
     "find_column",
     "mapping_of_each_stress",
 ]
-
-
-@dataclass(frozen=True)
-class ColumnChoice:
-    """The columns (counted from 0) of the deformation and of the stress or force, and what they hold.
-
-    Parameters
-    ----------
-    deformation, stress : int
-        The columns.
-    measure : str
-        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear, its rate, twist, or
-        outer or inner diameter.
-    load : str
-        What the other column holds: stress, torque, force or pressure.
-    strain_type, stress_type : str
-        Which measure of strain, or of shear, and of stress.
-    by_unit : frozenset of int
-        Which of the columns were told by their units alone, under names that are not known.
-    """
-
-    deformation: int
-    stress: int
-    measure: str = "stretch"
-    load: str = "stress"
-    strain_type: str = "engineering"
-    stress_type: str = "engineering"
-    by_unit: frozenset[int] = frozenset()
 
 
 def choose_columns(
@@ -158,7 +128,7 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     readings = (
         table.names,
         [name.lower() for name in table.names],
-        [heading(name).quantity for name in table.names],
+        table.quantities,
     )
     for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
         columns = [column for column, name in enumerate(names) if name and name == key]
@@ -185,7 +155,7 @@ def _names(table: Table) -> list[tuple[str, str]]:
 
     Beside columns of a spread without words for a mean.
     """
-    quantities = [heading(name).quantity for name in table.names]
+    quantities = table.quantities
     is_less_one = stretches_less_one(table.names)
     quantities = ["strain" if less_one else name for name, less_one in zip(quantities, is_less_one, strict=True)]
     is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]

@@ -11,7 +11,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.columns import ColumnChoice, about_stress, mapping_of_each_stress
+from tissuq.experiments.reading.columns import about_stress, mapping_of_each_stress
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
 from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
 from tissuq.experiments.reading.height_of_block import of_block
@@ -19,6 +19,7 @@ from tissuq.experiments.reading.labels import columns_only
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.repeated_sizes import test_beside
 from tissuq.experiments.reading.several_specimens import check_one_specimen
 from tissuq.experiments.reading.spread import Spread, spread_of

@@ -8,10 +8,10 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import declared_unit, factor_of, strain_factor_of
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words, initial_size, tube_of
 from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
 from tissuq.experiments.reading.positions import FIRST_ROW, LITTLE_LOAD, ZERO_ASSUMED, check_lengths, check_positions
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS

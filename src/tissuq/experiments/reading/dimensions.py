@@ -11,10 +11,10 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.numbers import number_and_unit
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import heading, on_axis
 from tissuq.experiments.reading.inflation import Tube
 from tissuq.experiments.reading.mean_size import MEAN_OF, statements_of_size
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.repeated_sizes import TestBeside
 from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
 from tissuq.experiments.reading.table import Column, Table

@@ -16,7 +16,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.columns import ColumnChoice, choose_columns
+from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.conversion import (
     columns_of_stresses,
     measured_rows,
@@ -31,6 +31,7 @@ from tissuq.experiments.reading.labels import check_labels, columns_only, labels
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.plausibility import check_signs, check_stretches
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.regions import (
     AUTO,
     Region,

@@ -8,10 +8,9 @@ from math import isclose
 
 import numpy as np
 
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions
 from tissuq.experiments.reading.headings import dimensions_named
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, LENGTH

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.headings import NEXT_WORD, heading
+from tissuq.experiments.reading.headings import NEXT_WORD
 from tissuq.experiments.reading.several_specimens import row_names
 from tissuq.experiments.reading.table import Table
 
@@ -54,7 +54,7 @@ def labels_of(table: Table, names: Sequence[str]) -> dict[str, str]:
 
 def columns_only(table: Table, only: Mapping[str, str | int] | None) -> dict[str, str | int]:
     """Return what of ``only`` is asked of cells of columns; directions and conditions may be said elsewhere."""
-    stated = LABELS.keys() - {heading(name).quantity for name in table.names}
+    stated = LABELS.keys() - {*table.quantities}
     return {name: value for name, value in (only or {}).items() if name.lower() not in stated}
 
 
@@ -75,7 +75,7 @@ def check_labels(table: Table, experiment: Experiment, only: Mapping[str, str | 
 
 def _in_column(table: Table, pattern: str) -> str:
     """Return the text in all rows of the only column of a label."""
-    columns = [k for k, name in enumerate(table.names) if re.fullmatch(pattern, heading(name).quantity)]
+    columns = [k for k, quantity in enumerate(table.quantities) if re.fullmatch(pattern, quantity)]
     cells = set(row_names(table, columns[0])) if len(columns) == 1 else set[str]()
     return cells.pop() if len(cells) == 1 else ""
 

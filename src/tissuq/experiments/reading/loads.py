@@ -10,9 +10,9 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
 from tissuq.experiments.reading.positions import FIRST_ROW
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stress_measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.torsion import apparent_stress

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.measured_rows import MeasuredRows
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 
 __all__ = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 
 __all__ = ["FIRST_ROW", "LITTLE_LOAD", "ZERO_ASSUMED", "check_lengths", "check_positions"]

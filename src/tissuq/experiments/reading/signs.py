@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import TURNS
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column
 
@@ -132,7 +130,7 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
     for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         furthest = int(np.argmax(np.abs(stretch - 1)))
         for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
-            if heading(measured.table.names[column]).quantity.startswith(COMPRESSION_WORDS) and value > 0:
+            if measured.table.quantities[column].startswith(COMPRESSION_WORDS) and value > 0:
                 raise InputError(
                     f"{measured.table.place(column, furthest)}: the name says compression and the value is positive. "
                     "If the machine counts compression as positive, give compression_positive=True "

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import heading, is_of_count, is_of_mean, of_spread, role_names, without_mean
+from tissuq.experiments.reading.columns import find_column
+from tissuq.experiments.reading.headings import is_of_count, is_of_mean, of_spread, role_names, without_mean
 from tissuq.experiments.reading.loads import Load
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import SPREADS
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
@@ -99,7 +100,7 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
 
     Where some columns are of means, those of others have none.
     """
-    quantities = [heading(name).quantity for name in table.names]
+    quantities = table.quantities
     of_stress = quantities[choice.stress]
     if any(map(is_of_mean, quantities)) and not is_of_mean(of_stress):
         return Spread()
@@ -164,7 +165,7 @@ def _count(table: Table, mapping: Mapping[str, str | int], mean_of: int | None) 
     """Return the number of specimens in every row, or of all, and where it comes from; None where nobody says it."""
     if mean_of is not None:
         return np.array(float(mean_of)), f"{mean_of} (as given)"
-    columns = [column for column, name in enumerate(table.names) if is_of_count(heading(name).quantity)]
+    columns = [column for column, quantity in enumerate(table.quantities) if is_of_count(quantity)]
     if "n" in mapping:
         columns = [find_column(table, "n", mapping["n"])]
     if len(columns) != 1:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from math import prod
 
 from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
+from tissuq.experiments.reading.lines_above import names_above
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, are_named, numbered, sizes_in_line
-from tissuq.experiments.reading.side_by_side import names_above
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import AREA, LENGTH, Quantity
@@ -114,7 +114,7 @@ def names_of_specimen(
     table: Table, choices: Sequence[ColumnChoice], only: Mapping[str, str | int] | None
 ) -> frozenset[str]:
     """Return what a file calls the specimen in a table: its sheet, title, name above the columns, and cells."""
-    columns = [k for k, name in enumerate(table.names) if is_of_specimens(heading(name).quantity)]
+    columns = [k for k, quantity in enumerate(table.quantities) if is_of_specimens(quantity)]
     cells = [set(table.texts(column)) - {""} for column in columns]
     asked = [str(value) for name, value in (only or {}).items() if plain(name) not in CYCLE_NAMES | SET_NAMES]
     names = [table.sheet, table.title, *asked, *(cell for values in cells if len(values) == 1 for cell in values)]
@@ -126,7 +126,7 @@ def names_of_specimen(
 
 def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     """Yield what lines above the table state: ``Width : 5 mm``, ``"Probendicke";1,55;"mm"``, or less clear ones."""
-    is_of_one = not table.number and not any(is_of_specimens(heading(name).quantity) for name in table.names)
+    is_of_one = not table.number and not any(map(is_of_specimens, table.quantities))
     for line, text in table.head:
         text, source = text.lstrip("# "), f"in line {line}"
         if several := sizes_in_line(text, table.separator):
@@ -191,7 +191,7 @@ def _among_words(text: str, source: str) -> Iterator[StatedSize]:
 def _in_columns(table: Table) -> Iterator[StatedSize]:
     """Yield the sizes in columns of them that hold one number all along."""
     for column, name in enumerate(table.names):
-        quantity, measurement = numbered(heading(name).quantity)
+        quantity, measurement = numbered(table.quantities[column])
         if not dimensions_named(quantity, is_cylinder=True):
             continue
         cells = {cell for cell in table.texts(column) if cell.lower() not in MISSING}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,12 @@ from tissuq.experiments.reading.layout import (
     MISSING,
     SPREADSHEET_ERRORS,
     WHITESPACE,
+    joined,
     split,
 )
 from tissuq.experiments.units import BRACKETS
 
-__all__ = ["Column", "Lines", "Table", "padded", "rows_in"]
+__all__ = ["Column", "Lines", "Table", "filled_on", "padded", "rows_in"]
 
 Column = NDArray[np.float64]
 Lines = list[tuple[int, str]]
@@ -89,6 +91,11 @@ class Table:
     counted: str = "line"
     other_lines: Mapping[str, Lines] = field(default_factory=dict)
 
+    @cached_property
+    def quantities(self) -> list[str]:
+        """What the names of the columns say they hold, without units."""
+        return [heading(name).quantity for name in self.names]
+
     @property
     def span(self) -> str:
         """Return the lines of its rows, in words."""
@@ -146,9 +153,17 @@ class Table:
         cells = (split(row, self.separator) for row in self.rows)
         return [row[column] if column < len(row) else "" for row in cells]
 
-    def texts_of_all(self) -> list[tuple[str, ...]]:
-        """Return the cells of every column as text, as `texts` does of one."""
-        return list(zip(*(padded(split(row, self.separator), len(self.names)) for row in self.rows), strict=True))
+    def cells(self) -> list[tuple[str, ...]]:
+        """Return the cells of every row as text, one for each column: empty ones where a row ends before it."""
+        return [padded(split(row, self.separator), len(self.names)) for row in self.rows]
+
+    def with_cells(self, cells: Iterable[Sequence[str]]) -> Table:
+        """Return the table with other cells in its rows."""
+        return replace(self, rows=[joined(row, self.separator) for row in cells])
+
+    def noted(self, *notes: str) -> Table:
+        """Return the table with more to know of how it was found."""
+        return replace(self, notes=(*self.notes, *notes))
 
     def numbers(self, columns: Sequence[int]) -> list[Column]:
         """Return columns (counted from 0) as finite numbers, written with decimal points or decimal commas.
@@ -223,7 +238,7 @@ class Table:
         count, first = np.count_nonzero(is_left_out), self.lines[int(np.argmax(is_left_out))]
         what, where = ("1 row", "") if count == 1 else (f"{count} rows", "the first ")
         note = f"{what} {text} {where}in {self.counted} {first}."
-        return replace(self.taken(np.flatnonzero(~is_left_out)), notes=(*self.notes, note))
+        return self.taken(np.flatnonzero(~is_left_out)).noted(note)
 
     def _how_to_leave_out(self, columns: Sequence[int]) -> str:
         """Return how to leave out the rows with a faulty cell in columns; nothing where these are most rows."""
@@ -289,6 +304,14 @@ def _problem(cell: str) -> str:
 def padded(cells: list[str], width: int) -> tuple[str, ...]:
     """Return the cells of a row, so many, empty ones added."""
     return tuple([*cells, *[""] * width][:width])
+
+
+def filled_on(cells: Sequence[str]) -> list[str]:
+    """Return cells, of which each goes for the empty ones after it."""
+    filled = list(cells[:1])
+    for cell in cells[1:]:
+        filled.append(cell or filled[-1])
+    return filled
 
 
 def rows_in(lines: str, numbers: Sequence[int], file: str) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from io import StringIO
 from itertools import pairwise
 from typing import Any
@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.beside import without_statements_beside
 from tissuq.experiments.reading.blocks import blocks_of
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import (
     WHITESPACE,
     column_names,
@@ -29,15 +27,12 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
-from tissuq.experiments.reading.means_with_spreads import with_spreads_apart
-from tissuq.experiments.reading.percentages import without_percent_signs
-from tissuq.experiments.reading.spanning import with_names_above
-from tissuq.experiments.reading.summary import find_summary
+from tissuq.experiments.reading.lines_above import number_before, title_of, with_names_above
+from tissuq.experiments.reading.no_measurements import without_statements_beside, without_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
-from tissuq.experiments.reading.thousands import without_thousands
-from tissuq.experiments.reading.titles import number_before, title_of
 from tissuq.experiments.reading.transposed import transposed_table
+from tissuq.experiments.reading.written_numbers import with_plain_numbers
 
 __all__ = ["read_table", "read_tables"]
 
@@ -164,7 +159,7 @@ def _of_data_frame(data: Any) -> Table:
         table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first))
     if len(rows) >= LONG_FILE and (block := _block(columns)) is not None:
         return replace(table, block=block)
-    return _without_summary(table)
+    return without_summary(table)
 
 
 def _block(columns: Sequence[DataColumn]) -> NDArray[np.float64] | None:
@@ -283,8 +278,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     if layout.names:
         table = with_names_above(table, texts[layout.names - 1])
-    table = with_spreads_apart(without_percent_signs(without_thousands(table)))
-    return _without_summary(table)
+    return without_summary(with_plain_numbers(table))
 
 
 def _joined(tables: Sequence[Table]) -> list[Table]:
@@ -304,30 +298,12 @@ def _goes_on(table: Table, later: Table) -> bool:
     """Tell whether a table has the names of the one before, and times that go on from there."""
     if (table.names, table.units) != (later.names, later.units):
         return False
-    times = [column for column, name in enumerate(table.names) if TIME.search(heading(name).quantity)]
+    times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
     ends = table.taken(np.array([0, len(table.rows) - 1]))
     return bool(times) and all(
         before[0] < before[-1] <= after[0]
         for before, after in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
     )
-
-
-def _without_summary(table: Table) -> Table:
-    """Return the table without the rows of a summary at its end."""
-    summary = find_summary(table.rows, table.lines, partial(split, separator=table.separator))
-    if summary is None:
-        return table
-    first, last = table.lines[summary.start], table.lines[-1]
-    counted = table.counted
-    where = f"{counted} {first}" if first == last else f"{counted}s {first} to {last}"
-    if summary.statistics is None:
-        raise InputError(
-            f"{table.file}, {where}: set apart at the end of the table, and not going on from {counted} "
-            f"{table.lines[summary.start - 1]}. Delete a summary; put measurements into a file of their own."
-        )
-    what = f" with its {', '.join(summary.statistics)}" if summary.statistics else ""
-    note = f"{where} at the end of the table, a summary{what}, left out: no measurements."
-    return replace(table.taken(np.arange(summary.start)), notes=(*table.notes, note))
 
 
 def _no_table(file: str, content: Lines) -> InputError:

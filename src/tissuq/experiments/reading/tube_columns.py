@@ -9,7 +9,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Planar
-from tissuq.experiments.reading.headings import heading, role_names
+from tissuq.experiments.reading.headings import role_names
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES_OF_TUBE
 from tissuq.experiments.units import measured_in
@@ -88,8 +88,8 @@ def _columns(table: Table, quantities: Sequence[str], role: str) -> Iterator[int
 
 def _check_length(table: Table) -> None:
     """Refuse a tube whose axial stretch the table says, and that is not one."""
-    for column, name in enumerate(table.names):
-        if not AXIAL_STRETCH.fullmatch(heading(name).quantity):
+    for column, quantity in enumerate(table.quantities):
+        if not AXIAL_STRETCH.fullmatch(quantity):
             continue
         (stretch,) = table.numbers([column])
         row = int(np.argmax(np.abs(stretch - 1)))
