@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import is_quantity, unit_of
+from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
 __all__ = ["checked", "checked_points", "in_mpa"]

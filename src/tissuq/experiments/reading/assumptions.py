@@ -8,8 +8,7 @@ import numpy as np
 
 from tissuq.experiments.reading.column_units import MPA_ASSUMED
 from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
-from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
-from tissuq.experiments.reading.positions import ZERO_ASSUMED
+from tissuq.experiments.reading.plausibility import RATIO_ASSUMED, ZERO_ASSUMED
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stated_mode import is_torque
 from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED

@@ -1,8 +1,10 @@
-"""Blocks of one table, parted by blank lines, of which each begins anew: tests beneath one another without names."""
+"""Tables beneath one another: of which a time goes on in the next one, and blocks of one that each begin anew."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +14,12 @@ from tissuq.experiments.numbers import NUMBER, number_in
 from tissuq.experiments.reading.layout import FEWEST_ROWS
 from tissuq.experiments.reading.table import Table
 
-__all__ = ["blocks_of"]
+__all__ = ["blocks_of", "joined_in_time"]
 
 SAME, FAR = 0.1, 0.5
 """Share of the range of a column within which all blocks begin, and by which one of them goes back at a blank line."""
+TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
+"""Names of a column of times."""
 
 
 def blocks_of(table: Table, filled: Collection[int]) -> list[Table]:
@@ -63,3 +67,28 @@ def _begins_anew(numbers: NDArray[np.float64], row: int) -> bool:
     span = np.nanmax(numbers, axis=0) - np.nanmin(numbers, axis=0)
     is_same = np.abs(numbers[row] - numbers[0]) <= SAME * span
     return bool(len(span) and is_same.all() and (np.abs(numbers[row] - numbers[row - 1]) >= FAR * span).any())
+
+
+def joined_in_time(tables: Sequence[Table]) -> list[Table]:
+    """Return tables, those that go on from the one before as one with it."""
+    joined = list(tables[:1])
+    for table in tables[1:]:
+        if _goes_on(joined[-1], table):
+            note = f"{joined[-1].span} and {table.span}, in which time goes on, read as one table."
+            rows, lines = [*joined[-1].rows, *table.rows], [*joined[-1].lines, *table.lines]
+            joined[-1] = replace(joined[-1], rows=rows, lines=lines).noted(note)
+        else:
+            joined.append(table)
+    return joined
+
+
+def _goes_on(table: Table, later: Table) -> bool:
+    """Tell whether a table has the names of the one before, and times that go on from there."""
+    if (table.names, table.units) != (later.names, later.units):
+        return False
+    times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
+    ends = table.taken(np.array([0, len(table.rows) - 1]))
+    return bool(times) and all(
+        before[0] < before[-1] <= after[0]
+        for before, after in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
+    )

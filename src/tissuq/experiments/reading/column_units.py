@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments import units
+from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, Quantity
 
-__all__ = ["MPA_ASSUMED", "declared_unit", "factor_of", "strain_factor_of", "stress_unit_of"]
+__all__ = ["MPA_ASSUMED", "UnitOption", "declared_unit", "factor_of", "strain_factor_of", "stress_unit_of"]
 
+UnitOption = Literal["force_unit", "displacement_unit", "strain_unit"]
+"""Options of reading that state the unit of a column."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"
 LARGEST_ASSUMED_STRESS = 100.0
 """Largest stress, MPa, of a soft material: numbers beyond it that have no unit are not taken as MPa."""
@@ -34,8 +39,11 @@ def declared_unit(table: Table, column: int) -> str:
     return table.unit(column)
 
 
-def factor_of(table: Table, column: int, quantity: Quantity, option: str, unit: str | None) -> tuple[float, str]:
-    """Return the factor from a column's unit of force or length, and the words for where it comes from."""
+def factor_of(
+    table: Table, column: int, quantity: Quantity, option: UnitOption, options: ReadingOptions
+) -> tuple[float, str]:
+    """Return the factor from a column's unit, which an option may state, and the words for where it comes from."""
+    unit = options.get(option)
     declared = declared_unit(table, column)
     proposed = f"{declared}f" if quantity is FORCE and declared in units.MASSES else quantity.unit
     hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
@@ -56,8 +64,9 @@ def factor_of(table: Table, column: int, quantity: Quantity, option: str, unit: 
     return factor, f"{unit} (as given)"
 
 
-def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, strain_unit: str | None) -> float:
+def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, options: ReadingOptions) -> float:
     """Return what one unit of a column of strains is as a plain ratio."""
+    strain_unit = options.get("strain_unit")
     column = table.place(choice.deformation)
     try:
         in_file = units.strain_factor(declared)
@@ -78,10 +87,10 @@ def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, strain_u
 
 
 def stress_unit_of(
-    table: Table, choice: ColumnChoice, stress_unit: str | None, largest: float
+    table: Table, choice: ColumnChoice, values: Column, options: ReadingOptions
 ) -> tuple[units.StressUnit, str]:
-    """Return the unit of the stresses, the largest of which is given, and the words for where it comes from."""
-    declared = declared_unit(table, choice.stress)
+    """Return the unit of stresses, and the words for where it comes from."""
+    declared, stress_unit = declared_unit(table, choice.stress), options.get("stress_unit")
     if stress_unit is not None:
         unit = units.stress_unit(stress_unit)
         in_file = _unit_or_none(declared)
@@ -92,7 +101,7 @@ def stress_unit_of(
             )
         return unit, f"{unit.name} (as given)"
     if not declared:
-        _check_assumed_mpa(table, choice, largest)
+        _check_assumed_mpa(table, choice, float(np.abs(values).max()))
         return units.StressUnit("MPa", 1.0), MPA_ASSUMED
     try:
         unit = units.stress_unit(declared)

@@ -92,7 +92,8 @@ def choose_columns(
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
     mappings = mapping_of_each_stress(mode, mapping)
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
-    if not is_of_axes and not all(_has_roles(mode, roles) for roles in mappings[1:]):
+    needed = (LOADS,) if len(mode.controls) == 1 else (LOADS, DEFORMATIONS)
+    if not is_of_axes and not all(roles.keys() & kind for roles in mappings[1:] for kind in needed):
         raise _roles_missing(table, mode)
     axes = mode.machine_axes if is_of_axes else (axis,) * count
     labels = [f"axis {name}" for name in axes] if is_of_axes else list(mode.stresses) if count > 1 else [""]
@@ -174,11 +175,6 @@ def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] |
         numbered = [role for role in roles if f"{role}{number}" in mappings[0]]
         mappings.append({role: mappings[0].pop(f"{role}{number}") for role in numbered})
     return mappings
-
-
-def _has_roles(mode: LoadingMode, mapping: Mapping[str, str | int]) -> bool:
-    """Return whether a mapping holds a stress or force, and a deformation where each stress has one of its own."""
-    return bool(mapping.keys() & LOADS and (len(mode.controls) == 1 or mapping.keys() & DEFORMATIONS))
 
 
 def _choice(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.reading.averages import averaged, scatter_of_neighbours
+from tissuq.experiments.reading.load_cell import averaged, scatter_of_neighbours
 from tissuq.experiments.reading.table import Column
 
 __all__ = ["Event", "find_holds", "find_rupture", "find_slips"]

@@ -30,7 +30,7 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.labels import check_labels, columns_only, labels_of
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.plausibility import check_signs, check_stretches
+from tissuq.experiments.reading.plausibility import check_stretches
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.regions import (
     AUTO,
@@ -46,7 +46,7 @@ from tissuq.experiments.reading.several_specimens import (
     only_rows,
     specimen_of,
 )
-from tissuq.experiments.reading.signs import with_signs
+from tissuq.experiments.reading.signs import check_signs, with_signs
 from tissuq.experiments.reading.spread import Spread
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,

@@ -62,10 +62,10 @@ def without_statements_beside(table: Table) -> Table:
         cells = [split(row, table.separator) for row in table.rows]
         if any(row[gap] for row in cells if len(row) > gap):
             continue
-        beside = [(line, _filled(row[gap + 1 :])) for line, row in zip(table.lines, cells, strict=True)]
-        statements = [(line, row) for line, row in beside if row]
-        if _are_statements([row for _, row in beside]):
-            head = [(line, joined(row, table.separator)) for line, row in statements]
+        beside = [[cell for cell in row[gap + 1 :] if cell] for row in cells]
+        if _are_statements(beside):
+            statements = zip(table.lines, beside, strict=True)
+            head = [(line, joined(statement, table.separator)) for line, statement in statements if statement]
             return replace(
                 table,
                 names=table.names[:gap],
@@ -84,10 +84,6 @@ def _are_statements(rows: Sequence[Sequence[str]]) -> bool:
     stated = [rows[position] for position in filled]
     begin_with_words = all(len(row) > 1 and not NUMBER.fullmatch(row[0]) for row in stated)
     return begin_with_words and any(NUMBER.fullmatch(row[1]) for row in stated)
-
-
-def _filled(cells: Sequence[str]) -> list[str]:
-    return [cell for cell in cells if cell]
 
 
 def without_summary(table: Table) -> Table:

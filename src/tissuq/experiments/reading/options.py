@@ -10,10 +10,10 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
-from tissuq.experiments.units import is_quantity, unit_of
 
 __all__ = ["READING_OPTIONS", "TURNS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
 
@@ -191,7 +191,9 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
         measure = options.get(option)
         if measure is not None and measure not in measures:
             raise InputError(f"{option} must be one of {', '.join(measures)}, not '{measure}'.")
-    if (stretch_range := options.get("stretch_range")) is not None and not _is_range(stretch_range):
+    stretch_range = options.get("stretch_range")
+    ends = np.asarray([0.0, 1.0] if stretch_range is None else stretch_range)
+    if ends.shape != (2,) or not np.isfinite(ends).all() or ends[0] >= ends[1]:
         raise InputError(
             f"stretch_range (--stretch) must be a lowest and a highest stretch such as 1:1.2, not {stretch_range!r}."
         )
@@ -203,7 +205,3 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
     if not isinstance(every, int) or every < 1:
         raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
     return mode
-
-
-def _is_range(pair: Sequence[float]) -> bool:
-    return len(pair) == 2 and bool(np.isfinite(pair).all()) and pair[0] < pair[1]

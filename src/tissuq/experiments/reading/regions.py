@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from tissuq.experiments.modes.mode import STRETCH, Control, LoadingMode
 from tissuq.experiments.reading.cycles import Cycle, find_cycles
 from tissuq.experiments.reading.events import Event, find_holds, find_rupture, find_slips
-from tissuq.experiments.reading.load_cell import find_drift, find_saturation, staircase_of, step_of
+from tissuq.experiments.reading.load_cell import find_drift, find_outliers, find_saturation, staircase_of, step_of
 from tissuq.experiments.reading.measured_rows import COUNTED_FROM, MeasuredRows
-from tissuq.experiments.reading.outliers import find_outliers
 from tissuq.experiments.reading.slack import Slack, find_slack
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import StressUnit

@@ -97,7 +97,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
     for column, labels in sorted(parting, key=lambda pair: len(dimensions_named(table.quantities[pair[0]]))):
         quantity = table.quantities[column]
         is_numbered = not NOT_OF_TESTS.search(quantity) and _jump(labels, course)
-        if not (is_of_specimens(quantity) or _are_words(labels) or is_numbered):
+        if not (is_of_specimens(quantity) or not any(map(NUMBER.fullmatch, labels)) or is_numbered):
             continue
         name, distinct = table.key(column), list(dict.fromkeys(labels))
         fit_all = (
@@ -141,7 +141,8 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
         distinct = list(dict.fromkeys(labels))
         if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
             continue
-        is_of_tests = _begin_anew(labels, distinct, course) and not all(map(_is_cycle, distinct))
+        are_cycles = all(plain(label).rstrip("0123456789 .#") in CYCLE_NAMES for label in distinct)
+        is_of_tests = _begin_anew(labels, distinct, course) and not are_cycles
         if is_of_specimens(quantity) or is_of_tests:
             yield column, labels
 
@@ -163,14 +164,6 @@ def _jump(labels: Sequence[str], course: Column) -> bool:
     """Tell whether the way back between labels was not measured, as it is between cycles of one specimen."""
     last = np.flatnonzero([label != after for label, after in pairwise(labels)])
     return bool((np.abs(course[last] - course[last + 1]) >= RETURN * np.ptp(course)).all())
-
-
-def _is_cycle(label: str) -> bool:
-    return plain(label).rstrip("0123456789 .#") in CYCLE_NAMES
-
-
-def _are_words(labels: Sequence[str]) -> bool:
-    return not any(NUMBER.fullmatch(label) for label in labels)
 
 
 def _listed(texts: Sequence[str]) -> str:

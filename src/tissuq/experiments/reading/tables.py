@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.blocks import blocks_of
+from tissuq.experiments.reading.blocks import blocks_of, joined_in_time
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
 from tissuq.experiments.reading.layout import (
@@ -48,8 +47,6 @@ MOST_COLUMNS = 1000
 """Columns of a table that is read in seconds."""
 CACHED_FILES = 2
 """Files whose tables are remembered: tests of one file are read one after another."""
-TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
-"""Names of a column of times."""
 
 
 def read_table(path: Any, skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None) -> Table:
@@ -221,7 +218,7 @@ def _read_every_line(
     starts = [content[position][0] for position in later_tables(content, layout)]
     bounds = pairwise([0, *starts, len(lines) + 1])
     parts = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
-    tables = _joined([_table_of(file, part, layout.separator, sheet) for part in parts])
+    tables = joined_in_time([_table_of(file, part, layout.separator, sheet) for part in parts])
     lines_with_text = {line for line, _ in filled}
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
@@ -239,8 +236,8 @@ def _without_comments(lines: Lines) -> Lines:
 
 def _lines_of(tables: Sequence[Table], but: Table) -> Lines:
     """Return the lines above and in tables, but for one of them."""
-    others = [table for table in tables if table is not but]
-    return [line for table in others for line in (*table.head, *zip(table.lines, table.rows, strict=True))]
+    remaining = [table for table in tables if table is not but]
+    return [line for table in remaining for line in (*table.head, *zip(table.lines, table.rows, strict=True))]
 
 
 def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
@@ -279,31 +276,6 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
     if layout.names:
         table = with_names_above(table, texts[layout.names - 1])
     return without_summary(with_plain_numbers(table))
-
-
-def _joined(tables: Sequence[Table]) -> list[Table]:
-    """Return tables, those that go on from the one before as one with it."""
-    joined = list(tables[:1])
-    for table in tables[1:]:
-        if _goes_on(joined[-1], table):
-            note = f"{joined[-1].span} and {table.span}, in which time goes on, read as one table."
-            rows, lines = [*joined[-1].rows, *table.rows], [*joined[-1].lines, *table.lines]
-            joined[-1] = replace(joined[-1], rows=rows, lines=lines, notes=(*joined[-1].notes, note))
-        else:
-            joined.append(table)
-    return joined
-
-
-def _goes_on(table: Table, later: Table) -> bool:
-    """Tell whether a table has the names of the one before, and times that go on from there."""
-    if (table.names, table.units) != (later.names, later.units):
-        return False
-    times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
-    ends = table.taken(np.array([0, len(table.rows) - 1]))
-    return bool(times) and all(
-        before[0] < before[-1] <= after[0]
-        for before, after in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
-    )
 
 
 def _no_table(file: str, content: Lines) -> InputError:
