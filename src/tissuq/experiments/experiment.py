@@ -115,9 +115,9 @@ class Experiment:
             if errors.shape != stresses.shape or (errors < 0).any():
                 raise InputError(f"experiment '{name}': give one standard error for every stress, none negative.")
         columns = zip(stresses.reshape(len(stresses), -1).T, errors.reshape(len(stresses), -1).T, strict=True)
-        labels, least = (name, source, unit, specimen), dict(least_errors or {})
+        labels, errors_at_least = (name, source, unit, specimen), dict(least_errors or {})
         curves = tuple(
-            Curve(mode, channel, points, *column, *labels, least, direction, condition)
+            Curve(mode, channel, points, *column, *labels, errors_at_least, direction, condition)
             for channel, column in enumerate(columns)
         )
         object.__setattr__(self, "curves", curves)

@@ -44,14 +44,14 @@ def blocks_of(table: Table, filled: Collection[int]) -> list[Table]:
     if not starts or any(stop - start < FEWEST_ROWS for start, stop in bounds):
         return [table]
     note = "tests are parted where the table begins anew after a blank line; --table chooses one."
-    parts = [table.taken(np.arange(start, stop)) for start, stop in bounds]
-    return [part.noted(note) for part in parts]
+    blocks = [table.taken(np.arange(start, stop)) for start, stop in bounds]
+    return [block.noted(note) for block in blocks]
 
 
 def _is_named(cells: Sequence[Sequence[str]], row: int) -> bool:
     """Tell whether words in a column name what begins at a row, and name something else above it."""
-    above, before, first = cells[row - 2], cells[row - 1], cells[row]
-    return any(a == b != c and c and not NUMBER.fullmatch(c) for a, b, c in zip(above, before, first, strict=True))
+    rows = zip(*cells[row - 2 : row + 1], strict=True)
+    return any(a == b != c and c and not NUMBER.fullmatch(c) for a, b, c in rows)
 
 
 def _numbers(texts: Sequence[Sequence[str]]) -> NDArray[np.float64]:
@@ -89,6 +89,6 @@ def _goes_on(table: Table, later: Table) -> bool:
     times = [column for column, quantity in enumerate(table.quantities) if TIME.search(quantity)]
     ends = table.taken(np.array([0, len(table.rows) - 1]))
     return bool(times) and all(
-        before[0] < before[-1] <= after[0]
-        for before, after in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
+        earlier[0] < earlier[-1] <= continued[0]
+        for earlier, continued in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
     )

@@ -116,16 +116,16 @@ def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> No
     """Refuse to take stresses without a unit as MPa where the file speaks of another one, or by their size."""
     texts = {"the name": table.names[choice.stress], "the row of units": " ".join(table.units)}
     texts |= {f"line {line}": text for line, text in table.head}
-    mentions = ((where, unit) for where, text in texts.items() for unit in units.stress_units_in(text))
-    where, unit = next((mention for mention in mentions if units.stress_unit(mention[1]).to_mpa != 1.0), ("", ""))
+    mentions = ((source, unit) for source, text in texts.items() for unit in units.stress_units_in(text))
+    source, unit = next((mention for mention in mentions if units.stress_unit(mention[1]).to_mpa != 1.0), ("", ""))
     if unit:
-        found, likely = f"but {where} speaks of {unit}", unit
+        reason, likely = f"but {source} speaks of {unit}", unit
     elif largest > LARGEST_ASSUMED_STRESS:
-        found, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
+        reason, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
     else:
         return
     raise InputError(
-        f"{table.place(choice.stress)}: no unit of stress is stated for it, {found}. Give stress_unit={likely!r} "
+        f"{table.place(choice.stress)}: no unit of stress is stated for it, {reason}. Give stress_unit={likely!r} "
         f"(--stress-unit {likely}), or whichever it is."
     )
 

@@ -185,7 +185,7 @@ def _choice(
     axis: str | None,
 ) -> ColumnChoice:
     """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
-    is_shear, told = mode.controls == (SHEAR,), set[int]()
+    is_shear, unnamed = mode.controls == (SHEAR,), set[int]()
     check_roles(table, mapping, is_shear)
     contents = Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
@@ -197,7 +197,7 @@ def _choice(
         load = next((role for role in loads if contents.fitting(role)), "")
         by_unit = None if load else told_by_unit(table, contents, loads)
         load, stress = by_unit or (load, recognise(table, contents, [load or "force"], loads))
-        told |= {stress} if by_unit else set()
+        unnamed |= {stress} if by_unit else set()
         is_per_width = measured_in(table.unit(stress)) == FORCE_PER_WIDTH.name
         load = "force" if load == "stress" and is_per_width else load
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
@@ -218,7 +218,7 @@ def _choice(
         by_unit = None if is_named else told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
-            told |= {deformation} if contents.quantities[deformation] not in OPEN_WITHOUT_UNIT else set()
+            unnamed |= {deformation} if contents.quantities[deformation] not in OPEN_WITHOUT_UNIT else set()
         else:
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
@@ -239,7 +239,7 @@ def _choice(
             f"give two columns. {columns_there_are(table)}"
         )
     check_test(table, stress, mapping, is_shear)
-    return with_types(table, ColumnChoice(deformation, stress, measure, load, by_unit=frozenset(told)), contents)
+    return with_types(table, ColumnChoice(deformation, stress, measure, load, by_unit=frozenset(unnamed)), contents)
 
 
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:

@@ -113,8 +113,8 @@ def _of_pandas(frame: Any) -> Iterator[DataColumn]:
     if any(name is not None and name not in frame.columns for name in frame.index.names):
         frame = frame.reset_index()
     for number, name in enumerate(frame.columns):
-        parts = [str(part) for part in (name if isinstance(name, tuple) else (name,))]
-        heading = " ".join(part for part in parts if part and not part.startswith(NO_NAME))
+        levels = [str(level) for level in (name if isinstance(name, tuple) else (name,))]
+        heading = " ".join(level for level in levels if level and not level.startswith(NO_NAME))
         column = frame.iloc[:, number]
         if hasattr(column.dtype, "units"):  # of pint-pandas
             yield _of_array(heading, column.array.quantity)

@@ -185,12 +185,12 @@ def _from_rate(table: Table, choice: ColumnChoice, values: Column) -> tuple[Colu
             f"{len(times)} columns are times. Add a column of shear to the file (--column shear=NAME)."
         )
     rate, rate_source = factor_of(table, choice.deformation, RATE, "strain_unit", {})
-    second, _ = factor_of(table, times[0], TIME, "strain_unit", {})
+    seconds, _ = factor_of(table, times[0], TIME, "strain_unit", {})
     (time,) = table.numbers(times)
     if (np.diff(time) < 0).any():
         row = int(np.argmax(np.diff(time) < 0)) + 1
         raise InputError(f"{table.place(times[0], row)}: the time goes back, so that no shear follows from its rate.")
-    shear = cumulative_trapezoid(values * rate, time * second, initial=0.0)
+    shear = cumulative_trapezoid(values * rate, time * seconds, initial=0.0)
     label, over = table.label(choice.deformation), table.label(times[0])
     return shear, f"amount of shear = integral of column {label} in {rate_source} over {over}, 0 in the first row"
 
@@ -245,10 +245,10 @@ def _from_diameter(
     return stretch, f"hoop stretch in the middle of the wall = sqrt(1 + (d^2/4 - {letter}^2)/(A B)): {side}, {words}"
 
 
-def _zero(text: str, first: float, quantity: Quantity) -> tuple[float, str]:
+def _zero(text: str, first_value: float, quantity: Quantity) -> tuple[float, str]:
     """Return the position from which displacements, or the angle from which twists are counted, and words for it."""
     if text == FIRST_ROW:
-        return first, f", counted from {first:g} {quantity.unit} (its first row)"
+        return first_value, f", counted from {first_value:g} {quantity.unit} (its first row)"
     number, unit = number_and_unit(text)
     if number is None or not unit:
         raise InputError(

@@ -60,7 +60,7 @@ class Dimensions:
     sizes: Mapping[str, Dimension]
     set_by_user: frozenset[str]
     ambiguous: Mapping[str, str]
-    others: tuple[StatedSize, ...] = ()
+    further_sizes: tuple[StatedSize, ...] = ()
     contradictions: tuple[str, ...] = ()
     divide_forces: bool = False
     averages: tuple[str, ...] = ()
@@ -85,7 +85,7 @@ class Dimensions:
             * (self.divide_forces and not sections_of(self.sizes)),
         )
 
-    def distance(self, first: float) -> Dimension:
+    def distance(self, first_distance: float) -> Dimension:
         """Return the undeformed distance of marks in pixels: the one that is given, or else the first of the test.
 
         Raises
@@ -94,11 +94,11 @@ class Dimensions:
             When a length is given that is not in pixels.
         """
         if "length" not in self.set_by_user:
-            return Dimension(first, "in its first row", PIXELS.unit)
+            return Dimension(first_distance, "in its first row", PIXELS.unit)
         if self.sizes["length"].unit != PIXELS.unit:
             raise InputError(
                 f"{self.file}: distances are in pixels, and so must be the undeformed one: give it as "
-                f'--length "{first:.4g} px", or leave it out where the test begins undeformed.'
+                f'--length "{first_distance:.4g} px", or leave it out where the test begins undeformed.'
             )
         return self.sizes["length"]
 
@@ -133,8 +133,8 @@ class Dimensions:
             'dimensions={"diameter": "3 mm", "thickness": "0.5 mm"}).'
         )
         diameter, thickness = self._size("diameter", advice), self._size("thickness", advice)
-        if others := sorted(self.set_by_user - {"diameter", "thickness"}):
-            raise InputError(f"{self.file} is read as pressure and diameter of a tube, which need no {others[0]}.")
+        if unneeded := sorted(self.set_by_user - {"diameter", "thickness"}):
+            raise InputError(f"{self.file} is read as pressure and diameter of a tube, which need no {unneeded[0]}.")
         if thickness.value >= diameter.value / 2:
             raise InputError(
                 f"{self.file}: a wall of {thickness.value:g} mm (thickness {thickness.source}) does not fit into an "
@@ -180,9 +180,9 @@ class Dimensions:
         InputError
             When it is not known, or sizes are given that a force per width does not need.
         """
-        if others := sorted(self.set_by_user & {"area", "width", "diameter"}):
+        if unneeded := sorted(self.set_by_user & {"area", "width", "diameter"}):
             raise InputError(
-                f"{self.file} holds a force per width, which over the thickness is a stress: leave {others[0]} out, "
+                f"{self.file} holds a force per width, which over the thickness is a stress: leave {unneeded[0]} out, "
                 'and give the undeformed thickness (--thickness "2 mm").'
             )
         return self._size(
@@ -214,22 +214,22 @@ class Dimensions:
     def _partly_known(self) -> str:
         sides = [name for name in ("width", "thickness") if name in self.sizes]
         if sides:
-            other = "thickness" if sides[0] == "width" else "width"
-            return f"Known is only the {sides[0]}. {self._others(LENGTH, other, default='')}".rstrip()
+            missing_side = "thickness" if sides[0] == "width" else "width"
+            return f"Known is only the {sides[0]}. {self._others(LENGTH, missing_side, default='')}".rstrip()
         areas = self._others(AREA, "area", default="")
         return areas or self._others(LENGTH, "width", "thickness", "diameter")
 
     def _others(self, kind: Quantity, *names: str, default: str = "None is recognised in the file.") -> str:
         """Return what other sizes the file states, and the options that say what they are."""
-        sizes = [size for size in self.others if size.kind is kind][:SHOWN]
+        sizes = [size for size in self.further_sizes if size.kind is kind][:SHOWN]
         if not sizes:
             return default
         said = ", ".join(f"{size.source} '{size.text}'" for size in sizes)
-        which = "that" if len(sizes) == 1 else "one of these"
+        reference = "that" if len(sizes) == 1 else "one of these"
         number = f"{sizes[0].value:g}" if len(sizes) == 1 else "NUMBER"
         options = " or ".join(f'--{name} "{number} {kind.unit}"' for name in names)
         each_alone = EACH_ALONE * self.is_one_of_several
-        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}.{each_alone}"
+        return f"The file says {said}: if {reference} is the {' or '.join(names)}, give {options}.{each_alone}"
 
 
 def agree(size: Dimension, alternative: Dimension) -> bool:

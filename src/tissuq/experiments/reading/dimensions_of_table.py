@@ -53,10 +53,10 @@ def dimensions_of(
         raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
     every_size = stated_sizes(table, specimens, test)
     is_cylinder = "diameter" in texts or any(size.is_of("diameter", is_cylinder=False) for size in every_size)
-    stated, ambiguous, others, averages = dict[str, Dimension](), dict[str, str](), every_size, list[str]()
+    stated, ambiguous, unnamed, averages = dict[str, Dimension](), dict[str, str](), every_size, list[str]()
     for name in DIMENSION_NAMES:
         of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
-        others = [size for size in others if size not in of_name]
+        unnamed = [size for size in unnamed if size not in of_name]
         sizes = [Dimension(*statement) for statement in _statements_of_size(of_name)]
         means = [size for size in sizes if size.source.startswith(MEAN_OF) and name not in texts]
         averages += [f"the {name} is the {mean.source}: {mean.value:.4g} {quantity_of(name).unit}." for mean in means]
@@ -70,7 +70,7 @@ def dimensions_of(
         stated | of_user,
         frozenset(texts),
         ambiguous,
-        tuple(others),
+        tuple(unnamed),
         averages=tuple(averages),
         is_one_of_several=test is not None,
     )
@@ -182,6 +182,6 @@ def _statements_of_size(sizes: Sequence[StatedSize]) -> list[tuple[float, str]]:
     mean = sum(values) / max(1, len(values))
     if len(values) < 2 or max(values) - min(values) >= NOTABLE_SCATTER * mean:
         return [*once, *((size.value, size.source) for size in by_number.values())]
-    places = ", ".join(dict.fromkeys(size.source.removeprefix("in ") for size in by_number.values()))
+    sources = ", ".join(dict.fromkeys(size.source.removeprefix("in ") for size in by_number.values()))
     listed = ", ".join(f"{value:g}" for value in values)
-    return [*once, (mean, f"{MEAN_OF} {len(values)} measurements ({listed}, in {places})")]
+    return [*once, (mean, f"{MEAN_OF} {len(values)} measurements ({listed}, in {sources})")]

@@ -341,9 +341,9 @@ def read_rows(
         )
         if mode.controls != (SHEAR,) or stress_measure.name != "cauchy":
             used = used.with_step(stress_measure.step)
-    if (every := options.get("every", 1)) > 1:
-        rows = np.arange(0, len(used), every)
-        used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
+    if (step := options.get("every", 1)) > 1:
+        rows = np.arange(0, len(used), step)
+        used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
     check_signs(used, choices, bool(is_positive), options.get("turn"))
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)

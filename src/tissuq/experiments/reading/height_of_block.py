@@ -63,7 +63,7 @@ def of_block(
     how = _how(table, choice, numbers, words)
     if not how or "diameter" in dimensions.sizes or "length" in dimensions.ambiguous:
         return dimensions
-    heights = [size for size in dimensions.others if dimensions_named(size.name, is_cylinder=True) == {"length"}]
+    heights = [size for size in dimensions.further_sizes if dimensions_named(size.name, is_cylinder=True) == {"length"}]
     if len({size.value for size in heights}) == 1:
         return _with_height(dimensions, Dimension(heights[0].value, heights[0].source), how)
     sides = {name: dimensions.sizes[name] for name in SIDES if name in dimensions.sizes}
@@ -109,8 +109,12 @@ def _with_height(dimensions: Dimensions, height: Dimension, how: str) -> Dimensi
         )
         return replace(dimensions, open_height=text)
     note = f"the height, {height.value:g} mm {height.source}, was taken for the length, which it is in {how}."
-    others = tuple(size for size in dimensions.others if size.value != height.value or size.source != height.source)
-    return replace(dimensions, sizes=sizes | {"length": height}, others=others, averages=(*dimensions.averages, note))
+    unnamed = tuple(
+        size for size in dimensions.further_sizes if size.value != height.value or size.source != height.source
+    )
+    return replace(
+        dimensions, sizes=sizes | {"length": height}, further_sizes=unnamed, averages=(*dimensions.averages, note)
+    )
 
 
 def _how(table: Table, choice: ColumnChoice, numbers: tuple[Column, Column], words: Sequence[str]) -> str:

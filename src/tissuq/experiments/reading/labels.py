@@ -67,9 +67,9 @@ def check_labels(table: Table, experiment: Experiment, only: Mapping[str, str | 
         With what it is, as far as anything says so.
     """
     for name in set(only or {}) - columns_only(table, only).keys():
-        wanted, found = str((only or {})[name]), getattr(experiment, name.lower())
-        if found.lower() != wanted.strip().lower():
-            is_what = f"is '{found}'" if found else "is not said by a column or a name"
+        wanted, stated_label = str((only or {})[name]), getattr(experiment, name.lower())
+        if stated_label.lower() != wanted.strip().lower():
+            is_what = f"is '{stated_label}'" if stated_label else "is not said by a column or a name"
             raise InputError(f"{table.file}: the {name.lower()} of the test {is_what}, not '{wanted}'. Leave it out.")
 
 
@@ -84,7 +84,7 @@ def _in_names(names: Sequence[str], pattern: str) -> str:
     """Return the word in the last name that says a label; nothing where one says two."""
     for name in reversed(names):
         words = re.sub(r"[\s_-]+", " ", NEXT_WORD.sub(" ", name)).lower()
-        found = {match[0] for match in re.finditer(rf"(?<!\w)(?:{pattern})(?!\w)", words)}
-        if found:
-            return found.pop() if len(found) == 1 else ""
+        labels = {match[0] for match in re.finditer(rf"(?<!\w)(?:{pattern})(?!\w)", words)}
+        if labels:
+            return labels.pop() if len(labels) == 1 else ""
     return ""

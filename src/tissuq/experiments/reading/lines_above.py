@@ -28,13 +28,13 @@ def number_before(names: Sequence[str]) -> str:
     return names[0] if names and NUMBER.fullmatch(names[0]) else ""
 
 
-def title_of(above: Sequence[str], separator: str) -> str:
+def title_of(lines_above: Sequence[str], separator: str) -> str:
     """Return what the lines above the names call the table; an empty text where they do not.
 
     That is the specimen that they state, or else what stands alone in the last of them that states no size; sizes may
     stand beneath it.
     """
-    lines = [[cell for cell in split(line, separator) if cell] for line in above]
+    lines = [[cell for cell in split(line, separator) if cell] for line in lines_above]
     if separator == WHITESPACE:
         lines = [[" ".join(cells)] for cells in lines]
     last = lines[-1] if lines else []
@@ -57,13 +57,13 @@ def _statement(cells: Sequence[str]) -> tuple[str, str] | None:
     return (name, " ".join(filter(None, values))) if any(values) and not NUMBER.fullmatch(name) else None
 
 
-def with_names_above(table: Table, above: str) -> Table:
+def with_names_above(table: Table, line: str) -> Table:
     """Return the table with the names of quantities in the line above its names, which are then those of specimens.
 
     Only where that line names quantities alone, the names do not, and one of them is over several columns. Names of
     means and of spreads are added to that of the quantity.
     """
-    quantities = split(above, table.separator)
+    quantities = split(line, table.separator)
     if not all(is_of_role(name) for name in quantities if name) or len(quantities) > len(table.names):
         return table
     over = filled_on(padded(quantities, len(table.names)))
@@ -100,8 +100,8 @@ def names_above(table: Table, columns: Sequence[int]) -> list[str]:
             continue
         if any(map(_states_size, cells)):
             continue
-        above = filled_on(cells + [""] * (len(names) - len(cells)))
-        over = [above[column] for column in columns]
+        names_over = filled_on(cells + [""] * (len(names) - len(cells)))
+        over = [names_over[column] for column in columns]
         if all(over) and len({plain(name) for name in over}) == len(over):
             return over
     return []

@@ -42,10 +42,10 @@ LARGEST_SHARE, SINGLE_ROWS = 0.02, 3
 """Share of the rows, and number of them, up to which they are single ones, and not how these rows scatter."""
 
 
-def averaged(most: int, *columns: Column) -> tuple[NDArray[np.intp], list[Column]]:
+def averaged(most_points: int, *columns: Column) -> tuple[NDArray[np.intp], list[Column]]:
     """Return the rows at which the points begin and the last one ends, and each column averaged to so many at most."""
     count = len(columns[0])
-    ends = np.linspace(0, count, min(count, most) + 1).astype(np.intp)
+    ends = np.linspace(0, count, min(count, most_points) + 1).astype(np.intp)
     return ends, [np.add.reduceat(values, ends[:-1]) / np.diff(ends) for values in columns]
 
 
@@ -65,12 +65,12 @@ def find_outliers(values: Column) -> NDArray[np.intp]:
     span = float(np.ptp(values))
     if len(values) < ROWS_OF_OUTLIER or not span:
         return np.array([], dtype=np.intp)
-    before, after = 2 * values[1:-3] - values[:-4], 2 * values[3:-1] - values[4:]
+    extrapolated_forward, extrapolated_back = 2 * values[1:-3] - values[:-4], 2 * values[3:-1] - values[4:]
     between = (values[1:-3] + values[3:-1]) / 2
-    away = values[2:-2] - np.stack([before, after, between])
+    away = values[2:-2] - np.stack([extrapolated_forward, extrapolated_back, between])
     is_off = np.abs(np.sign(away).sum(axis=0)) == len(away)
-    least = max(LEAST_JUMP * span, STEPS * (step_of(values) or 0.0))
-    threshold = np.maximum(SCATTERS * _scatter(np.abs(away[2])), least)
+    least_jump = max(LEAST_JUMP * span, STEPS * (step_of(values) or 0.0))
+    threshold = np.maximum(SCATTERS * _scatter(np.abs(away[2])), least_jump)
     rows = np.flatnonzero(is_off & (np.abs(away).min(axis=0) > threshold)) + 2
     return rows if len(rows) <= max(SINGLE_ROWS, LARGEST_SHARE * len(values)) else rows[:0]
 
@@ -87,11 +87,11 @@ def find_saturation(load: Column) -> NDArray[np.intp]:
     """Return the rows at exactly the largest load where they are many: it was the most that the load cell reads."""
     size = np.abs(load)
     values, counts = np.unique(size, return_counts=True)
-    others = counts[:-1][values[:-1] > 0.5 * values[-1]]
+    lower_counts = counts[:-1][values[:-1] > 0.5 * values[-1]]
     is_saturated = (
         len(values) >= FEWEST_LEVELS
         and counts[-1] >= SATURATED_ROWS
-        and counts[-1] > TIMES_OTHERS * others.max(initial=1)
+        and counts[-1] > TIMES_OTHERS * lower_counts.max(initial=1)
     )
     return np.flatnonzero(size == values[-1]) if is_saturated else np.array([], dtype=np.intp)
 
@@ -137,5 +137,5 @@ def find_drift(course: Column, load: Column) -> tuple[float, float] | None:
     slope = abs(float(np.polyfit(way[rows], load[rows], 1)[0])) if len(np.unique(way[rows])) > 1 else 0.0
     error = scatter_of_neighbours(load) * np.hypot(len(begin) ** -0.5, len(end) ** -0.5)
     allowed = max(DRIFT * largest, DRIFT_SCATTERS * error) + slope * abs(way[begin].mean() - way[end].mean())
-    first, last = float(load[begin].mean()), float(load[end].mean())
-    return (first, last) if abs(last - first) > allowed else None
+    load_at_begin, load_at_end = float(load[begin].mean()), float(load[end].mean())
+    return (load_at_begin, load_at_end) if abs(load_at_end - load_at_begin) > allowed else None

@@ -106,12 +106,12 @@ def without_summary(table: Table) -> Table:
         return _without_statistics(table)
     if start < max(FEWEST_MEASUREMENTS, len(table.rows) - start):
         return table
-    above, beneath, of_numbers = _parted(table, start)
-    names = [_statistic(row, above, of_numbers) for row in beneath]
+    numbers, beneath, of_numbers = _parted(table, start)
+    names = [_statistic(row, numbers, of_numbers) for row in beneath]
     has_word = [_has_word(row, of_numbers) for row in beneath]
     if all(name or (is_apart and word) for name, word in zip(names, has_word, strict=True)):
         return _without_rows(table, start, names)
-    if not _jumps(above, beneath, of_numbers):
+    if not _jumps(numbers, beneath, of_numbers):
         return table
     raise InputError(
         f"{table.file}, {_place(table, start)}: set apart at the end of the table, and not going on from "
@@ -121,13 +121,13 @@ def without_summary(table: Table) -> Table:
 
 def _without_statistics(table: Table) -> Table:
     """Return the table without last rows that are statistics of those above, unless a last measurement may be one."""
-    first = max(FEWEST_MEASUREMENTS, len(table.rows) - MOST_ROWS)
+    earliest = max(FEWEST_MEASUREMENTS, len(table.rows) - MOST_ROWS)
     end = table.taken(np.arange(max(0, len(table.rows) - 3 * MOST_ROWS), len(table.rows)))
-    if first >= len(table.rows) or not _jumps(*_parted(end, len(end.rows) - (len(table.rows) - first))):
+    if earliest >= len(table.rows) or not _jumps(*_parted(end, len(end.rows) - (len(table.rows) - earliest))):
         return table
-    for start in range(first, len(table.rows)):
-        above, beneath, of_numbers = _parted(table, start)
-        names = [_statistic(row, above, of_numbers) for row in beneath]
+    for start in range(earliest, len(table.rows)):
+        numbers, beneath, of_numbers = _parted(table, start)
+        names = [_statistic(row, numbers, of_numbers) for row in beneath]
         if all(names) and not OF_ONE_ROW.issuperset(names):
             return _without_rows(table, start, names)
     return table
@@ -143,53 +143,56 @@ def _without_rows(table: Table, start: int, statistics: Sequence[str]) -> Table:
 
 def _place(table: Table, start: int) -> str:
     """Return the lines from a row to the last, in words."""
-    first, last = table.lines[start], table.lines[-1]
-    return f"{table.counted} {first}" if first == last else f"{table.counted}s {first} to {last}"
+    top, bottom = table.lines[start], table.lines[-1]
+    return f"{table.counted} {top}" if top == bottom else f"{table.counted}s {top} to {bottom}"
 
 
 def _parted(table: Table, start: int) -> tuple[NDArray[np.float64], list[tuple[str, ...]], NDArray[np.bool_]]:
     """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
     cells = table.cells()
-    above = np.array([[number_in(cell) for cell in row] for row in cells[:start]])
-    return above, cells[start:], np.isfinite(above).all(axis=0)
+    numbers = np.array([[number_in(cell) for cell in row] for row in cells[:start]])
+    return numbers, cells[start:], np.isfinite(numbers).all(axis=0)
 
 
 def _start_beneath_gap(lines: Sequence[int]) -> int | None:
     """Return the row beneath the only place where lines are blank, within the last rows of a table."""
     if lines[-1] - lines[0] == len(lines) - 1:
         return None
-    first = int(np.flatnonzero(np.diff(lines) > 1)[0]) + 1
-    return first if len(lines) - first <= MOST_ROWS else None
+    row = int(np.flatnonzero(np.diff(lines) > 1)[0]) + 1
+    return row if len(lines) - row <= MOST_ROWS else None
 
 
 def _start_of_labels(table: Table) -> int | None:
     """Return the first of the last rows that have a word in a cell where the row before them has a number."""
     last = table.taken(np.arange(max(0, len(table.rows) - MOST_ROWS - 1), len(table.rows))).cells()
-    for count, (row, above) in enumerate(pairwise(reversed(last)), start=1):
+    for count, (row, row_above) in enumerate(pairwise(reversed(last)), start=1):
         words = [_is_word(cell) for cell in row]
         if not any(words):
             break
-        if any(word and NUMBER.fullmatch(cell) for word, cell in zip(words, above, strict=False)):
+        if any(word and NUMBER.fullmatch(cell) for word, cell in zip(words, row_above, strict=False)):
             return len(table.rows) - count
     return None
 
 
-def _statistic(row: Sequence[str], above: NDArray[np.float64], of_numbers: NDArray[np.bool_]) -> str:
+def _statistic(row: Sequence[str], numbers: NDArray[np.float64], of_numbers: NDArray[np.bool_]) -> str:
     """Return which statistic all numbers of a row are, to their last digit; an empty text if none."""
     columns = [column for column in np.flatnonzero(of_numbers).tolist() if NUMBER.fullmatch(row[column])]
     if len(columns) < 2 and not (columns and _has_word(row, of_numbers)):
         return ""
     for name, statistic in STATISTICS.items():
-        if all(abs(number_in(row[k]) - statistic(above[:, k])) <= _rounding(row[k]) for k in columns):
+        if all(abs(number_in(row[k]) - statistic(numbers[:, k])) <= _rounding(row[k]) for k in columns):
             return name
     return ""
 
 
-def _jumps(above: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_numbers: NDArray[np.bool_]) -> bool:
+def _jumps(numbers: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_numbers: NDArray[np.bool_]) -> bool:
     """Tell whether rows do not go on from the ones above as those do among themselves."""
     values = np.array([[number_in(cell) for cell in row] for row in beneath])
-    above, steps = above[:, of_numbers], np.abs(np.diff(np.vstack([above[-1:], values])[:, of_numbers], axis=0))
-    allowed = JUMP * np.abs(np.diff(above, axis=0)).max(axis=0) + JUMP_OF_RANGE * np.ptp(above, axis=0)
+    numbers, steps = (
+        numbers[:, of_numbers],
+        np.abs(np.diff(np.vstack([numbers[-1:], values])[:, of_numbers], axis=0)),
+    )
+    allowed = JUMP * np.abs(np.diff(numbers, axis=0)).max(axis=0) + JUMP_OF_RANGE * np.ptp(numbers, axis=0)
     return bool((np.nan_to_num(steps) > allowed).any())
 
 

@@ -117,12 +117,12 @@ def check_positions(table: Table, choice: ColumnChoice, displacement: Column, lo
     nearest = int(np.argmin(np.abs(displacement)))
     if abs(displacement[nearest]) <= OFFSET * span and size[nearest] <= LITTLE_LOAD:
         return False
-    first, ends = float(displacement[0]), np.array([displacement.min(), displacement.max()]) / length
+    start, ends = float(displacement[0]), np.array([displacement.min(), displacement.max()]) / length
     from_first, from_zero, of_length = (
-        f"(stretch {low:.4g} to {high:.4g})" for low, high in (ends + 1 - first / length, ends + 1, ends)
+        f"(stretch {low:.4g} to {high:.4g})" for low, high in (ends + 1 - start / length, ends + 1, ends)
     )
     raise InputError(
-        f"{table.place(choice.deformation, 0)}: begins at {first:g} mm with {size[0]:.0%} of the largest load, so that "
+        f"{table.place(choice.deformation, 0)}: begins at {start:g} mm with {size[0]:.0%} of the largest load, so that "
         f"nothing shows where the specimen is undeformed. If it is there, give --zero first {from_first}; if at 0, "
         f"--zero '0 mm' {from_zero}; if it is undeformed at first, and the load cell reads that without load, "
         "--load-zero first; if the column holds the length or height of the specimen, --column "

@@ -170,7 +170,10 @@ def recognise(
         hint = by_role or _of_other_quantities(table, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
         of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
-        of_roles = ((of_units.get(kind, kind), of) for kind, of in _by_unit(table, table.quantities).items())
+        of_roles = (
+            (of_units.get(kind, kind), columns_of_role)
+            for kind, columns_of_role in _by_unit(table, table.quantities).items()
+        )
         by_unit = {role: columns for role, columns in of_roles if role in roles}
         likely = [table.label(column) for columns in by_unit.values() for column in columns]
         several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""
@@ -248,5 +251,5 @@ def _how_to_say(table: Table, roles: Sequence[str]) -> str:
         return (
             'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
         )
-    others = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
-    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{others}.'
+    more = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
+    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{more}.'

@@ -162,7 +162,7 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
 
 def _jump(labels: Sequence[str], course: Column) -> bool:
     """Tell whether the way back between labels was not measured, as it is between cycles of one specimen."""
-    last = np.flatnonzero([label != after for label, after in pairwise(labels)])
+    last = np.flatnonzero([label != next_label for label, next_label in pairwise(labels)])
     return bool((np.abs(course[last] - course[last + 1]) >= RETURN * np.ptp(course)).all())
 
 

@@ -117,8 +117,8 @@ def _parts(quantity: str) -> Iterator[tuple[str, str]]:
     yield quantity, ""
     words = [word.strip(".:,()#") for word in quantity.split()]
     for count in range(1, len(words)):
-        first, last = " ".join(words[:count]), " ".join(words[count:])
-        for name, test in ((first, last), (last, first)):
+        head, tail = " ".join(words[:count]), " ".join(words[count:])
+        for name, test in ((head, tail), (tail, head)):
             if _is_test(test):
                 yield name, test
 

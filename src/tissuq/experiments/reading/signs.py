@@ -212,16 +212,16 @@ def _check_signs(
             )
         if advice:
             raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {advice}")
-        other = "; if the column of stretches holds strain, give it as strain"
+        alternative = "; if the column of stretches holds strain, give it as strain"
         if choice.measure in ("strain", "displacement"):
-            other = (
+            alternative = (
                 f"; if this is tension, in which the {choice.measure} falls, give compression_positive=False "
                 "(--tension-positive)"
             )
         raise InputError(
             f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
             "counts compression as positive, give compression_positive=True (--compression-positive)"
-            f"{other}."
+            f"{alternative}."
         )
     row = _wrong_sign(stretch, stress, stretch > 1)
     if row is not None:

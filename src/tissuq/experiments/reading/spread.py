@@ -67,20 +67,20 @@ def spread_of(
     InputError
         When a column that is given cannot be used.
     """
-    given = next((kind for kind in SPREADS if kind in mapping), None)
+    wanted = next((kind for kind in SPREADS if kind in mapping), None)
     if choice.stress_type == "torsion" or choice.load == "pressure":
         of_load = "the pressure in a tube" if choice.load == "pressure" else "the torque of a disc"
-        if given or mean_of is not None:
-            option = f"--column {given}={mapping[given]}" if given else f"mean_of={mean_of} (--mean-of)"
+        if wanted or mean_of is not None:
+            option = f"--column {wanted}={mapping[wanted]}" if wanted else f"mean_of={mean_of} (--mean-of)"
             raise InputError(f"{table.file}: {option} is for stresses or forces, not for {of_load}. Leave it out.")
         spread = _recognised(table, choice)
         if spread.column is None:
             return spread
         unused = f"column {table.label(spread.column)} is not used: standard deviations and standard errors"
         return replace(spread, problem=f"{unused} are taken of stresses or forces, not of {of_load}.")
-    if given:
-        column = find_column(table, given, mapping[given])
-        return _with_errors(table, choice, Spread(column, given), mapping, load, mean_of)
+    if wanted:
+        column = find_column(table, wanted, mapping[wanted])
+        return _with_errors(table, choice, Spread(column, wanted), mapping, load, mean_of)
     spread = _recognised(table, choice)
     if spread.column is None and mean_of is not None:
         raise InputError(
@@ -104,7 +104,7 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
     of_stress = quantities[choice.stress]
     if any(map(is_of_mean, quantities)) and not is_of_mean(of_stress):
         return Spread()
-    found: dict[str, list[int]] = {}
+    by_kind: dict[str, list[int]] = {}
     for column in range(len(table.names)):
         kind, of_what = of_spread(quantities[column])
         is_of_load = measured_in(table.unit(column)) in ("", choice.load) and of_what in (
@@ -113,9 +113,9 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
             *role_names(choice.load),
         )
         if kind and is_of_load and not table.is_constant(column):
-            found.setdefault(kind, []).append(column)
+            by_kind.setdefault(kind, []).append(column)
     for kind in (*SPREADS, ""):
-        columns = found.get(kind or "open", [])
+        columns = by_kind.get(kind or "open", [])
         following = [column for column in columns if column > choice.stress]
         if columns:
             column = min(following or columns)

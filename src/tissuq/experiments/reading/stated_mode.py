@@ -104,8 +104,8 @@ def mode_of(
     (str or LoadingMode, str)
         The mode, and where it comes from.
     """
-    if (chosen := options.get("mode")) is not None:
-        return chosen, GIVEN
+    if (wanted := options.get("mode")) is not None:
+        return wanted, GIVEN
     mode, source = find_mode(file, [table.sheet, table.title, *words])
     columns = options.get("columns") or {}
     if not mode and columns.keys() & {*SHEARS, "torque"}:

@@ -221,8 +221,8 @@ class Table:
             [
                 len(row) < len(columns)
                 and all(map(NUMBER.fullmatch, row))
-                and OVERFLOW.isdisjoint(map(str.lower, every))
-                for row, every in zip(filled, cells, strict=True)
+                and OVERFLOW.isdisjoint(map(str.lower, cells_of_row))
+                for row, cells_of_row in zip(filled, cells, strict=True)
             ]
         )
         table = self._without(is_missing, f"without values of {' and '.join(map(self.label, columns))} left out,")
@@ -235,9 +235,9 @@ class Table:
         """Return the table without some rows, unless these are none or all, with a note of why."""
         if not is_left_out.any() or is_left_out.all():
             return self
-        count, first = np.count_nonzero(is_left_out), self.lines[int(np.argmax(is_left_out))]
-        what, where = ("1 row", "") if count == 1 else (f"{count} rows", "the first ")
-        note = f"{what} {text} {where}in {self.counted} {first}."
+        count, first_line = np.count_nonzero(is_left_out), self.lines[int(np.argmax(is_left_out))]
+        what, article = ("1 row", "") if count == 1 else (f"{count} rows", "the first ")
+        note = f"{what} {text} {article}in {self.counted} {first_line}."
         return self.taken(np.flatnonzero(~is_left_out)).noted(note)
 
     def _how_to_leave_out(self, columns: Sequence[int]) -> str:
@@ -324,15 +324,15 @@ def rows_in(lines: str, numbers: Sequence[int], file: str) -> NDArray[np.bool_]:
     """
     of_rows = np.array(numbers)
     is_in = np.zeros(len(of_rows), dtype=bool)
-    for part in str(lines).split(","):
-        ends = part.split(":")
+    for span in str(lines).split(","):
+        ends = span.split(":")
         if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
             raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
-        found = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
-        if not found.any():
+        is_in_span = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
+        if not is_in_span.any():
             raise InputError(
-                f"{file}: there is no row to leave out in line {part.strip()}; rows are in lines {of_rows.min()} to "
+                f"{file}: there is no row to leave out in line {span.strip()}; rows are in lines {of_rows.min()} to "
                 f"{of_rows.max()}."
             )
-        is_in |= found
+        is_in |= is_in_span
     return is_in

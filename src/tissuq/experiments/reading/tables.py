@@ -121,7 +121,7 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
         every_sheet = workbook.sheets(path)
         short = {name: list(enumerate(lines, 1)) for name, lines in every_sheet.items() if len(lines) <= SHORT}
         sheets = sheets_with_tables(path, every_sheet, sheet)
-        parts = [
+        tables_of_sheets = [
             _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, SEPARATOR_OF_CELLS, name)
             for name, lines in sheets.items()
         ]
@@ -129,7 +129,7 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
             replace(
                 table, other_lines={**table.other_lines, **{name: short[name] for name in short if name != table.sheet}}
             )
-            for tables in parts
+            for tables in tables_of_sheets
             for table in tables
         )
     if sheet is not None:
@@ -152,8 +152,8 @@ def _of_data_frame(data: Any) -> Table:
         lines=range(len(rows)),
         counted="row",
     )
-    if is_units_row(first := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
-        table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first))
+    if is_units_row(first_row := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
+        table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first_row))
     if len(rows) >= LONG_FILE and (block := _block(columns)) is not None:
         return replace(table, block=block)
     return without_summary(table)
@@ -176,10 +176,10 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
     if len(lines) < LONG_FILE:
         return None
     try:
-        head, *others = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
+        head, *later_tables = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
     except InputError:
         return None
-    if others:
+    if later_tables:
         return None
     rows = lines[head.lines[0] - 1 :]
     while rows and not rows[-1].strip():
@@ -217,8 +217,8 @@ def _read_every_line(
         raise _no_table(file, content)
     starts = [content[position][0] for position in later_tables(content, layout)]
     bounds = pairwise([0, *starts, len(lines) + 1])
-    parts = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
-    tables = joined_in_time([_table_of(file, part, layout.separator, sheet) for part in parts])
+    spans = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
+    tables = joined_in_time([_table_of(file, span, layout.separator, sheet) for span in spans])
     lines_with_text = {line for line, _ in filled}
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:

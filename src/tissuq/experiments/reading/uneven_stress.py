@@ -118,9 +118,9 @@ class Tube:
         if mean @ middle <= 0:
             raise InputError("the tube is not wider where the pressure is larger: check which columns are read.")
         shape, weights = (2 + through) / (1 + through) ** 2, WEIGHTS / 2
-        known = weights * through * shape
-        some = slice(None, None, 1 + len(mean) // MOST_ROWS)
-        coefficients = _log_coefficients(mean[some] / size, known[some], through[some] / largest)
+        shape_in_wall = weights * through * shape
+        thinned = slice(None, None, 1 + len(mean) // MOST_ROWS)
+        coefficients = _log_coefficients(mean[thinned] / size, shape_in_wall[thinned], through[thinned] / largest)
 
         def curve(x: FloatArray) -> FloatArray:
             """Return the stress of the curve over x, which has a value at 0."""
@@ -156,17 +156,17 @@ def rim_stress(shear: FloatArray, apparent: FloatArray) -> FloatArray:
     ----------
     Nadai (1950), Theory of Flow and Fracture of Solids, chapter 21; Rabinowitsch (1929) for flow in tubes.
     """
-    places, sizes = shear / np.abs(shear).max(), apparent / max(float(np.abs(apparent).max()), np.finfo(float).tiny)
-    if places @ sizes <= 0:
+    shares, sizes = shear / np.abs(shear).max(), apparent / max(float(np.abs(apparent).max()), np.finfo(float).tiny)
+    if shares @ sizes <= 0:
         raise InputError("the torque does not have the sign of the twist: change one of the signs in the file.")
-    squares = places[:, None] ** 2
-    coefficients = _log_coefficients(sizes, places[:, None], squares)
+    squares = shares[:, None] ** 2
+    coefficients = _log_coefficients(sizes, shares[:, None], squares)
     degrees = np.arange(len(coefficients))
     slope = 1 + squares**degrees @ (2 * degrees * coefficients)
     return np.asarray(apparent * (3 + slope) / 4)
 
 
-def _log_coefficients(sizes: FloatArray, known: FloatArray, variable: FloatArray) -> FloatArray:
+def _log_coefficients(sizes: FloatArray, shape: FloatArray, variable: FloatArray) -> FloatArray:
     """Return the coefficients c of the curve sum over j of known_ij exp(sum over k of c_k variable_ij^k).
 
     It is nearest to the measurements by least squares; the degree (0 to 3) is chosen by the Bayesian information
@@ -181,23 +181,23 @@ def _log_coefficients(sizes: FloatArray, known: FloatArray, variable: FloatArray
     variable : (n, m) array
     """
     powers = variable[..., None] ** np.arange(MAX_DEGREE + 1)
-    sums, fits = known.sum(axis=1), []
+    sums, fits = shape.sum(axis=1), []
     degrees = min(MAX_DEGREE, len(np.unique(np.abs(sums))) // POINTS_OF_TERM - 1)
     start = np.log([sums @ sizes / (sums @ sums)])
     for degree in range(max(degrees, 0) + 1):
         columns = powers[..., : degree + 1]
-        start, misfit = _fitted(sizes, known, columns, np.append(start, np.zeros(degree + 1 - len(start))))
+        start, misfit = _fitted(sizes, shape, columns, np.append(start, np.zeros(degree + 1 - len(start))))
         criterion = len(sizes) * np.log(max(misfit, SMALLEST_MISFIT)) + (degree + 1) * np.log(len(sizes))
         fits.append((criterion, start))
     return min(fits, key=lambda fit: fit[0])[1]
 
 
-def _fitted(sizes: FloatArray, known: FloatArray, columns: FloatArray, start: FloatArray) -> tuple[FloatArray, float]:
+def _fitted(sizes: FloatArray, shape: FloatArray, columns: FloatArray, start: FloatArray) -> tuple[FloatArray, float]:
     """Return the coefficients for powers (n, m, k) of the variable, and the mean square of the misfit."""
     from scipy.optimize import least_squares
 
     def curves(coefficients: Any) -> Any:
-        return known * np.exp(np.minimum(columns @ coefficients, LARGEST_LOG))
+        return shape * np.exp(np.minimum(columns @ coefficients, LARGEST_LOG))
 
     result = least_squares(
         lambda coefficients: curves(coefficients).sum(axis=1) - sizes,

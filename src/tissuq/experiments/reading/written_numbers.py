@@ -50,9 +50,9 @@ def _without_thousands(table: Table) -> Table:
     if not all(map(grouped.fullmatch, numbers_with_mark)):  # the mark is the decimal one of some
         return table
     without = [[cell.replace(mark, "") if grouped.fullmatch(cell) else cell for cell in row] for row in rows]
-    place = f"{table.counted} {lines_of_cells[example]}"
+    position = f"{table.counted} {lines_of_cells[example]}"
     return table.with_cells(without).noted(
-        f"'{mark}' was taken for a thousands separator, as in '{example}' in {place}."
+        f"'{mark}' was taken for a thousands separator, as in '{example}' in {position}."
     )
 
 
@@ -100,7 +100,7 @@ def _with_spreads_apart(table: Table) -> Table:
         if is_parted:
             parted.append(table.label(position))
             names += _names(name)
-            columns += [[match[part] if match else cell for match, cell in pairs] for part in (1, 2)]
+            columns += [[match[group] if match else cell for match, cell in pairs] for group in (1, 2)]
         else:
             names.append(name)
             columns.append(cells)
@@ -116,6 +116,6 @@ def _names(name: str) -> tuple[str, str]:
     words = SPREAD_IN_NAME.search(name)
     kind, _ = of_spread(plain(words["kind"] or "")) if words else ("", "")
     of_mean = SPREAD_IN_NAME.sub(" ", name).strip()
-    parts = heading(of_mean)
-    of_spreads = f"{parts.quantity} {kind if kind in SPREADS else '±'}"
-    return of_mean, f"{of_spreads} ({parts.unit})" if parts.unit else of_spreads
+    name_of_mean = heading(of_mean)
+    of_spreads = f"{name_of_mean.quantity} {kind if kind in SPREADS else '±'}"
+    return of_mean, f"{of_spreads} ({name_of_mean.unit})" if name_of_mean.unit else of_spreads
