@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.drawing.panels import Panels, columns_of, limits_of, on_figure, shortened, small_panels, within
-from tissuq.drawing.pieces import band, line, points
+from tissuq.drawing.pieces import band, cut_off, line, points
 from tissuq.drawing.style import BAND, BASE, INK, MARKERS, STYLE, TRUTH, inline_svg, new_figure, relative_size
 from tissuq.experiments.units import StressUnit
 from tissuq.inference.solution import Solution
@@ -142,6 +142,7 @@ def _draw(axis: Axes, found: Described, unit: StressUnit) -> None:
         points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
                marker=MARKERS[number % len(MARKERS)])  # fmt: skip
     axis.set_ylim(limits)
+    cut_off(axis, *beyond[:2], unit.name)
     axis.locator_params(axis="x", nbins=6)
 
 

@@ -114,7 +114,8 @@ def _measured(found: Sequence[Described]) -> Iterator[_Test]:
     """Yield the measured curves, of those with several paths each path."""
     for of in found:
         curve = of.curve
-        name = f"{curve.name}, {curve.quantity}" if len(found) > 1 else curve.mode.name
+        name = curve.name if len(found) > 1 else curve.mode.name
+        name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
         for number, (places, is_curve) in enumerate(of.ways, 1):
             rows = _spread(np.argsort(curve.abscissa, kind="stable") if of.points.ndim == 1 else places)
             named = f"{name}, path {number}" if len(of.ways) > 1 else name
