@@ -142,7 +142,7 @@ def _draw(axis: Axes, found: Described, unit: StressUnit) -> None:
         points(axis, curve.abscissa[rows], measured[rows], error=error[rows], label="" if number else "measured",
                marker=MARKERS[number % len(MARKERS)])  # fmt: skip
     axis.set_ylim(limits)
-    cut_off(axis, *beyond[:2], unit.name)
+    cut_off(axis, beyond[0], beyond[1], unit.name)
     axis.locator_params(axis="x", nbins=6)
 
 
