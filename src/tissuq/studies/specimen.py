@@ -16,7 +16,7 @@ from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.findings import STRESS_AT_REST, data_warnings
 from tissuq.experiments.reading.notes import each_once
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
@@ -245,10 +245,13 @@ def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:
     A unit that was assumed may make the answer wrong by a factor of 100 or 1000.
     """
     messages = ((reading.experiment.name, text) for reading in readings for text in data_warnings(reading))
-    return tuple(
-        ResultWarning(text, "doubtful-reading", Severity.PROBLEM) if is_doubtful(text) else ResultWarning(text)
-        for text in each_once(messages, len(readings), "all tests")
-    )
+    return tuple(map(_warning_of_file, each_once(messages, len(readings), "all tests")))
+
+
+def _warning_of_file(text: str) -> ResultWarning:
+    if is_doubtful(text):
+        return ResultWarning(text, "doubtful-reading", Severity.PROBLEM)
+    return ResultWarning(text, "stress-at-rest" if STRESS_AT_REST in text else "measurements")
 
 
 def _names(settings: SpecimenSettings) -> list[str]:
