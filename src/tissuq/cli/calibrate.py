@@ -71,9 +71,10 @@ def calibrate(
     force: Force = False,
 ) -> None:
     """Identify the parameters of an expensive model, using an emulator whose error is included."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.calibration import HEADERS, readable_calibration, write_calibration_run
+    from tissuq.report.calibration import calibration_result
     from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.calibration import CalibrationSettings, run_calibration
 
     if bool(file) == bool(config):
@@ -105,13 +106,11 @@ def calibrate(
     runs_folder = runs_in or target.with_name(f"{target.name}-forward-runs")
     with campaign_progress(settings.runs + settings.refine) as step:
         study = run_calibration(settings, beside, runs_in=runs_folder, workers=workers, step=step)
+    result = calibration_result(study, beside)
     with run_folder(target, force=force) as folder:
-        write_calibration_run(study, folder, beside, figures=figures)
-    print_rows(f"{settings.forward_model.name}: {len(study.calibration.runs)} runs", HEADERS,
-               readable_calibration(study.calibration))  # fmt: skip
-    print(f"Emulator, {study.calibration.check}")
-    print_warnings(study.warnings)
-    print(f"Forward runs: {runs_folder}\nReport: {target / 'report.html'}")
+        write_result(result, folder, figures=figures)
+    print(f"Forward runs: {runs_folder}")
+    print_result(result.record(), target)
     not_converged([] if study.calibration.converged else ["the calibration"])
 
 

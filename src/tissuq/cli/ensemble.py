@@ -98,10 +98,11 @@ def ensemble(
     figures: Figures = True,
 ) -> None:
     """Run your own finite-element model with draws of a posterior; the same command resumes a stopped ensemble."""
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
-    from tissuq.report.ensemble import readable_quantities, write_ensemble
+    from tissuq.report.ensemble import ensemble_result
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import check_source
+    from tissuq.report.terminal import print_explanations, print_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.ensemble import EnsembleSettings, prepare_ensemble, run_ensemble
     from tissuq.studies.ensemble_files import forget_failures
     from tissuq.studies.stream import open_pool
@@ -152,11 +153,10 @@ def ensemble(
             prepared, folder, pool=pool, limit=max_jobs if scheduler else None, timeout=timeout, retries=retries,
             keep=keep, progress=campaign_progress,
         )  # fmt: skip
-    write_ensemble(study, folder, figures=figures)
-    print_rows(f"Model '{prepared.deck.main}' with {settings.draws} draws, at the end", *readable_quantities(study))
+    result = ensemble_result(study, folder)
+    write_result(result, folder, figures=figures)
     print_explanations(prepared.card_warnings)
-    print_warnings(study.warnings)
-    print(f"Report: {folder / 'report.html'}")
+    print_result(result.record(), folder)
 
 
 def _check_named_again(config: Path, settings: EnsembleSettings, options: dict[str, Any], dry_run: bool) -> None:

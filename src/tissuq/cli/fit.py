@@ -13,7 +13,6 @@ from tissuq.cli import reading
 from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, once_each, parse_prior, progress
 from tissuq.cli.reading import one_noise
 from tissuq.errors import InputError
-from tissuq.result_warning import Severity
 from tissuq.studies.settings import load_settings, setting_of
 
 if TYPE_CHECKING:
@@ -178,19 +177,16 @@ def _compare_laws(
     **options: bool,
 ) -> None:
     """Fit several laws, write the run and print their table."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
+    from tissuq.report.laws import law_result
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.laws import run_laws
 
-    study = _written(
-        partial(run_laws, settings, beside, own=own, found=found), write_law_run, sources, target, **options
-    )
-    problems = [warning for warning in study.warnings if warning.severity is Severity.PROBLEM]
-    print_warnings(problems)
-    print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))
-    print(law_lead(study))
-    print_warnings([warning for warning in study.warnings if warning not in problems])
-    print(f"Report: {target / 'report.html'}")
+    def write(study: LawStudy, sources: list[Path], folder: Path, *, figures: bool) -> None:
+        write_result(law_result(study, sources), folder, figures=figures)
+
+    study = _written(partial(run_laws, settings, beside, own=own, found=found), write, sources, target, **options)
+    print_result(law_result(study, sources).record(), target)
     _print_omissions(study)
 
 
@@ -276,10 +272,11 @@ def population(
     force: Force = False,
 ) -> None:
     """Identify a population from its specimens, every specimen within it, and what to expect for a new patient."""
-    from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.mechanics import material_named
-    from tissuq.report.population import HEADERS, readable_population, write_population_run
+    from tissuq.report.population import population_result
     from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.population import PopulationSettings, run_population
 
     if bool(files) == bool(config):
@@ -297,10 +294,8 @@ def population(
     with progress() as step:
         study = run_population(settings, beside, step, law)
         step("writing")
+        result = population_result(study, beside)
         with run_folder(target, force=force) as folder:
-            write_population_run(study, folder, beside, figures=figures)
-    print_rows(f"A population of {len(study.tests)} specimens", HEADERS, readable_population(study))
-    print("Complete pooling treats all specimens as one: its interval does not describe the range of patients.")
-    print_warnings(study.warnings)
-    print(f"Report: {target / 'report.html'}")
+            write_result(result, folder, figures=figures)
+    print_result(result.record(), target)
     not_converged([] if study.population.converged else ["the population"])

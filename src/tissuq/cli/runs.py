@@ -68,15 +68,10 @@ def predict(
     force: Force = False,
 ) -> None:
     """Predict the stress in any loading mode from a fit, and compare it with measurements."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.prediction import (
-        band_headers,
-        readable_bands,
-        readable_scores,
-        score_headers,
-        write_prediction_run,
-    )
+    from tissuq.report.prediction import prediction_result
     from tissuq.report.run_folder import check_apart, check_target, run_folder
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
 
     if bool(run) == bool(config):
@@ -100,17 +95,10 @@ def predict(
     with progress() as step:
         prediction = run_prediction(settings, beside, step, law)
         step("writing")
+        result = prediction_result(prediction, settings, target, beside, law=material)
         with run_folder(target, force=force) as folder:
-            write_prediction_run(prediction, settings, folder, target, beside, law=material, figures=figures)
-    print_rows(
-        f"Stress in mode {prediction.mode.name}, {prediction.unit.name}",
-        band_headers(prediction),
-        readable_bands(prediction),
-    )
-    if prediction.scores is not None and prediction.data is not None:
-        print_rows(f"Measurements of {prediction.data.name}", score_headers(prediction), readable_scores(prediction))
-    print_warnings(prediction.warnings)
-    print(f"Report: {target / 'report.html'}")
+            write_result(result, folder, figures=figures)
+    print_result(result.record(), target)
     not_converged(["the fit"] if prediction.posterior.solution.is_approximate else [])
 
 
@@ -246,17 +234,11 @@ def compare(
 ) -> None:
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
     from tissuq.experiments.units import stress_unit
-    from tissuq.report.comparison import (
-        EXPLANATIONS,
-        HEADERS,
-        comparison_warnings,
-        parameter_header,
-        readable_comparison,
-        write_comparison,
-    )
+    from tissuq.report.comparison import comparison_result
     from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
 
     if out is not None:
         if any(path.resolve().is_relative_to(out.resolve()) for path in runs):
@@ -266,14 +248,11 @@ def compare(
     table = compare_fits(trees)
     units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
-    headers = [*HEADERS, parameter_header(table, unit)]
-    print_rows("Fits of the same measurements", headers, readable_comparison(table, unit))
-    print_explanations(EXPLANATIONS)
-    print_warnings(comparison_warnings(table))
+    result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
         with run_folder(out, force=force) as folder:
-            write_comparison(table, [str(run) for run in runs], unit, folder)
-        print(f"Report: {out / 'report.html'}")
+            write_result(result, folder)
+    print_result(result.record(), out, details=out is None)
 
 
 def _trees(runs: list[Path]) -> dict[str, xr.DataTree]:

@@ -60,9 +60,10 @@ def structure(
     figures: Figures = True,
 ) -> None:
     """Compute the force in a case with draws of a posterior; the same command resumes a stopped simulation."""
-    from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.run_folder import check_apart
-    from tissuq.report.simulation import SOURCE, check_source, copy_source, readable_forces, write_simulation
+    from tissuq.report.simulation import SOURCE, check_source, copy_source, simulation_result
+    from tissuq.report.terminal import print_result, print_warnings
+    from tissuq.report.writer import write_result
     from tissuq.studies.stream import open_pool
     from tissuq.studies.structure import SimulationSettings, load_posteriors, run_simulation
 
@@ -94,10 +95,10 @@ def structure(
     processes = 1 if law else workers or os.cpu_count() or 1  # other processes cannot load a law from a file
     with open_pool(processes, scheduler) as pool:
         study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign_progress)
-    write_simulation(study, folder, figures=figures)
-    print_rows(f"Case '{named}' with {settings.draws} draws", *readable_forces(study))
-    print_warnings([*dict.fromkeys(str(warning.message) for warning in raised), *study.warnings])
-    print(f"Report: {folder / 'report.html'}")
+    result = simulation_result(study, folder)
+    write_result(result, folder, figures=figures)
+    print_warnings(list(dict.fromkeys(str(warning.message) for warning in raised)))
+    print_result(result.record(), folder)
 
 
 def _sizes(texts: list[str]) -> dict[str, float | str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -24,6 +24,9 @@ from tissuq.cli.options import (
 )
 from tissuq.errors import InputError
 from tissuq.studies.settings import load_settings
+
+if TYPE_CHECKING:
+    from tissuq.report.result import Result
 
 __all__ = ["paper", "study"]
 
@@ -47,9 +50,10 @@ def paper(
     force: Force = False,
 ) -> None:
     """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
-    from tissuq.cli.tables import print_summary, print_warnings
+    from tissuq.report.paper import paper_result
     from tissuq.report.run_folder import check_target, run_folder
-    from tissuq.report.validation import write_paper_run
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
     from tissuq.validation.paper import PaperSettings, run_paper
     from tissuq.validation.paper.study import steps_of
 
@@ -65,10 +69,10 @@ def paper(
     with progress(steps_of(settings)) as step:
         study = run_paper(settings, step)
         step("writing")
+        result = paper_result(study)
         with run_folder(out, force=force) as folder:
-            write_paper_run(study, folder, figures=figures)
-    print_summary(out)
-    print_warnings(study.warnings)
+            write_result(result, folder, figures=figures)
+    print_result(result.record(), out)
     not_converged(study.not_converged)
 
 
@@ -115,8 +119,7 @@ def coverage(
     scheduler: Scheduler = None,
 ) -> None:
     """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
-    from tissuq.cli.tables import print_rows
-    from tissuq.report.validation import readable_coverage, write_campaign
+    from tissuq.report.coverage import coverage_result
     from tissuq.validation.coverage import PRESETS, CoverageSettings, run_campaign
     from tissuq.validation.coverage.campaign import tasks_of
 
@@ -129,9 +132,7 @@ def coverage(
     settings = load_settings(CoverageSettings, config, _with_preset(preset, options))
     folder = out or Path("runs") / f"coverage-{preset or (config or Path()).stem}"
     results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_campaign)
-    summary = write_campaign(settings, results, folder)
-    print_rows("Coverage of C10", *readable_coverage(summary))
-    print(f"± are Monte Carlo standard errors. Report: {folder / 'report.html'}")
+    _write(coverage_result(settings, results), folder)
 
 
 @study.command("sbc", cls=Renamed)
@@ -149,17 +150,14 @@ def sbc(
     ] = None,
 ) -> None:
     """Check by simulation that posteriors are what priors and data make them (simulation-based calibration)."""
-    from tissuq.cli.tables import print_rows
-    from tissuq.report.validation import readable_ranks, write_sbc
+    from tissuq.report.sbc import sbc_result
     from tissuq.validation.sbc import SbcSettings, run_sbc, tasks_of
 
     options = {"replicates": replicates, "noise": noise, "seed": seed, "material": material}
     settings = load_settings(SbcSettings, config, options | {"formulations": formulation or None})
     folder = out or Path("runs") / (config.stem if config else f"sbc-{material}" if material else "sbc")
     results = _carry_out(settings, folder, workers, scheduler, len(tasks_of(settings)), run_sbc)
-    table = write_sbc(settings, results, folder)
-    print_rows("Ranks of the truth", *readable_ranks(table))
-    print(f"Report: {folder / 'report.html'}")
+    _write(sbc_result(settings, results), folder)
 
 
 @study.command("tissues", cls=Renamed)
@@ -190,8 +188,7 @@ def tissues(
 ) -> None:
     """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
     from tissuq.cli.reading import tolerances
-    from tissuq.cli.tables import print_rows
-    from tissuq.report.tissues import readable_tissues, write_tissues
+    from tissuq.report.tissues import tissue_result
     from tissuq.validation.tissues import TissueSettings, run_benchmark
     from tissuq.validation.tissues.benchmark import tasks_of
 
@@ -203,8 +200,16 @@ def tissues(
     settings = load_settings(TissueSettings, config, options)
     target = out or Path("runs") / (config.stem if config else "tissues")
     results = _carry_out(settings, target, workers, scheduler, len(tasks_of(settings)), run_benchmark)
-    print_rows("Predictions of real tests", *readable_tissues(write_tissues(settings, results, target)))
-    print(f"Report: {target / 'report.html'}")
+    _write(tissue_result(settings, results), target)
+
+
+def _write(result: Result, folder: Path) -> None:
+    """Write the result of a campaign into its folder, and print it."""
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
+
+    write_result(result, folder)
+    print_result(result.record(), folder)
 
 
 def _with_preset(name: str | None, options: dict[str, Any]) -> dict[str, Any]:

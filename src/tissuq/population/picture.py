@@ -30,9 +30,12 @@ SMALL_MARKS_ABOVE = 25
 """Number of specimens above which names and marks are smaller."""
 
 
-def draw_specimens(drawn: Panels, population: Population, unit: StressUnit) -> None:
-    """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order."""
-    symbols, summary = population.symbols, numbers_of(population.summary(unit="MPa"))
+def draw_specimens(drawn: Panels, population: Population, unit: StressUnit, count: int | None = None) -> None:
+    """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order.
+
+    Of the first so many parameters, where a ``count`` is said.
+    """
+    symbols, summary = population.symbols[:count], numbers_of(population.summary(unit="MPa"))
     table = numbers_of(population.specimen_summary(unit="MPa"))
     order = sorted(population.names, key=lambda name: table[name, symbols[0]]["median"])
     small, size = len(order) > SMALL_MARKS_ABOVE, relative_size()
