@@ -76,7 +76,7 @@ def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, h
     arguments = ("study", "tissues", "--dataset", "brain-cortex", "--formulation", "none", "--protocol", "tests")
     said = cli(*arguments, "--out", "out")
     assert said.status == 0
-    assert "Predictions of real tests" in said.out
+    assert "Do predictions of real tests hold?" in said.out
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "Each test from the others of its set" in page
     assert {"summary.csv", "predictions.csv", "run.toml"} <= {file.name for file in (here / "out").iterdir()}

@@ -138,20 +138,33 @@ class Call(Generic[Kind, How]):
         steps : int, optional
             Their number, where it is known.
         """
-        from tissuq.report.terminal import print_result
         from tissuq.report.writer import write_result
 
-        records: list[dict[str, Any]] = []
+        results: list[Result] = []
 
         def write(study: Study, *, folder: Path, figures: bool) -> None:
-            result = result_of(study)
-            write_result(result, folder, figures=figures)
-            records.append(result.record())
+            results.append(result_of(study))
+            write_result(results[0], folder, figures=figures)
 
         study = self.written(target, run, write, steps)
-        print_result(records[0], target)
-        self.answer(records[0]["numbers"])
+        self.printed(results[0], target)
         return study
+
+    def concluded(self, result: Result, folder: Path, *, figures: bool = True) -> None:
+        """Write a result into the folder of a campaign, and print it."""
+        from tissuq.report.writer import write_result
+
+        write_result(result, folder, figures=figures)
+        self.monitor.write_log(folder, result.warnings)
+        self.printed(result, folder)
+
+    def printed(self, result: Result, folder: Path | None) -> None:
+        """Print a result, everything where it is written nowhere; with --quiet its numbers alone."""
+        from tissuq.report.terminal import print_result
+
+        record = result.record()
+        print_result(record, folder, details=folder is None)
+        self.answer(record["numbers"])
 
     def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:
         """Print the numbers of a result, with --quiet alone, which leaves all else out."""
