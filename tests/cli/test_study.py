@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from tissuq.cli.options import _duration
+from tissuq.cli.progress import _left
 from tissuq.validation.coverage import PRESETS
 
 CAMPAIGN = """
@@ -55,7 +55,7 @@ def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
 
 @pytest.mark.parametrize(("seconds", "text"), [(None, ""), (65.0, "1:05 left, "), (7260.0, "2 h 01 min left, ")])
 def test_the_time_left_is_told_in_minutes_or_hours(seconds, text):
-    assert _duration(seconds) == text
+    assert _left(seconds) == text
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
