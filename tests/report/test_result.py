@@ -6,6 +6,7 @@ import csv
 import json
 import re
 
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from pydantic import BaseModel
@@ -76,6 +77,7 @@ def test_every_kind_of_content_is_written(tmp_path):
     files = {
         "rows.csv": rows,
         "rows.json": rows,
+        "table.csv": pd.DataFrame({"a": [0.5]}, index=["left out"]),
         "text.txt": "text",
         "bytes.bin": b"\x00",
         "input/copy.txt": tmp_path / "source.txt",
@@ -85,7 +87,8 @@ def test_every_kind_of_content_is_written(tmp_path):
     with (folder / "rows.csv").open(newline="") as lines:
         assert list(csv.DictReader(lines)) == [{"a": "1", "b": ""}, {"a": "2.5", "b": "x"}]
     assert json.loads((folder / "rows.json").read_text()) == rows
-    assert [(folder / name).read_bytes() for name in list(files)[2:]] == [b"text", b"\x00", b"copied", b"by function"]
+    texts = [(folder / name).read_bytes() for name in list(files)[2:]]
+    assert texts == [b"a\n0.5\n", b"text", b"\x00", b"copied", b"by function"]
     assert not (folder / "figures").exists()
 
 

@@ -20,7 +20,7 @@ from tissuq.studies.settings import load_settings
 
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
-    from tissuq.report.result import Result
+    from tissuq.report.result import Record, Result
 
 __all__ = ["Call", "not_converged"]
 
@@ -138,32 +138,30 @@ class Call(Generic[Kind, How]):
         steps : int, optional
             Their number, where it is known.
         """
+        from tissuq.report.terminal import print_result
         from tissuq.report.writer import write_result
 
-        results: list[Result] = []
+        records: list[Record] = []
 
         def write(study: Study, *, folder: Path, figures: bool) -> None:
-            results.append(result_of(study))
-            write_result(results[0], folder, figures=figures)
+            result = result_of(study)
+            write_result(result, folder, figures=figures)
+            records.append(result.record())
 
         study = self.written(target, run, write, steps)
-        self.printed(results[0], target)
+        print_result(records[0], target)
+        self.answer(records[0]["numbers"])
         return study
 
-    def concluded(self, result: Result, folder: Path, *, figures: bool = True) -> None:
+    def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
         """Write a result into the folder of a campaign, and print it."""
+        from tissuq.report.terminal import print_result
         from tissuq.report.writer import write_result
 
         write_result(result, folder, figures=figures)
         self.monitor.write_log(folder, result.warnings)
-        self.printed(result, folder)
-
-    def printed(self, result: Result, folder: Path | None) -> None:
-        """Print a result, everything where it is written nowhere; with --quiet its numbers alone."""
-        from tissuq.report.terminal import print_result
-
         record = result.record()
-        print_result(record, folder, details=folder is None)
+        print_result(record, folder)
         self.answer(record["numbers"])
 
     def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:

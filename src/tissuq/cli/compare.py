@@ -39,6 +39,7 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     from tissuq.experiments.units import stress_unit
     from tissuq.report.comparison import comparison_result
     from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.terminal import print_result
     from tissuq.report.writer import write_result
 
     runs, out, force = call.settings.runs, call.how.out, call.how.force
@@ -50,11 +51,11 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     table = compare_fits(trees)
     units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
-    result = comparison_result(table, list(map(str, runs)), unit)
+    result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
         with run_folder(out, force=force) as folder:
             write_result(result, folder)
-    call.printed(result, out)
+    print_result(result.record(), out, details=out is None)
 
 
 def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:

@@ -80,7 +80,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
             retries=how.retries, keep=how.keep, progress=call.campaign_in(folder),
         )  # fmt: skip
     print_explanations(prepared.card_warnings)
-    call.concluded(ensemble_result(study, folder), folder, figures=how.figures)
+    call.put_into(folder, ensemble_result(study, folder), figures=how.figures)
 
 
 def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings:

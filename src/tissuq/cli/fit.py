@@ -113,7 +113,7 @@ def _compare_laws(
     study = call.carried_out(
         target,
         lambda step: run_laws(settings, call.beside, step, own, found),
-        lambda study: law_result(study, sources),
+        partial(law_result, sources=sources),
     )
     _print_omissions(study)
 

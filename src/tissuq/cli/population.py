@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from tissuq.cli.call import Call, not_converged
@@ -33,6 +34,6 @@ def population(call: Call[PopulationSettings, PopulationOptions]) -> None:
     study = call.carried_out(
         target,
         lambda step: run_population(settings, call.beside, step, law),
-        lambda study: population_result(study, call.beside),
+        partial(population_result, beside=call.beside),
     )
     not_converged([] if study.population.converged else ["the population"])

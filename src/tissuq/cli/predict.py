@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from tissuq.cli.call import Call, not_converged
@@ -39,6 +40,6 @@ def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
     prediction = call.carried_out(
         target,
         lambda step: run_prediction(settings, beside, step, law),
-        lambda prediction: prediction_result(prediction, settings, target, beside, law=call.how.user_law),
+        partial(prediction_result, settings=settings, target=target, beside=beside, law=call.how.user_law),
     )
     not_converged(["the fit"] if prediction.posterior.solution.is_approximate else [])

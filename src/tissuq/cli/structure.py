@@ -58,4 +58,4 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     with open_pool(processes, call.how.scheduler) as pool:
         study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign)
     print_warnings(list(dict.fromkeys(str(warning.message) for warning in raised)))
-    call.concluded(simulation_result(study, folder), folder, figures=call.how.figures)
+    call.put_into(folder, simulation_result(study, folder), figures=call.how.figures)

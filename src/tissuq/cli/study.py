@@ -55,7 +55,7 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     settings = call.loaded_as(CoverageSettings, **of_preset | call.stated)
     folder = call.how.out or Path("runs") / f"coverage-{name or (call.config or Path()).stem}"
     results = _carry_out(call, settings, folder, len(tasks_of(settings)), run_campaign)
-    call.concluded(coverage_result(settings, results), folder)
+    call.put_into(folder, coverage_result(settings, results))
 
 
 @study.command("sbc", cls=Command)
@@ -75,7 +75,7 @@ def _calibrate(call: Call[SbcOptions, Any]) -> None:
         call.config.stem if call.config else f"sbc-{material}" if material else "sbc"
     )
     results = _carry_out(call, settings, folder, len(tasks_of(settings)), run_sbc)
-    call.concluded(sbc_result(settings, results), folder)
+    call.put_into(folder, sbc_result(settings, results))
 
 
 @study.command("tissues", cls=Command)
@@ -89,7 +89,7 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
     settings = call.loaded_as(TissueSettings)
     target = call.how.out or Path("runs") / (call.config.stem if call.config else "tissues")
     results = _carry_out(call, settings, target, len(tasks_of(settings)), run_benchmark)
-    call.concluded(tissue_result(settings, results), target)
+    call.put_into(target, tissue_result(settings, results))
 
 
 def _carry_out(

@@ -321,9 +321,9 @@ class Population:
             self.draw(drawn, self.unit(unit))
         return drawn.result
 
-    def draw(self, drawn: Panels, unit: StressUnit, count: int | None = None) -> None:
-        """Draw `plot` on panels, one a parameter, of the first ``count`` where one is said, in a unit of stress."""
-        units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols[:count]}
+    def draw(self, drawn: Panels, unit: StressUnit) -> None:
+        """Draw `plot` on panels, one a parameter as far as there are panels, with stresses in a unit."""
+        units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols[: len(drawn.axes)]}
         draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units)
 
     def _repr_html_(self) -> str:

@@ -14,7 +14,7 @@ from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
-from tissuq.report.result import Block, Number, Picture, Result, Section, Table
+from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, known_number, significant
 from tissuq.report.writer import posterior_files
@@ -71,7 +71,8 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
         files |= posterior_files({NoDiscrepancy.name: study.posterior})
     model, runs = settings.forward_model.name, len(calibration.runs)
     has_discrepancy = calibration.problem.discrepancy.is_correlated
-    with_it = f"; of the forward model alone: {calibration.predictive_coverage(discrepancy=False):.0%}"
+    inside_alone = calibration.predictive_coverage(discrepancy=False)
+    alone = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
     numbers = [
         Number(symbol, marginal.mean, *marginal.hdi(), interval_is="95 % HPD")
         for symbol, marginal in calibration.marginals.items()
@@ -83,7 +84,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
         title="Parameters of an expensive forward model",
         subject=f"{len(study.data.control)} measurements · forward model {model} · {runs} runs · discrepancy "
         f"{settings.discrepancy}",
-        numbers=(*numbers, Number("inside the band", inside, remark=with_it.lstrip("; ") if has_discrepancy else "")),
+        numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=alone)),
         finding=_lead(study),
         next_step=_next_step(study),
         picture=Picture(

@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from tissuq.report.coverage_figures import campaign_figures, shares_figure
-from tissuq.report.result import Block, Number, Picture, Result, Section, Table
+from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.tables import significant
 from tissuq.validation.coverage import CoverageSettings, summarise, summarise_unseen
 
@@ -26,8 +26,6 @@ SETTING_HEADERS = {
     "family": "family",
     "mode": "loading mode",
 }
-MAX_NUMBERS = 3
-"""Formulations in the head of a page."""
 MODES = (
     "The true stress against the {percent} % band of the stress itself, at stretches above one up to where I1 or I2 "
     "leaves the range that was measured. The error is the median over materials of the root mean square error of the "
@@ -66,7 +64,7 @@ def coverage_result(settings: CoverageSettings, results: list[dict[str, Any]]) -
         ),
         tables=(Table(headers, rows, "Coverage of C10", _words(headers), ERRORS),),
         sections=_sections(settings, tables, percent),
-        files={f"{name}.csv": _csv(table) for name, table in tables.items()},
+        files={f"{name}.csv": table for name, table in tables.items()},
     )  # fmt: skip
 
 
@@ -75,17 +73,13 @@ def _words(headers: list[str]) -> tuple[int, ...]:
     return tuple(range(1, headers.index("formulation") + 1))
 
 
-def _csv(table: pd.DataFrame) -> Any:
-    return lambda path: table.to_csv(path, index=False)
-
-
 def numbers_of_shares(table: pd.DataFrame, column: str, prob: float, words: str) -> tuple[Number, ...]:
     """Return the mean share of some formulations, the nearest to the nominal one first, with its range."""
-    shares = table.groupby("formulation", sort=False)[column].agg(["mean", "min", "max", "count"]).dropna()
+    shares = table.groupby("formulation", sort=False)[column].agg(["mean", "min", "max"]).dropna()
     shares = shares.iloc[(shares["mean"] - prob).abs().argsort(kind="stable").to_numpy()]
     numbers = []
     for name, row in shares.head(MAX_NUMBERS).iterrows():
-        ends = f"; {row['min']:.0%} to {row['max']:.0%} over {row['count']:.0f} cases" if row["count"] > 1 else ""
+        ends = f"; {row['min']:.0%} to {row['max']:.0%} by case" if row["max"] > row["min"] else ""
         numbers.append(Number(f"{words} '{name}'", f"{row['mean']:.0%}", remark=f"nominal {prob:.0%}{ends}"))
     return tuple(numbers)
 

@@ -18,7 +18,7 @@ from tissuq.decks.model_run import FIELDS
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
-from tissuq.report.result import Block, Number, Picture, Preformatted, Result, Section, Table
+from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
 from tissuq.report.tables import significant
 from tissuq.studies.ensemble import EnsembleStudy
 from tissuq.studies.ensemble_files import DRAWS
@@ -95,7 +95,7 @@ def ensemble_result(study: EnsembleStudy, folder: Path) -> Result:
 def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Number, ...]:
     """Return every quantity at the end with its band, and the largest share of the variance of the first."""
     percent, numbers = _headers(study, tables)[4], []
-    for name, table in tables.items():
+    for name, table in list(tables.items())[:MAX_NUMBERS]:
         row = _last(table)
         numbers.append(
             Number(f"{name} at the end", row["mean"], row["low"], row["high"], interval_is=f"{percent} band")
@@ -105,7 +105,7 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
     if shares and all(np.isfinite(share) for share in shares.values()):
         largest = max(shares, key=lambda name: shares[name])
         share = f"{100 * shares[largest]:.0f} ± {100 * row[f'{largest}_error']:.0f} % of the variance"
-        numbers.append(Number("largest source of uncertainty", largest, remark=share))
+        numbers.append(Number("uncertain mostly by", largest, remark=share))
     return tuple(numbers)
 
 
@@ -139,7 +139,7 @@ def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, A
     everything.insert(0, "quantity", everything.pop("quantity"))
     beyond = result.beyond
     files: dict[str, Any] = {
-        "quantities.csv": lambda path: everything.to_csv(path, index=False),
+        "quantities.csv": everything,
         "draws.csv": _draw_rows(study),
         "model.diff": f"{prepared.diff()}\n",
         "curves.nc": bytes(_curves(study).to_netcdf(engine="h5netcdf")),

@@ -179,7 +179,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
 def _first_parameter(population: Population, unit: StressUnit) -> Figure:
     """Return the panel of the first parameter, for the head of a page."""
     with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
-        population.draw(on_figure(figure, 1, 1), unit, count=1)
+        population.draw(on_figure(figure, 1, 1), unit)
     return figure
 
 

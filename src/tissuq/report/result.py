@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 __all__ = [
+    "MAX_NUMBERS",
     "RESULT",
     "Block",
     "Number",
@@ -41,6 +42,8 @@ __all__ = [
 
 RESULT = "result.json"
 """The file with the record of a result."""
+MAX_NUMBERS = 3
+"""Numbers of one kind in an answer; tables have all."""
 MAX_SHOWN = 3
 """Warnings that are shown at once; notes and the others are counted and folded."""
 
@@ -295,7 +298,8 @@ class Result:
     warnings : tuple of str
         `ResultWarning`s, or plain sentences, which are cautions.
     files : mapping of str to object
-        By name in the run folder: rows (``.csv``, ``.json``), text, bytes, a file to copy, or a function of the path.
+        By name in the run folder: rows (``.csv``, ``.json``), a table of pandas without its index, text, bytes, a file
+        to copy, or a function of the path.
     recipe : BaseModel, optional
         The settings for run.toml, where it is not written yet; ``without`` those of no meaning.
     how_to_repeat : str

@@ -80,7 +80,7 @@ def sbc_result(settings: SbcSettings, results: list[dict[str, Any]]) -> Result:
             Section("How to read it", (CHECK, (*HOW_TO_READ, *left_out))),
             Section("Priors", (priors,)),
         ),
-        files={"ranks.csv": lambda path: table.to_csv(path, index=False)},
+        files={"ranks.csv": table},
     )  # fmt: skip
 
 

@@ -95,7 +95,7 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
         f"measurement{against}."
     )
     files = {
-        "forces.csv": lambda path: table.to_csv(path, index=False),
+        "forces.csv": table,
         "summary.json": _summary(study, table),
         "curves.nc": bytes(_curves(study).to_netcdf(engine="h5netcdf")),
         "middle_draw.pvd": lambda path: _write_fields(study, path.parent),
@@ -103,7 +103,7 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
     return Result(
         command="structure",
         title="From the posterior to a force",
-        subject=f"{case.description} · {model.experiment.name}, material {model.material.name}, discrepancy "
+        subject=f"{case.description} · {model.experiment.name}, {model.material.name}, discrepancy "
         f"{model.discrepancy.name} · {complete} of {draws} draws completed",
         numbers=_numbers(study, table),
         finding=_lead(simulation, table),
@@ -127,12 +127,11 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     shares = {name: last[name] for name in SHARES if name in last and np.isfinite(last[name])}
     if len(shares) > 1:
         largest = max(shares, key=lambda name: shares[name])
-        remark = f"{_percent(shares[largest], last[f'{largest}_error'])} of the variance of a measurement"
-        numbers.append(Number("largest source of uncertainty", largest, remark=remark))
+        share = f"{_percent(shares[largest], last[f'{largest}_error'])} of the variance"
+        numbers.append(Number("uncertain mostly by", largest, remark=share))
     beyond = _last_mean(simulation.energy_beyond)
     if beyond is not None:
-        remark = "in parts strained beyond the measurements"
-        numbers.append(Number("strain energy", f"{100 * beyond:.0f} %", remark=remark))
+        numbers.append(Number("energy strained beyond the measurements", f"{100 * beyond:.0f} %"))
     return tuple(numbers)
 
 

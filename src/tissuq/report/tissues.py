@@ -77,8 +77,8 @@ def tissue_result(settings: TissueSettings, results: list[dict[str, Any]]) -> Re
         tables=tables,
         sections=_sections(settings, summary, results, sets),
         files={
-            "summary.csv": lambda path: summary.to_csv(path, index=False),
-            "predictions.csv": lambda path: predictions.to_csv(path, index=False),
+            "summary.csv": summary,
+            "predictions.csv": predictions,
         },
     )  # fmt: skip
 

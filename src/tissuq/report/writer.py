@@ -52,7 +52,7 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> None:
 
 
 def _write(path: Path, content: Any) -> None:
-    """Write what stands in a file: rows, text, bytes, a copy of a file, or what a function writes there."""
+    """Write what stands in a file: rows, a table of pandas, text, bytes, a copy, or what a function writes there."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if callable(content):
         content(path)
@@ -62,6 +62,8 @@ def _write(path: Path, content: Any) -> None:
         path.write_bytes(content)
     elif isinstance(content, str):
         path.write_text(content, encoding="utf-8", errors="surrogateescape")
+    elif hasattr(content, "to_csv"):
+        content.to_csv(path, index=False)
     elif path.suffix == ".csv":
         write_csv(path, content)
     else:
