@@ -71,8 +71,8 @@ def _about_correction(table: Table, column: int) -> str:
     beside = [k for k, same in enumerate(table.quantities) if same != quantity and without_correction(same) == name]
     if not beside:
         return ""
-    which = f"{table.label(column)} is read, and not {table.label(beside[0])} beside it"
-    return f"{which}; to read that one name it: --column ROLE={table.label(beside[0])}."
+    text = f"{table.label(column)} is read, and not {table.label(beside[0])} beside it"
+    return f"{text}; to read that one name it: --column ROLE={table.label(beside[0])}."
 
 
 def _about_name(measured: MeasuredRows, column: int, role: str) -> str:

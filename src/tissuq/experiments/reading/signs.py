@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,14 +13,13 @@ from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.options import TURNS
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
+from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 
 __all__ = ["check_signs", "with_signs"]
 
 SIGNED = ("strain", "displacement", *SHEARS)
 """Deformations that may be counted the other way round."""
-COMPRESSION = re.compile(r"(?<![^\W_])(compr(?![^\W_])|compress|compresi|compressão|stauch|druck|сжим|压缩|压应|圧縮)")
-"""In names of columns whose numbers may be positive in compression."""
 NEGLIGIBLE_STRAIN = 0.1
 """Share of the largest strain up to which strains of the other sign are noise or slack."""
 TURN_ALL = (
@@ -140,7 +138,7 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
     for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         furthest = int(np.argmax(np.abs(stretch - 1)))
         for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
-            if COMPRESSION.search(measured.table.names[column].lower()) and value > 0:
+            if direction_of(measured.table.names[column]) == "compression" and value > 0:
                 raise InputError(
                     f"{measured.table.place(column, furthest)}: the name says compression and the value is positive. "
                     "If the machine counts compression as positive, give compression_positive=True "

@@ -63,7 +63,7 @@ OF_RHEOMETER = re.compile(
 """Names of columns that a rheometer writes beside strain and stress."""
 DIRECTIONS_OF_LOAD = {
     "compression": re.compile(
-        r"compress|(?<![a-z])compr(?![a-z])|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축|сжати"
+        r"compress|(?<![a-z])compr(?![a-z])|compresi|(?<![^\W_])druck|stauch|压缩|压应|圧縮|압축|сжати|сжим"
     ),
     "tension": re.compile(
         r"(?<![a-z])tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени"
