@@ -55,8 +55,8 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
     for choice in choices:
         roles = {choice.deformation: choice.measure, choice.stress: choice.load}
         sentences += [_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit]
-    columns = {column for choice in choices for column in (choice.deformation, choice.stress)}
-    sentences += [text for column in sorted(columns) if (text := _about_correction(measured.table, column))]
+        corrections = (_about_correction(measured.table, column, role) for column, role in roles.items())
+        sentences += filter(None, corrections)
     if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
         sentences += [_about_rim(name) for name in measured.table.names if is_torque(name)]
     if ZERO_ASSUMED in source:
@@ -64,7 +64,7 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
     return tuple(sentences)
 
 
-def _about_correction(table: Table, column: int) -> str:
+def _about_correction(table: Table, column: int, role: str) -> str:
     """Return that a column was read which is the corrected one of two, or of which there is a corrected one."""
     quantity = table.quantities[column]
     name = without_correction(quantity)
@@ -72,7 +72,7 @@ def _about_correction(table: Table, column: int) -> str:
     if not beside:
         return ""
     text = f"{table.label(column)} is read, and not {table.label(beside[0])} beside it"
-    return f"{text}; to read that one name it: --column ROLE={table.label(beside[0])}."
+    return f"{text}; if that one is meant, give --column {role}={table.label(beside[0])}."
 
 
 def _about_name(measured: MeasuredRows, column: int, role: str) -> str:
