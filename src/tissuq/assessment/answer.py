@@ -18,6 +18,7 @@ from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
+from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -29,8 +30,9 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
-NORMAL_HALF_WIDTH, SET_BY_SPREAD = 1.96, 0.7
+NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 """Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
+SPREAD = "assumed spread between specimens"
 GRID_POINTS = 9
 """Stretches at which the width of a band is looked at."""
 
@@ -150,6 +152,7 @@ def _reporting(
     reasons_against = {
         "sampling has not converged": "not-converged" in codes,
         "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
+        "there is stress at rest, so that it may be off by far more than its interval": "stress-at-rest" in codes,
         "a bound of its prior, not the data, determines it": is_cut,
         "the fitted curve departs from the measured one, and the interval does not include that": (
             "unmodelled-curve" in codes
@@ -171,14 +174,11 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
     if "not-near-reference" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
-    if _is_spread_of_specimens(solution, half_width):
-        return verdict, f"{width}, nearly all of it the assumed spread between specimens"
+    model = solution.model
+    if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
+        common = SPREAD if model.tolerances.estimand == TISSUE else "assumed error of the stress as a whole"
+        return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width
-
-
-def _is_spread_of_specimens(solution: Solution, half_width: float) -> bool:
-    """Return whether an error that all tests have in common, above all the spread between specimens, sets a width."""
-    return solution.model.common_error * NORMAL_HALF_WIDTH > SET_BY_SPREAD * half_width
 
 
 def _precision(half_width: float) -> tuple[Verdict, str]:
@@ -337,7 +337,7 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     reporting, _, others, simulating = (use.verdict for use in uses)
     codes = {warning.code for warning in warnings}
     model = solution.model
-    if reporting is not Verdict.YES and "measurements" in codes:
+    if reporting is not Verdict.YES and not codes.isdisjoint({"measurements", "stress-at-rest"}):
         return STEPS["measurements"]
     if not solution.is_of_data:
         return STEPS["export"]
@@ -346,7 +346,7 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     if "unstable" in codes:
         return STEPS["stable"]
     if reporting is not Verdict.YES:
-        return STEPS["specimens" if "spread between specimens" in uses[0].reason else "design"]
+        return STEPS["specimens" if SPREAD in uses[0].reason else "design"]
     if others is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]
