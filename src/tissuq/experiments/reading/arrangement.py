@@ -23,7 +23,7 @@ SAME, FAR = 0.1, 0.5
 TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
 """Names of a column of times."""
 FEWEST_VALUES = 4
-"""Of each column."""
+"""Of each column of a table that lies on its side."""
 MOST_LINES = 200
 """Of a file, or a sheet, that is such a table."""
 

@@ -26,8 +26,8 @@ EVIDENCE, SHORTEST = 5.0, 0.03
 """Gain in log likelihood (n log of the ratio of mean squares) and share of the way from which slack is said."""
 LEAST_SLOPE = 0.02
 """Slope at the start of the stiffest curves of the family, relative to their mean slope."""
-HIGHEST_COMPRESSION = 0.5
-"""Stretch from which on a test that shortens the specimen begins; amounts of shear begin near zero."""
+LEAST_FIRST_STRETCH = 0.5
+"""Stretch at which a test that shortens the specimen begins at least; amounts of shear begin near zero."""
 ALREADY_LOADED = 0.2
 """Share of the largest stress below which, with the other sign, the rows are of a test through its reference."""
 LEAST_PRELOAD, MOST_LOAD = 0.005, 0.1
@@ -67,8 +67,9 @@ def find_slack(stretch: Column, stress: Column) -> Slack | None:
     if load.min() < -ALREADY_LOADED:
         return None
     _, (share, mean_load) = averaged(MOST_POINTS, way / way[-1], load)
-    is_compressed = 0 < stretch.min() < stretch[0] == stretch.max() and stretch[0] > HIGHEST_COMPRESSION
-    shortest = float(stretch.min() / stretch[0]) if is_compressed and stress.sum() < 0 else 1.0
+    last = float(stretch[order[-1]])
+    is_compressed = 0 < last < stretch[0] > LEAST_FIRST_STRETCH and stress.sum() < 0
+    shortest = last / float(stretch[0]) if is_compressed else 1.0
     starts, gains = _gains(share, mean_load, shortest)
     if gains.max() < EVIDENCE or starts[np.argmax(gains)] < SHORTEST:
         return None
