@@ -113,3 +113,9 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
     assert 0.7 * (modulus.high - modulus.low) / 2 / modulus.mean < 1.96 * 0.18
     assert "spread between specimens" in answer.uses[0].reason
     assert "further specimens" in answer.next_step.shell
+
+
+def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
+    answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
+    assert answer.meaning == tq.estimands()["specimen"].description
+    assert answer.uses[0].reason.endswith("nearly all of it the assumed error of the stress as a whole")

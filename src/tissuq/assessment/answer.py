@@ -14,10 +14,11 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
+from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -29,8 +30,9 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
-NORMAL_HALF_WIDTH, SET_BY_SPREAD = 1.96, 0.7
+NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 """Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
+SPREAD = "assumed spread between specimens"
 GRID_POINTS = 9
 """Stretches at which the width of a band is looked at."""
 
@@ -172,14 +174,11 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
     if "not-near-reference" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
-    if _is_spread_of_specimens(solution, half_width):
-        return verdict, f"{width}, nearly all of it the assumed spread between specimens"
+    model = solution.model
+    if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
+        common = SPREAD if model.tolerances.estimand == TISSUE else "assumed error of the stress as a whole"
+        return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width
-
-
-def _is_spread_of_specimens(solution: Solution, half_width: float) -> bool:
-    """Return whether an error that all tests have in common, above all the spread between specimens, sets a width."""
-    return solution.model.common_error * NORMAL_HALF_WIDTH > SET_BY_SPREAD * half_width
 
 
 def _precision(half_width: float) -> tuple[Verdict, str]:
@@ -347,7 +346,7 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     if "unstable" in codes:
         return STEPS["stable"]
     if reporting is not Verdict.YES:
-        return STEPS["specimens" if "spread between specimens" in uses[0].reason else "design"]
+        return STEPS["specimens" if SPREAD in uses[0].reason else "design"]
     if others is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -299,8 +300,12 @@ def _evidence_changes(solution: Solution, rescaled_solutions: Mapping[str, Solut
     return {} if log_evidence is None else {name: float(value - log_evidence) for name, value in evidences.items()}
 
 
+@lru_cache(maxsize=8)
 def shares_of_discrepancy(solution: Solution) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals."""
+    """Return the discrepancy's share of the stress and of the initial stiffness: means and ends of 95 % intervals.
+
+    Remembered, as the answer and the assessment ask for them.
+    """
     experiment, components = solution.model.experiment, solution.mixture
     mode = experiment.curves[0].mode
     reference = experiment.states_at(mode.excursion([-STRETCH_STEP, STRETCH_STEP]), mode)

@@ -112,6 +112,9 @@ class Solution:
         The same of the prior; None where it is not known.
     is_of_data : bool
         Whether it is the posterior given the model's measurements; that of a new patient is of somebody else.
+    represent_few : callable, optional
+        Given a number of components and whether those of the tails are wanted, returns what `few_components` does, at
+        less cost.
     """
 
     model: StatisticalModel
@@ -130,12 +133,13 @@ class Solution:
     stable_share: float = 1.0
     stable_prior_share: float | None = None
     is_of_data: bool = True
+    represent_few: Callable[[int, bool], GaussianMixture] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is computed in place of what computes it, so that the posterior can go to another process."""
         tails = None if self.represent_tails is None else partial(_same, self.wide_mixture)
         computed = {"represent": partial(_same, self.mixture), "represent_tails": tails}
-        return self.__dict__ | computed | {"marginals": dict(self.marginals)}
+        return self.__dict__ | computed | {"marginals": dict(self.marginals), "represent_few": None}
 
     @cached_property
     def mixture(self) -> GaussianMixture:
@@ -146,6 +150,12 @@ class Solution:
     def wide_mixture(self) -> GaussianMixture:
         """The same with components in the tails, too, where importance weights may need them."""
         return self.mixture if self.represent_tails is None else self.represent_tails()
+
+    def few_components(self, count: int, *, wide: bool) -> GaussianMixture:
+        """Return at most so many components that stand for `mixture`, or for `wide_mixture`; neither is kept."""
+        if self.represent_few is not None:
+            return self.represent_few(count, wide)
+        return ((self.represent_tails if wide else None) or self.represent)().resampled(count)
 
     @cached_property
     def draws(self) -> dict[str, FloatArray]:

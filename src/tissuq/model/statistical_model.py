@@ -32,6 +32,8 @@ FloatArray = NDArray[np.float64]
 
 BENT_QUANTILES = (0.001, 0.1, 0.5, 0.9, 0.999)
 """Probabilities of the exponents' priors at which the size of a box is judged."""
+MAX_REMEMBERED_SIZE = 2000
+"""Measurements up to which the stresses of a block are remembered from one model to the next."""
 POINTS_OF_RANGE = 2001
 """Points that stand for the range of the stretches of very many measurements."""
 
@@ -145,7 +147,7 @@ class StatisticalModel(ErrorModel):
         """The members of an energy discrepancy over the range of the data; none for other discrepancies."""
         if not isinstance(self.discrepancy, EnergyDiscrepancy):
             return ()
-        return tuple(self.discrepancy.members(self._range))
+        return _remembered_members(self.discrepancy, self._range)
 
     @property
     def _range(self) -> States:
@@ -241,7 +243,7 @@ class StatisticalModel(ErrorModel):
         numbers = np.unique(member[: len(member) * self.material.is_isotropic])
         limits = [self.energy_members[number].limits for number in numbers]
         for distinct in dict.fromkeys(limits):
-            alike = [number for number, other in zip(numbers, limits, strict=True) if other == distinct]
+            alike = [number for number, values in zip(numbers, limits, strict=True) if values == distinct]
             yield distinct, np.flatnonzero(np.isin(member, alike))
 
     def energy_features(self, member: int) -> list[FloatArray]:
@@ -252,7 +254,9 @@ class StatisticalModel(ErrorModel):
         """Return the stresses of the terms of a block as `rows`, remembered, as many members have it."""
         key = block, reach, length
         if key not in self._known_blocks:
-            self._known_blocks[key] = np.asarray(self.rows(block.stress_features(self.states, reach, length)))
+            are_few = self.experiment.size <= MAX_REMEMBERED_SIZE
+            features = (_remembered_features if are_few else _features)(block, self.states, reach, length)
+            self._known_blocks[key] = np.asarray(self.rows(features))
         return self._known_blocks[key]
 
     @cached_property
@@ -368,3 +372,18 @@ def _basis(material: Material, discrepancy: Discrepancy, states: States, bent: A
 
 
 _remembered_basis = lru_cache(maxsize=64)(_basis)
+
+
+# The same for every noise, lag and tolerance of the same tests, of which the errors are estimated.
+
+
+@lru_cache(maxsize=64)
+def _remembered_members(discrepancy: EnergyDiscrepancy, states: States) -> tuple[Member, ...]:
+    return tuple(discrepancy.members(states))
+
+
+def _features(block: EnergyBlock, states: States, reach: tuple[float, float], length: float) -> FloatArray:
+    return block.stress_features(states, reach, length)
+
+
+_remembered_features = lru_cache(maxsize=256)(_features)

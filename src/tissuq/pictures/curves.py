@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution

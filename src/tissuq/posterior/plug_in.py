@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from tissuq.assessment.stability import MIN_LOSS_PROBABILITY, stable_ranges
 from tissuq.errors import ModelError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.enumerators.noise_grid import at_level, at_noise, with_known_noise
+from tissuq.inference.peak import highest
 from tissuq.inference.solution import Solution
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.measurement_errors import MeanError
@@ -45,10 +46,9 @@ LONGEST_CORRELATION, LAG_COUNT = 0.1, 5
 test; correlations up to it that are tried."""
 MIN_LOG_EVIDENCE_GAIN = 3.0
 """Of autoregressive noise over independent one, from which it is taken."""
-LEVEL_ACCURACY = 0.1
-"""Of the logarithm of the level at which noise is compared."""
-MAX_LEVEL_FACTOR, MAX_STEP_FACTOR = 20.0, 3.0
-"""How far that may be from the residuals of the pilot fit, and from one correlation to the next."""
+LEVEL_STEP, MAX_LEVEL_FACTOR, LEVEL_ACCURACY = 0.4, 20.0, 0.1
+"""Of the search for the level at which noise is compared: first step of its logarithm; how far it may be from where
+the search begins; accuracy of the log evidence there."""
 
 
 class ErrorEstimates:
@@ -124,11 +124,10 @@ class ErrorEstimates:
         autoregressive = replace(_sketch(model), noise=AutoregressiveNoise())
         longest = np.exp(-1 / (LONGEST_CORRELATION * fewest))
         lags, evidences = np.linspace(0, np.arctanh(longest), LAG_COUNT), list[float]()
-        level, factor = model.fitted_errors.level or model.noise_of_tests[1], MAX_LEVEL_FACTOR
+        level = model.fitted_errors.level or model.noise_of_tests[1]
         for lag in np.tanh(lags):
-            level, evidence = self._best_level(autoregressive.with_errors(lag=float(lag)), level, factor)
+            level, evidence = self._best_level(autoregressive.with_errors(lag=float(lag)), level)
             evidences.append(evidence)
-            factor = MAX_STEP_FACTOR
             if evidence < max(evidences) - MIN_LOG_EVIDENCE_GAIN:
                 break
         fits = model.fitted_errors.fits + self._fits
@@ -137,19 +136,23 @@ class ErrorEstimates:
         lag = float(np.tanh(_peak(lags[: len(evidences)], np.array(evidences))))
         return replace(model, noise=autoregressive.noise).with_errors(lag=lag, fits=fits)
 
-    def _best_level(self, model: StatisticalModel, level: float, factor: float) -> tuple[float, float]:
-        """Return the level of the noise, within a factor of another, with the largest log evidence, and that.
+    def _best_level(self, model: StatisticalModel, level: float) -> tuple[float, float]:
+        """Return the level of the noise with the largest log evidence, searched from another one, and that.
 
         The levels that are tried count as one fit.
         """
         self._fits += 1
+        log_level, log_evidence = highest(
+            partial(self._log_evidence_at, model),
+            float(np.log(level)),
+            LEVEL_STEP,
+            float(np.log(MAX_LEVEL_FACTOR)),
+            LEVEL_ACCURACY,
+        )
+        return float(np.exp(log_level)), log_evidence
 
-        def negative_log_evidence(log_level: float) -> float:
-            return -(self._solve(at_noise(model, float(np.exp(log_level)))).log_evidence or 0.0)
-
-        ends = np.log([level / factor, level * factor])
-        best = minimize_scalar(negative_log_evidence, bounds=ends, method="bounded", options={"xatol": LEVEL_ACCURACY})
-        return float(np.exp(best.x)), -float(best.fun)
+    def _log_evidence_at(self, model: StatisticalModel, log_level: float) -> float:
+        return self._solve(at_noise(model, float(np.exp(log_level)))).log_evidence or 0.0
 
     def _with_factor(self, model: StatisticalModel, level: float | None) -> StatisticalModel:
         """Return a model with its spreads times the factor that its tests tell, at a level of errors if noise needs it.

@@ -12,7 +12,7 @@ from tissuq.assessment.extent import has_energy
 from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BAND, BASE, INK, STYLE, TRUTH, new_figure, save_figure
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.answer import answer_on_new_figure
 from tissuq.pictures.curves import Described, described

@@ -9,7 +9,7 @@ import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.headings import heading, on_axis
+from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
@@ -149,10 +149,10 @@ def _other_axis(reading: Reading, number: int) -> str:
     """Return a sentence about a biaxial test that is read as uniaxial."""
     table = reading.table
     choice = reading.choices[number]
-    axis, _ = on_axis(heading(table.names[choice.deformation]).quantity)
+    axis, _ = on_axis(table.quantities[choice.deformation])
     if not axis or not isinstance(reading.experiment.mode, Uniaxial):
         return ""
-    names = [on_axis(heading(name).quantity) for name in table.names]
+    names = map(on_axis, table.quantities)
     is_across = [name_axis not in ("", axis) and name in ROLES["force"] for name_axis, name in names]
     if not any(is_across):
         return ""

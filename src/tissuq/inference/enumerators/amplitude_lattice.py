@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.inference.box import Boxes
+from tissuq.inference.box import NEGLIGIBLE_MASS, Boxes
 from tissuq.inference.enumerators.amplitudes import (
     NEGLIGIBLE_SHARE,
     Points,
@@ -171,6 +171,7 @@ class _EnergySums:
         settings = self._settings(points, self._node)
         gaussians = GaussianMixture(self._weights, settings, mean, root)
         self._truncated = TruncatedMixture.of(gaussians, mass_outside, self._box)
+        self._mass_outside = mass_outside.sum(axis=1)
         self._evidence: tuple[float, float] | tuple[None, None] = None, None
         if not any(isinstance(prior, Flat) for prior in model.priors.values()):
             evidence = float(top + np.log(total) + self._priors.log_height + model.log_whitening)
@@ -191,6 +192,7 @@ class _EnergySums:
             log_evidence=log_evidence,
             log_evidence_error=error,
             members=shares_of_members(self.model, self._points.lattice, self._weights),
+            represent_few=lambda few, wide: self._represented(TAILS_POWER if wide else 1.0, components, few),
         )
 
     def _reason(self) -> str:
@@ -207,8 +209,11 @@ class _EnergySums:
             f", and over {len(shares)} values of {', '.join(outer)} ({effective:.0f} effective)" if outer else ""
         )
 
-    def _represented(self, power: float, count: int) -> GaussianMixture:
-        """Return so many components that stand for all points, taken as often as a power of their weights says."""
+    def _represented(self, power: float, count: int, few: int | None = None) -> GaussianMixture:
+        """Return so many components that stand for all points, taken as often as a power of their weights says.
+
+        Or the ``few`` that stand for these, the others of which need not be computed where no bound cuts any.
+        """
         points, node, weights = self._points, self._node, self._weights
         if len(weights) > count:
             order = np.lexsort((points.noise_sd, points.first_index, points.second_index, points.lattice, node))
@@ -219,7 +224,14 @@ class _EnergySums:
                 node[representatives],
                 weights[representatives] ** (1 - power),
             )
-            weights = weights / weights.sum()
+            weights, outside = weights / weights.sum(), self._mass_outside[representatives]
+        else:
+            outside = self._mass_outside
+        is_free = outside.max(initial=0.0) < NEGLIGIBLE_MASS / 10
+        if few is not None and is_free and len(weights) > few:
+            representatives = systematic(weights[None], few)[0]
+            points, node = points[representatives], node[representatives]
+            weights = np.full(few, weights.sum() / few)
         features = {int(member): self.model.energy_features(member) for member in np.unique(points.lattice)}
         width = len(self.model.linear) + max(sum(f.shape[1] for f in blocks) for blocks in features.values())
         mean, root = np.zeros((len(weights), width)), np.zeros((len(weights), width, width))
@@ -236,7 +248,8 @@ class _EnergySums:
         mixture = GaussianMixture(weights, self._settings(points, node), mean, root, points.lattice)
         free = np.full((1, width - len(self.model.linear)), np.inf)
         box = Boxes(np.hstack([self._box.lower, -free]), np.hstack([self._box.upper, free]))
-        return TruncatedMixture.of(mixture, box.beyond(mean, root), box).components()
+        components = TruncatedMixture.of(mixture, box.beyond(mean, root), box).components()
+        return components if few is None else components.resampled(few)
 
     def _marginal(self, symbol: str) -> Marginal:
         if symbol in self.model.linear:

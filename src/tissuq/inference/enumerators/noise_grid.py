@@ -257,8 +257,7 @@ def _represented(
     """Return the components of all solutions, fewer of those of less weight."""
     mixtures = []
     for solution, share, log in zip(known, shares, logs, strict=True):
-        represent = (solution.represent_tails if wide else None) or solution.represent  # once, and not kept
-        few = represent().resampled(max(1, int(share * MAX_COMPONENTS)))
+        few = solution.few_components(max(1, int(share * MAX_COMPONENTS)), wide=wide)
         values = dict(zip(solution.model.nonlinear, few.settings.T, strict=True))
         values[SYMBOL] = np.full(len(few), np.exp(log))
         settings = np.column_stack([values[symbol] for symbol in model.nonlinear])

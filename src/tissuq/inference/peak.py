@@ -1,0 +1,68 @@
+"""Where a smooth function that costs much to evaluate is largest, by parabolas through few of its values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+__all__ = ["highest"]
+
+MAX_EVALUATIONS = 20
+
+
+def highest(
+    function: Callable[[float], float], start: float, step: float, reach: float, accuracy: float
+) -> tuple[float, float]:
+    """Return where a function with one peak is largest, and its value there, both as a parabola says.
+
+    Parameters
+    ----------
+    function : callable
+    start, step : float
+        Where the search begins, and how far from there it looks first; then twice as far, and so on. About over such a
+        step a parabola is to describe the function.
+    reach : float
+        Farthest from the start that is looked at; where the function still rises there, it is the result.
+    accuracy : float
+        By which the parabola may exceed the largest value that was computed.
+
+    Examples
+    --------
+    >>> place, value = highest(lambda x: 3 - (x - 1.7) ** 2, 0.0, 0.4, 3.0, 0.01)
+    >>> round(place, 6), round(value, 6)
+    (1.7, 3.0)
+    """
+    known = {place: function(place) for place in (start - step, start, start + step)}
+    widest = 1.5 * step
+    while len(known) < MAX_EVALUATIONS:
+        places = sorted(known)
+        best = max(places, key=lambda place: known[place])
+        index = places.index(best)
+        if index in (0, len(places) - 1):
+            step *= 2
+            place = float(np.clip(best + (step if index else -step), start - reach, start + reach))
+            if place == best:
+                break
+        else:
+            neighbours = places[index - 1 : index + 2]
+            farther = max((neighbours[0], neighbours[2]), key=lambda neighbour: abs(neighbour - best))
+            place, value = _top(neighbours, [known[neighbour] for neighbour in neighbours])
+            if abs(farther - best) > widest:  # a parabola says little
+                place = 0.5 * (farther + best)
+            elif value < known[best] + accuracy:
+                return place, value
+        known[place] = function(place)
+    best = max(known, key=lambda place: known[place])
+    return best, known[best]
+
+
+def _top(places: list[float], values: list[float]) -> tuple[float, float]:
+    """Return the top of the parabola through three ascending places, of which the middle one has the largest value."""
+    before, after = places[0] - places[1], places[2] - places[1]
+    drop_before, drop_after = values[0] - values[1], values[2] - values[1]
+    curvature = (drop_after / after - drop_before / before) / (after - before)
+    slope = drop_after / after - curvature * after
+    if curvature >= 0:  # all three are alike
+        return places[1], values[1]
+    return float(places[1] - 0.5 * slope / curvature), float(values[1] - 0.25 * slope**2 / curvature)
