@@ -16,6 +16,8 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # as many processes as cores: more thre
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+os.environ.setdefault("TISSUQ_PROGRESS", "off")  # lines that depend on how fast the machine is
+
 MEMORY_MAPS, MOST_MAPS = Path("/proc/self/maps"), 20_000
 """What a process has mapped (on Linux, where 65530 are allowed), and from how many on compiled functions are let go."""
 

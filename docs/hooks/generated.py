@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -51,6 +51,7 @@ GUIDES = {
     "discrepancies": ["what-it-computes.md", "energy.md"],
     "datasets": ["gallery.md"],
     "show": ["by-example.md"],
+    "schema": ["by-example.md"],
 }
 """The pages to read beside that of a command."""
 
@@ -106,10 +107,33 @@ def command_page(name: str, command: Any) -> str:
     guides = GUIDES.get(name, GUIDES.get(name.split()[0], []))
     if guides:
         lines += ["Read also: " + ", ".join(f"[{_title(page)}](../{page})" for page in guides) + ".", ""]
-    for title, parameters in (("Arguments", arguments), ("Options", options)):
+    settings = _settings(name.split()[-1])
+    if settings:
+        lines += [
+            "A file for `--config` has the settings that stand in brackets, or else those of the options' names, with "
+            f"`_` for `-`; `tissuq schema {name.split()[-1]}` prints their types.",
+            "",
+        ]
+    by_title: dict[str, list[Any]] = {"Arguments": arguments, "Options": []}
+    for option in options:
+        by_title.setdefault(getattr(option, "rich_help_panel", None) or "Options", []).append(option)
+    for title, parameters in by_title.items():
         if parameters:
-            lines += [f"## {title}", "", '<dl class="options">', *map(_definition, parameters), "</dl>", ""]
+            items = [_definition(parameter, settings) for parameter in parameters]
+            lines += [f"## {title}", "", '<dl class="options">', *items, "</dl>", ""]
     return "\n".join(lines)
+
+
+def _settings(name: str) -> dict[str, str]:
+    """Return the setting of every parameter of a command, where it has another name or a unit."""
+    from tissuq.cli.command import settings_of, slots_of
+
+    kind = settings_of(name)
+    remarks = {}
+    for slot in slots_of(kind) if kind is not None else ():
+        setting, unit = ".".join(slot.path), f" in {slot.option.unit}" if slot.option.unit else ""
+        remarks[slot.name] = f"<code>{setting}</code>{unit}" if setting != slot.name or unit else ""
+    return remarks
 
 
 def _slug(name: str) -> str:
@@ -143,7 +167,7 @@ def _argument_name(parameter: Any) -> str:
     return name if parameter.required else f"[{name}]"
 
 
-def _definition(parameter: Any) -> str:
+def _definition(parameter: Any, settings: Mapping[str, str]) -> str:
     if is_option(parameter):
         names = [*parameter.opts, *parameter.secondary_opts]
         anchor = names[0].lstrip("-")
@@ -153,6 +177,8 @@ def _definition(parameter: Any) -> str:
         names, anchor, kind = [_argument_name(parameter)], parameter.name, ""
     code = ", ".join(f"<code>{escape(name)}</code>" for name in names)
     default = "" if parameter.default in (None, (), [], False, True) else f" [{escape(str(parameter.default))}]"
+    if setting := settings.get(parameter.name):
+        kind += f" <em>({setting})</em>"
     return f'<dt id="{escape(anchor)}">{code}{kind}</dt><dd>{escape(parameter.help or "")}{default}</dd>'
 
 

@@ -38,6 +38,7 @@ WARNING_CODES: Mapping[str, str] = MappingProxyType(
         "poorly-determined": "The data determine the headline parameter poorly.",
         "prior-bound": "A bound of a prior, not the data, determines part of the result.",
         "stability-contradicted": "The data contradict the stability that was required.",
+        "stress-at-rest": "There is stress at the reference state, which no elastic material has.",
         "unmodelled-curve": "The fitted curve does not follow the measured one.",
         "unstable": "Material and discrepancy are more often unstable than stable over the measured range.",
     }

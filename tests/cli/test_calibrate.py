@@ -52,7 +52,8 @@ def test_a_run_leaves_the_promised_files(calibrate_run):
     figures = {f"figures/{name}.{kind}" for name in ("band", "emulator", "marginals") for kind in ("svg", "png")}
     tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc",
               "leave_one_out.csv", "sensitivity.csv"}  # fmt: skip
-    assert found == figures | tables | {"input/punch.csv", "input/force.py", "report.html", "run.toml", "contents.txt"}
+    files = {"input/punch.csv", "input/force.py", "report.html", "run.toml", "contents.txt", "tissuq.log"}
+    assert found == figures | tables | files
     for words in ("force.py:force: 16 runs", "each left out", "the solver has not converged", "run-forward-runs"):
         assert words in said.out.replace("\n      ", " ")
     page = (folder / "run" / "report.html").read_text()

@@ -288,7 +288,7 @@ def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, m
         ({"model.inp": "none.inp"}, ["none.inp", "cannot be read"]),
         ({"TISSUE": "Muscle"}, ["no material 'Muscle'", "Tissue, Fat"]),
         ({"TISSUE": "=run"}, ["is not a material"]),
-        ({"force=RF2@TOP": "RF2@TOP"}, ["not understood by --qoi"]),
+        ({"force=RF2@TOP": "RF2@TOP"}, ["is not a quantity of interest (--qoi)"]),
         ({"force=RF2@TOP": "force=RF9@TOP"}, ["not a quantity", "NAME=RF3@SET"]),
         ({"ccx": "febio4"}, ["reads decks of the format febio"]),
         ({"ccx": "cxx"}, ["no solver named 'cxx'", "ccx"]),

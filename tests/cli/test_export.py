@@ -69,7 +69,7 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
         (["--unit", "psi"], "MPa, kPa, Pa"),
         (["--law", "gent"], "no law 'gent'"),
         (["--draws", "0"], "one draw or more"),
-        (["--sampling", "halton"], "sobol, latin, random"),
+        (["--sampling", "halton"], "'sobol', 'latin' or 'random'"),
         (["--poisson", "0.6"], "between 0 and 0.5"),
         (["--bulk-modulus", "10", "--poisson", "0.4"], "not both"),
         (["--out", "runs/specimen", "--force"], "is the run itself"),

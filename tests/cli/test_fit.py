@@ -61,7 +61,7 @@ def test_a_run_leaves_the_promised_files_and_a_copy_of_the_users(fit_run):
     posteriors = {f"posterior/{name}.nc" for name in ("none", "constant", "gp")}
     tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv", "stability.csv"}
     assert found == figures | posteriors | tables | {
-        "report.html", "run.toml", "contents.txt", "answer.json", "assessment.json", "input/specimen.csv"
+        "report.html", "run.toml", "contents.txt", "tissuq.log", "answer.json", "assessment.json", "input/specimen.csv"
     }  # fmt: skip
     users = folder.parents[1] / "specimen.csv"
     assert (folder / "input" / "specimen.csv").read_bytes() == users.read_bytes()

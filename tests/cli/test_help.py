@@ -88,7 +88,10 @@ def test_ctrl_c_ends_with_status_130_and_leaves_nothing(cli, here, specimen, mon
     monkeypatch.setattr("tissuq.report.specimen.write_tables", interrupt)
     said = cli("fit", specimen, "--discrepancy", "none", "--no-figures")
     assert said.status == 130
-    assert said.err == "tissuq: stopped; no run was written (the same command resumes a campaign).\n"
+    assert said.err == (
+        "tissuq: stopped during 'writing' (done: none, assessing); no run was written. "
+        f"To begin again: tissuq fit {specimen} --discrepancy none --no-figures\n"
+    )
     assert [path.name for path in here.iterdir()] == [specimen.name]
 
 
@@ -106,7 +109,7 @@ def test_a_request_to_terminate_ends_with_status_143_and_leaves_nothing(cli, her
     finally:
         signal.signal(signal.SIGTERM, before)
     assert said.status == 143
-    assert said.err == "tissuq: stopped; no run was written (the same command resumes a campaign).\n"
+    assert said.err.startswith("tissuq: stopped during 'writing' (done: none, assessing); no run was written. ")
     assert [path.name for path in here.iterdir()] == [specimen.name]
 
 

@@ -31,7 +31,7 @@ def test_a_run_leaves_the_promised_files(request, name):
     tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv", "claims.csv", "sensitivity.csv"}
     posteriors = {f"posterior/{name}.nc" for name in FORMULATIONS}
     found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert found == figures | tables | posteriors | {"report.html", "run.toml", "contents.txt"}
+    assert found == figures | tables | posteriors | {"report.html", "run.toml", "contents.txt", "tissuq.log"}
     assert [path.name for path in folder.parent.iterdir()] == ["run"]
 
 

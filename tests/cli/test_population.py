@@ -64,7 +64,7 @@ def test_a_run_leaves_the_promised_files(population_run):
         "population.nc",
         "posterior/new-patient.nc",
     }
-    assert found == inputs | figures | tables | {"report.html", "run.toml", "contents.txt"}
+    assert found == inputs | figures | tables | {"report.html", "run.toml", "contents.txt", "tissuq.log"}
     assert "A population of 6 specimens" in said.out
     assert "does not describe the range of patients" in said.out
     page = (folder / "run" / "report.html").read_text()

@@ -60,7 +60,7 @@ def test_measurements_are_compared_with_and_the_prediction_repeats(cli, here, ru
     first, second = tree(here / "run-planar"), tree(here / "elsewhere" / "again")
     assert first.keys() == second.keys()
     differ = {name for name in first if first[name] != second[name]}
-    assert differ == {"run.toml", "report.html"}  # which name the run from where they are
+    assert differ == {"run.toml", "report.html", "tissuq.log"}  # which name the run from where they are, and the time
     assert again.out.replace("elsewhere/again", "run-planar") == said.out
 
 

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from tissuq.cli.options import _duration
+from tissuq.cli.progress import _duration
 from tissuq.validation.coverage import PRESETS
 
 CAMPAIGN = """

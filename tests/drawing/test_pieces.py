@@ -82,6 +82,20 @@ def test_only_what_is_outside_is_hatched(axis):
     assert patch.get_hatch()
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        ([0.1, 0.2], [0.8, 0.9], []),
+        ([-3.14, 0.2], [0.8, 0.9], ["bands go on to -3.1 kPa"]),
+        ([-2.0, np.nan], [2.5e7, 0.9], ["bands go on to -2e+00 and 2e+07 kPa"]),
+    ],
+)
+def test_bands_that_leave_the_axis_are_said_to(axis, low, high, words):
+    axis.set_ylim(0, 1)
+    pieces.cut_off(axis, low, high, "kPa")
+    assert [text.get_text() for text in axis.texts] == words
+
+
 def test_widths_go_with_the_size_of_letters(axis):
     for size in (10, 20):
         with mpl.rc_context({"font.size": size}):

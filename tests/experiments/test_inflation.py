@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import tissuq as tq
 from tissuq.errors import InputError
-from tissuq.experiments.reading.inflation import Tube
+from tissuq.experiments.reading.uneven_stress import Tube
 from tissuq.experiments.units import PRESSURE, looks_like_unit
 
 MMHG = 133.322387415e-6  # MPa

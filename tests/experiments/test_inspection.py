@@ -82,6 +82,12 @@ def test_what_is_strange_is_said(inspected, stretch, stress, words):
     assert words in notes(inspected(stretch, stress))
 
 
+def test_a_reference_between_measurements_is_no_late_beginning(inspected):
+    stretch = np.linspace(0.75, 1.4, 30)[::2]
+    assert np.abs(stretch - 1).min() > 0.05 * np.abs(stretch - 1).max()
+    assert "not near" not in notes(inspected(stretch, 1e3 * neo_hookean(stretch)))
+
+
 def test_cycles_that_are_all_used_and_hysteresis_are_said(inspected):
     stretch, _ = cycles([1.3, 1.3], rows=50)
     unloads = np.diff(stretch, append=1.0) < 0

@@ -161,6 +161,21 @@ def test_a_prediction_far_beyond_the_data_keeps_them_legible(posterior, data):
     axis.figure.draw_without_rendering()
 
 
+@pytest.mark.parametrize("mode", ["uniaxial", "planar"])
+def test_vague_data_keep_an_axis_that_is_read_and_it_says_where_the_bands_end(mode):
+    vague = tq.simulate("neo-hookean", {"C10": 0.5}, [0.98, 1.0, 1.02, 1.04], noise_sd=0.02, seed=1)
+    posterior = gallery.fit(vague.labelled(stress_unit="kPa"), discrepancy="none", noise_sd=0.3)
+    axis = posterior.plot_prediction(mode)
+    low, high = axis.get_ylim()
+    table = posterior.predict(np.linspace(0.98, 1.04, 61), mode=mode)
+    assert low < table["median"].min() < table["median"].max() < high
+    measured = 1000 * vague.stress if mode == "uniaxial" else table["median"].to_numpy()
+    assert high - low < 5.5 * max(np.ptp(measured), np.ptp(table["median"]))
+    (words,) = [text.get_text() for text in axis.texts]
+    numbers = [float(word) for word in words.removeprefix("bands go on to ").removesuffix(" kPa").split(" and ")]
+    assert numbers == pytest.approx([table["low"].min(), table["high"].max()], rel=0.1)
+
+
 def test_a_prediction_shows_the_bands_of_the_mode(posterior):
     axis = posterior.plot_prediction("equibiaxial", unit="MPa")
     median = by_label(axis)["predicted median"]

@@ -84,6 +84,20 @@ def test_fits_in_two_units_are_compared_and_averages_are_in_that_of_the_measurem
     assert min(medians[:2]) <= medians[2] <= max(medians[:2])
 
 
+def test_a_comparison_says_its_unit_and_takes_another(posterior, in_mpa):
+    fits = {"one": posterior, "two": posterior}
+    table, in_kpa = tq.compare(fits), tq.compare(fits, unit="kPa")
+    assert (table.columns.name, in_kpa.columns.name) == ("stresses in MPa", "stresses in kPa")
+    for name in ("median", "hdi_low", "hdi_high"):
+        np.testing.assert_allclose(in_kpa[name], 1000 * table[name])
+    np.testing.assert_allclose(table["log_evidence"], in_kpa["log_evidence"])
+
+
+def test_priors_of_labelled_arrays_say_in_what_they_are(posterior):
+    attributes = posterior.data.attrs
+    assert attributes["prior_C10"] == f"{posterior.model.priors['C10']}, in MPa"
+
+
 def test_notebooks_show_tables_with_units(posterior):
     page = posterior._repr_html_()
     assert "stresses in kPa" in page

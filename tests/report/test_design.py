@@ -10,7 +10,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.next_test.candidates import target_named
-from tissuq.report.design import design_figure, heading, readable_design, write_design
+from tissuq.report.design import design_figure, design_result, heading, readable_design
+from tissuq.report.writer import write_result
 from tissuq.studies.design import DesignSettings, DesignStudy
 
 
@@ -38,9 +39,10 @@ def test_numbers_are_in_the_unit_of_the_data(study):
 
 
 def test_everything_is_written(study, tmp_path):
-    write_design(study, study.settings, tmp_path)
+    write_result(design_result(study, study.settings), tmp_path)
     names = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.*")}
-    wanted = {"design.csv", "design.json", "run.toml", "report.html", "figures/design.svg", "figures/design.png"}
+    figures = {f"figures/{name}.{kind}" for name in ("answer", "design") for kind in ("svg", "png")}
+    wanted = {"design.csv", "design.json", "run.toml", "report.html", "result.json"} | figures
     assert names == wanted
     written = pd.read_csv(tmp_path / "design.csv", keep_default_na=False, na_values=["nan"])
     is_stress = study.table["target"] == "modulus"
@@ -57,7 +59,7 @@ def test_everything_is_written(study, tmp_path):
 
 
 def test_without_figures_there_are_none(study, tmp_path):
-    write_design(study, study.settings, tmp_path, figures=False)
+    write_result(design_result(study, study.settings), tmp_path, figures=False)
     assert not (tmp_path / "figures").exists()
     assert "<img" not in (tmp_path / "report.html").read_text()
 

@@ -8,7 +8,8 @@ import pytest
 import tissuq as tq
 from tissuq.report.run_folder import run_folder
 from tissuq.report.specimen import write_specimen_run
-from tissuq.studies.design import CandidateSettings, DesignSettings, run_design
+from tissuq.studies.design import run_design
+from tissuq.studies.design_settings import CandidateSettings, DesignSettings
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
 

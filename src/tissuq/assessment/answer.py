@@ -14,7 +14,7 @@ from tissuq.assessment.extent import shares_of_discrepancy
 from tissuq.assessment.modulus import modulus, modulus_symbols
 from tissuq.assessment.stability import StableRange
 from tissuq.errors import TissuqError
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
@@ -150,6 +150,7 @@ def _reporting(
     reasons_against = {
         "sampling has not converged": "not-converged" in codes,
         "what was read of the file is doubtful, as the warning says": "doubtful-reading" in codes,
+        "there is stress at rest, so that it may be off by far more than its interval": "stress-at-rest" in codes,
         "a bound of its prior, not the data, determines it": is_cut,
         "the fitted curve departs from the measured one, and the interval does not include that": (
             "unmodelled-curve" in codes
@@ -337,7 +338,7 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     reporting, _, others, simulating = (use.verdict for use in uses)
     codes = {warning.code for warning in warnings}
     model = solution.model
-    if reporting is not Verdict.YES and "measurements" in codes:
+    if reporting is not Verdict.YES and not codes.isdisjoint({"measurements", "stress-at-rest"}):
         return STEPS["measurements"]
     if not solution.is_of_data:
         return STEPS["export"]

@@ -195,13 +195,15 @@ EVIDENCE_CHANGES = (*SCALE_FACTORS, "boxes")
 """Changes of priors for which the change of the log evidence is given."""
 
 
-def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
+def compare(fits: Mapping[str, Any], unit: str = "MPa") -> pd.DataFrame:
     """Return fits of the same measurements side by side, that with the most evidence first.
 
     Parameters
     ----------
     fits : mapping of str to Posterior or xarray.DataTree
         By name; trees are those of `Posterior.data`, as saved files hold them.
+    unit : str
+        Of stress, such as ``"kPa"``; it stands at the head of the columns.
 
     Returns
     -------
@@ -219,7 +221,7 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
           at given nonlinear parameters, whose posterior without it follows by importance weights
           (`tissuq.prediction.densities`). is_rough marks fits in which too few of these weights are effective.
         - stacking: weights for an average of *predictions*, not of parameters.
-        - parameter, median, hdi_low, hdi_high: the material's first parameter and its 95 % interval, MPa.
+        - parameter, median, hdi_low, hdi_high: the material's first parameter and its 95 % interval, in the unit.
 
     Raises
     ------
@@ -263,7 +265,8 @@ def compare(fits: Mapping[str, Any]) -> pd.DataFrame:
         },
         list(trees),
     )
-    return table.sort_values(["log_evidence", "elpd"], ascending=False)
+    ordered = table.sort_values(["log_evidence", "elpd"], ascending=False)
+    return in_unit(ordered, ["median", "hdi_low", "hdi_high"], unit)
 
 
 def _tree(fit: Any) -> xr.DataTree:

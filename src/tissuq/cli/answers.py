@@ -8,18 +8,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tissuq.cli.reading import DIMENSIONS, OPTIONS, settings_of
+from tissuq.cli.command import slots_of, stated
 from tissuq.errors import InputError
+from tissuq.studies.measured_file import ReadingSettings
 
 __all__ = ["Answer", "answers_in", "options_in", "with_options"]
 
 SWITCHES = {"compression-positive": True, "tension-positive": False, "until-peak": True}
 """Options without a value, and what they say."""
-SETTINGS = {"compression-positive": "compression_positive", "tension-positive": "compression_positive"}
-SETTINGS |= {"stretch": "stretch_range", "mode": "mode"}
-"""Names of settings that are not those of their options."""
-NUMBERS = ("table", "every", "mean_of", "skip_rows")
-"""Settings that are whole numbers."""
+READING = {slot.typed.removeprefix("--"): slot for slot in slots_of(ReadingSettings)}
+"""How every option of reading is taken, by its name; that which says no stands for the same setting."""
+READING |= {slot.option.negative: slot for slot in READING.values() if slot.option.negative}
+DIMENSIONS = tuple(name for name, slot in READING.items() if slot.path[0] == "dimensions")
+"""Options that are sizes."""
 OPTION = re.compile(r"""--(?P<name>[a-z]+(?:-[a-z]+)*)(?: (?P<value>(?:[\w.]+=)?(?:'[^']*'|"[^"]*"|[^\s;,()'"]+)))?""")
 OTHER_ROLES = re.compile(r"\(or ((?:\w+=(?:, | or )?)+)\)")
 """As in ``--column stress=NAME (or force=)``."""
@@ -76,15 +77,16 @@ def answers_in(message: str, columns: Sequence[str], settings: Mapping[str, Any]
     end = -1
     for match in OPTION.finditer(message):
         name, value = match["name"], (match["value"] or "").rstrip(".:")
-        if _setting(name) not in {*OPTIONS, "mode"}:
+        if name not in READING:
             continue
         value = "" if name in SWITCHES else "".join(shlex.split(value)) if value.count("'") % 2 == 0 else value
         value = "" if value in WORDS else value
         is_joined = match.start() == end + 1 and found and not found[-1].leaves_out
         end = match.start() + len(f"--{name}") if name in SWITCHES else match.end()
         if not value and "eave" in message[: match.start()].rpartition(". ")[2]:
-            if {**settings, **(settings.get("dimensions") or {})}.get(_setting(name)) is not None:
-                found.append(Answer(((f"--{name}", ""),), _setting(name)))
+            setting = READING[name].path[-1]
+            if {**settings, **(settings.get("dimensions") or {})}.get(setting) is not None:
+                found.append(Answer(((f"--{name}", ""),), setting))
         elif name == "column":
             roles = [value.partition("=")[0], *_other_roles(message[match.end() :])]
             names = list(filter(None, columns)) if value.partition("=")[2] in PLACEHOLDERS else []
@@ -121,7 +123,7 @@ def options_in(text: str) -> tuple[tuple[str, str], ...]:
     while words:
         name = words.pop(0)
         plain = name.removeprefix("--")
-        if plain == name or _setting(plain) not in {*OPTIONS, "mode"}:
+        if plain == name or plain not in READING:
             raise InputError(f"'{name}' is no option of reading; write one such as --length '20 mm'.")
         if plain not in SWITCHES and not words:
             raise InputError(f"{name} needs a value.")
@@ -135,26 +137,20 @@ def with_options(settings: Mapping[str, Any], answer: Answer) -> dict[str, Any]:
         sizes = {name: size for name, size in (settings.get("dimensions") or {}).items() if name != answer.leaves_out}
         kept = {name: value for name, value in settings.items() if name != answer.leaves_out}
         return {**kept, "dimensions": sizes or None}
-    values: dict[str, Any] = dict.fromkeys(OPTIONS)
-    mode = settings.get("mode")
+    values: dict[str, Any] = {}
     for name, value in answer.options:
-        setting = _setting(name)
-        if setting == "mode":
-            mode = value
-        elif setting in ("column", "only"):
-            values[setting] = [*(values[setting] or []), value]
+        slot = READING[name]
+        if slot.reads is int and value.isdecimal():
+            values[slot.name] = int(value)
+        elif slot.reads in (str, int):
+            values[slot.name] = value
         else:
-            values[setting] = SWITCHES.get(name, int(value) if setting in NUMBERS and value.isdecimal() else value)
-    merged = dict(settings) | {"mode": mode}
-    for setting, value in settings_of(values).items():
-        if value is not None:
-            known = merged.get(setting)
-            merged[setting] = {**known, **value} if isinstance(value, dict) and isinstance(known, dict) else value
+            values[slot.name] = SWITCHES[name] if name in SWITCHES else [*values.get(slot.name, []), value]
+    merged = dict(settings)
+    for setting, value in stated(READING.values(), values)[0].items():
+        known = merged.get(setting)
+        merged[setting] = {**known, **value} if isinstance(value, dict) and isinstance(known, dict) else value
     return merged
-
-
-def _setting(name: str) -> str:
-    return SETTINGS.get(name, name.replace("-", "_"))
 
 
 def _other_roles(text: str) -> list[str]:

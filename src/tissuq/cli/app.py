@@ -2,36 +2,57 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from io import TextIOWrapper
-from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from tissuq.cli import (
     calibrate,
     catalogue,
+    compare,
+    design,
     ensemble,
+    export,
     fit,
     inspect,
+    paper,
+    population,
+    predict,
     project,
-    runs,
+    schema,
+    show,
     structure,
     study,
 )
-from tissuq.cli.former_names import Renamed
+from tissuq.cli.command import Command
+from tissuq.cli.stopping import INTERRUPTED, TERMINATED, Stopped, end_on_request
 from tissuq.errors import TissuqError
 
 __all__ = ["app", "main"]
 
-INTERRUPTED = 130
-"""The exit status that Typer gives to Ctrl-C."""
-TERMINATED = 128 + signal.SIGTERM
+
+class Commands(TyperGroup):
+    """The commands, which help lists by what they are for."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands under their headings, each with the beginning of what it does."""
+        limit = formatter.width - 6 - max(map(len, self.commands))
+        rows: dict[str, list[tuple[str, str]]] = {}
+        for name, command in self.commands.items():
+            if not command.hidden:
+                heading = str(getattr(command, "rich_help_panel", ""))
+                rows.setdefault(heading, []).append((name, command.get_short_help_str(limit)))
+        for heading, of_heading in rows.items():
+            with formatter.section(heading):
+                formatter.write_dl(of_heading)
+
 
 app = typer.Typer(
     name="tissuq",
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -55,32 +76,30 @@ def _tissuq(
     """Parameters of hyperelastic soft-tissue models, with uncertainty that can be trusted."""
 
 
-app.command("init")(project.init)
-app.command("paper", cls=Renamed)(study.paper)
-app.command("inspect")(inspect.inspect)
-app.command("fit")(fit.fit)
-app.command("predict", cls=Renamed)(runs.predict)
-app.command("population", cls=Renamed)(fit.population)
-app.command("calibrate")(calibrate.calibrate)
-app.command("compare")(runs.compare)
-app.command("design", cls=Renamed)(runs.design)
-app.command("export", cls=Renamed)(runs.export)
-app.command("structure", cls=Renamed)(structure.structure)
-app.command("ensemble")(ensemble.ensemble)
-app.command("simulate", cls=Renamed, hidden=True, deprecated=True)(structure.structure)
-app.command("show")(runs.show)
-app.command("materials")(catalogue.materials)
-app.command("modes")(catalogue.modes)
-app.command("check")(catalogue.check)
-app.command("discrepancies")(catalogue.discrepancies)
-app.add_typer(study.study)
-app.command("datasets")(catalogue.datasets)
-app.command("doctor")(project.doctor)
+COMMANDS: dict[str, dict[str, Any]] = {
+    "Start here": {"init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show},
+    "After a fit": {
+        "predict": predict.predict, "compare": compare.compare, "design": design.design, "export": export.export,
+        "structure": structure.structure, "ensemble": ensemble.ensemble,
+    },
+    "Several specimens, expensive models": {"population": population.population, "calibrate": calibrate.calibrate},
+    "How far to trust it": {"paper": paper.paper, "check": catalogue.check},
+    "What there is": {
+        "materials": catalogue.materials, "modes": catalogue.modes, "discrepancies": catalogue.discrepancies,
+        "datasets": catalogue.datasets, "doctor": project.doctor, "schema": schema.schema,
+    },
+}  # fmt: skip
+"""The commands, under the headings of the help."""
+for heading, commands in COMMANDS.items():
+    for name, function in commands.items():
+        app.command(name, cls=Command, rich_help_panel=heading)(function)
+app.add_typer(study.study, rich_help_panel="How far to trust it")
+app.command("simulate", cls=Command, hidden=True, deprecated=True)(structure.structure)
 
 
 def main() -> None:
     """Run the command line: exit status 2 with one message on bad input, 3 when sampling has not converged."""
-    signal.signal(signal.SIGTERM, _stop)
+    end_on_request()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that shows no ± shows a ? instead
@@ -93,12 +112,6 @@ def main() -> None:
         typer.echo(f"tissuq: {error}. Check the path, its permissions and the space on the disk.", err=True)
         sys.exit(2)
     except SystemExit as end:
-        if end.code in (INTERRUPTED, TERMINATED):
-            typer.echo("tissuq: stopped; no run was written (the same command resumes a campaign).", err=True)
+        if end.code in (INTERRUPTED, TERMINATED) and not isinstance(end, Stopped):
+            typer.echo("tissuq: stopped; no run was written.", err=True)
         raise
-
-
-def _stop(number: int, _: FrameType | None) -> None:
-    """End on a request to terminate as on an error, so that nothing half written is left."""
-    signal.signal(number, signal.SIG_IGN)
-    sys.exit(TERMINATED)

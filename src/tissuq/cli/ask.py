@@ -146,7 +146,7 @@ def _with_sizes(answer: Answer) -> Answer:
 
 
 def _typed_size(name: str) -> str:
-    from tissuq.experiments.reading.dimensions import given_size
+    from tissuq.experiments.reading.dimensions_of_table import given_size
 
     while True:
         typed = _typed(f"{name}, with its unit: ")

@@ -4,30 +4,22 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from tissuq.cli.options import (
-    Config,
-    Figures,
-    RunDiscrepancy,
-    RunMaterial,
-    Scheduler,
-    Seed,
-    campaign_progress,
-    check_folder,
-    once_each,
-    own_law,
-    progress,
-    write_campaign_recipe,
-)
+from tissuq.cli.call import Call
+from tissuq.cli.campaign import check_folder, write_campaign_recipe
+from tissuq.cli.command import command
+from tissuq.cli.running import Configured, LawOfRun
 from tissuq.errors import InputError
-from tissuq.studies.settings import is_inside, load_settings
+from tissuq.studies.ensemble_settings import EnsembleSettings
+from tissuq.studies.option import argument, option
+from tissuq.studies.option_texts import once_each
+from tissuq.studies.settings import is_inside
 
 if TYPE_CHECKING:
-    from tissuq.studies.ensemble import EnsembleSettings, PreparedEnsemble
+    from tissuq.studies.ensemble import PreparedEnsemble
 
 __all__ = ["ensemble"]
 
@@ -35,107 +27,43 @@ POSTERIORS = "posteriors"
 """Folder with a copy of every run that draws come from."""
 
 
-def ensemble(
-    run: Annotated[Path | None, typer.Argument(help="Run folder of tissuq fit.")] = None,
-    model: Annotated[
-        Path | None,
-        typer.Argument(
-            help="Your model: a deck of CalculiX or Abaqus (.inp), FEBio (.feb), LS-DYNA (.k), ANSYS (.cdb)."
-        ),
-    ] = None,
-    material: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Name (ANSYS: number) of the material in the model that gets the draws; NAME=RUN takes them from "
-            "another run. Repeat for more."
-        ),
-    ] = None,
-    qoi: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Quantity of interest: NAME=RF3@SET, U1@SET, S11@SET, MISES@SET:max (CalculiX), or "
-            "NAME=file.py:function of the folder of a draw. Repeat for more."
-        ),
-    ] = None,
-    solver: Annotated[str | None, typer.Option(help="ccx, febio4 or command [that of the deck].")] = None,
-    command: Annotated[
-        str | None, typer.Option(help="Command of the solver, such as 'abaqus job={job} ask=off', {deck} with suffix.")
-    ] = None,
-    deck: Annotated[str | None, typer.Option(help="abaqus, febio, ls-dyna or ansys [what the file is].")] = None,
-    card_format: Annotated[str | None, typer.Option("--format", help="Format of cards [that of the solver].")] = None,
-    discrepancy: RunDiscrepancy = None,
-    draws: Annotated[int | None, typer.Option(help="Draws of the posterior [64].")] = None,
-    sampling: Annotated[str | None, typer.Option(help="How draws spread: sobol, latin or random [sobol].")] = None,
-    all_draws: Annotated[
-        bool, typer.Option("--all-draws", help="Keep draws that are not stable over the measured range.")
-    ] = False,
-    shares: Annotated[
-        bool, typer.Option(help="Run the draws without their discrepancy, too, for the shares of the variance.")
-    ] = True,
-    law: Annotated[str | None, typer.Option(help="Law of the cards, as of tissuq export.")] = None,
-    order: Annotated[int | None, typer.Option(help="Order or number of terms of that law.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of stress of the model: MPa, kPa or Pa [MPa].")] = None,
-    bulk_modulus: Annotated[
-        float | None, typer.Option(help="In that unit, of all draws [1000 times the mean initial shear modulus].")
-    ] = None,
-    poisson: Annotated[float | None, typer.Option(help="Instead: Poisson's ratio of all draws.")] = None,
-    fitted_law: RunMaterial = None,
-    also: Annotated[
-        list[Path] | None, typer.Option(help="Another file that the solver needs beside the deck; repeat for more.")
-    ] = None,
-    seed: Seed = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the ensemble [runs/RUN-MODEL].")] = None,
-    config: Config = None,
-    max_jobs: Annotated[
-        int | None, typer.Option(min=1, help="Runs of the solver at a time, as many as licences [one a core].")
-    ] = None,
-    scheduler: Scheduler = None,
-    timeout: Annotated[float | None, typer.Option(min=0, help="Seconds after which a run is stopped [never].")] = None,
-    retries: Annotated[int, typer.Option(min=0, help="Times that a failed run is made again, as for a licence.")] = 0,
-    again: Annotated[bool, typer.Option("--again", help="Make runs again that failed earlier.")] = False,
-    keep: Annotated[bool, typer.Option(help="Keep the solver's files of every draw.")] = True,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show what changes in the deck, and run nothing.")] = False,
-    figures: Figures = True,
-) -> None:
+class EnsembleOptions(LawOfRun, Configured):
+    """Where draws come from, and how the solver is run."""
+
+    run: Path | None = argument(None, "Run folder of tissuq fit.")
+    out: Path | None = option(None, "Folder of the ensemble [runs/RUN-MODEL].")
+    max_jobs: int | None = option(None, "Runs of the solver at a time, as many as licences [one a core].", ge=1)
+    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
+    timeout: float | None = option(None, "Seconds after which a run is stopped [never].", unit="s", ge=0)
+    retries: int = option(0, "Times that a failed run is made again, as for a licence.", ge=0)
+    again: bool = option(False, "Make runs again that failed earlier.")
+    keep: bool = option(True, "Keep the solver's files of every draw.")
+    dry_run: bool = option(False, "Show what changes in the deck, and run nothing.")
+    figures: bool = option(True, "Draw the figures.")
+
+
+@command(EnsembleSettings, EnsembleOptions)
+def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     """Run your own finite-element model with draws of a posterior; the same command resumes a stopped ensemble."""
     from tissuq.cli.tables import print_explanations, print_rows, print_warnings
     from tissuq.report.ensemble import readable_quantities, write_ensemble
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import check_source
-    from tissuq.studies.ensemble import EnsembleSettings, prepare_ensemble, run_ensemble
+    from tissuq.studies.ensemble import prepare_ensemble, run_ensemble
     from tissuq.studies.ensemble_files import forget_failures
     from tissuq.studies.stream import open_pool
 
-    if run is not None and model is None and run.is_file():
-        run, model = None, run  # every material has its own run
-    if bool(model) == bool(config) or (run and not model):
-        raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
-    options: dict[str, Any] = {
-        "model": str(model) if model else None, "materials": _materials(material or [], run) or None,
-        "quantities": _pairs("--qoi", qoi or [], "force=RF3@TOP") or None, "solver": solver, "command": command,
-        "deck": deck, "card_format": card_format, "discrepancy": discrepancy, "draws": draws, "sampling": sampling,
-        "all_draws": all_draws or None, "shares": None if shares else False, "law": law, "order": order, "unit": unit,
-        "bulk_modulus": bulk_modulus, "poisson": poisson, "also": [str(file) for file in also or []] or None,
-        "seed": seed,
-    }  # fmt: skip
-    for name, option in (("materials", "--material NAME"), ("quantities", "--qoi NAME=RF3@SET")):
-        if config is None and options[name] is None:
-            raise InputError(f"give {option}: what the model is asked for.")
-    settings = load_settings(EnsembleSettings, config, options)
-    beside = config.parent if config else Path()
-    if config:
-        _check_named_again(config, settings, options, dry_run)
+    how, settings, beside = call.how, _settings(call), call.beside
     sources = list(dict.fromkeys(settings.materials.values()))
-    named = beside if config else Path(sources[0])
-    folder = out or Path("runs") / f"{named.resolve().name}-{Path(settings.model).stem}"
-    if not config and not dry_run:
+    named = beside if call.config else Path(sources[0])
+    folder = how.out or Path("runs") / f"{named.resolve().name}-{Path(settings.model).stem}"
+    if not (call.config or how.dry_run):
         for source in sources:
             check_apart(folder, beside / source)
-    with progress() as step:
-        prepared = prepare_ensemble(
-            settings, beside, own_law(fitted_law), step, runs_here=not (dry_run or scheduler), is_dry=dry_run
-        )
-    if dry_run:
+    runs_here = not (how.dry_run or how.scheduler)
+    with call.monitor.steps() as step:
+        prepared = prepare_ensemble(settings, beside, call.law, step, runs_here=runs_here, is_dry=how.dry_run)
+    if how.dry_run:
         print(prepared.diff())
         print_explanations(prepared.card_warnings)
         return
@@ -144,34 +72,52 @@ def ensemble(
     for number, source in enumerate(sources, start=1):
         check_source(beside / source, folder / POSTERIORS / str(number))
     _write_inputs(prepared, stored, sources, beside, folder)
-    if again:
+    if how.again:
         forget_failures(prepared, folder)
-    processes = max_jobs or os.cpu_count() or 1
-    with open_pool(processes, scheduler) as pool:
+    with open_pool(how.max_jobs or os.cpu_count() or 1, how.scheduler) as pool:
         study = run_ensemble(
-            prepared, folder, pool=pool, limit=max_jobs if scheduler else None, timeout=timeout, retries=retries,
-            keep=keep, progress=campaign_progress,
+            prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
+            retries=how.retries, keep=how.keep, progress=call.campaign_in(folder),
         )  # fmt: skip
-    write_ensemble(study, folder, figures=figures)
+    write_ensemble(study, folder, figures=how.figures)
+    call.monitor.write_log(folder, study.warnings)
     print_rows(f"Model '{prepared.deck.main}' with {settings.draws} draws, at the end", *readable_quantities(study))
     print_explanations(prepared.card_warnings)
     print_warnings(study.warnings)
     print(f"Report: {folder / 'report.html'}")
 
 
-def _check_named_again(config: Path, settings: EnsembleSettings, options: dict[str, Any], dry_run: bool) -> None:
+def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings:
+    """Return the settings, with the run of every material."""
+    stated, run = call.stated, call.how.run
+    model = stated.get("model")
+    if run is not None and model is None and run.is_file():
+        run, model = None, str(run)  # every material has its own run
+    if bool(model) == bool(call.config) or (run and not model):
+        raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
+    materials = _materials(stated.get("materials", []), run)
+    for example, value in (("--material NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):
+        if call.config is None and not value:
+            raise InputError(f"give {example}: what the model is asked for.")
+    settings = call.loaded(model=model, materials=materials or None)
+    if call.config:
+        _check_named_again(call.config, settings, stated, is_dry=call.how.dry_run)
+    return settings
+
+
+def _check_named_again(config: Path, settings: EnsembleSettings, stated: Mapping[str, Any], *, is_dry: bool) -> None:
     """Refuse to run programs, or to read files elsewhere, that a recipe names and the command line does not."""
     from tissuq.mechanics.user_law import LAW
 
     missing = []
-    if not dry_run:
-        if settings.command and not options["command"]:
+    if not is_dry:
+        if settings.command and not stated.get("command"):
             missing.append(f"--command {shlex.quote(settings.command)}")
         for name, text in settings.quantities.items():
-            if LAW.fullmatch(text) and name not in (options["quantities"] or {}):
+            if LAW.fullmatch(text) and name not in stated.get("quantities", {}):
                 missing.append(f"--qoi {shlex.quote(f'{name}={text}')}")
     inside = config.parent.resolve()
-    if options["also"] is None and not all(is_inside(inside / file, inside) for file in settings.also):
+    if "also" not in stated and not all(is_inside(inside / file, inside) for file in settings.also):
         missing += [f"--also {shlex.quote(file)}" for file in settings.also]
     if missing:
         raise InputError(
@@ -222,13 +168,3 @@ def _materials(texts: list[str], run: Path | None) -> dict[str, str]:
             raise InputError(f"material '{name}' has no run: give its RUN before the model, or write {name}=RUN.")
         pairs.append((name, source or str(run)))
     return once_each("--material", pairs)
-
-
-def _pairs(option: str, texts: list[str], example: str) -> dict[str, str]:
-    pairs = []
-    for text in texts:
-        name, equals, value = (word.strip() for word in text.partition("="))
-        if not (name and equals and value):
-            raise InputError(f"'{text}' is not understood by {option}; write NAME=WHAT, as in {example}.")
-        pairs.append((name, value))
-    return once_each(option, pairs)

@@ -1,189 +1,120 @@
-"""``tissuq fit`` and ``population``: the own measurements of a user, of one specimen or of many."""
+"""``tissuq fit``: a material, or several, from the measured files of a user."""
 
 from __future__ import annotations
 
 from filecmp import cmp
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
-
-import typer
+from typing import TYPE_CHECKING
 
 from tissuq.cli import reading
-from tissuq.cli.options import Config, Figures, Force, Seed, not_converged, once_each, parse_prior, progress
-from tissuq.cli.reading import one_noise
+from tissuq.cli.call import Call, not_converged
+from tissuq.cli.command import command
+from tissuq.cli.running import Written
 from tissuq.errors import InputError
 from tissuq.result_warning import Severity
-from tissuq.studies.settings import load_settings, setting_of
+from tissuq.studies.measured_file import ReadingSettings
+from tissuq.studies.option import option
+from tissuq.studies.settings import setting_of
+from tissuq.studies.specimen_settings import ALL, LawSettings, SpecimenSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.mechanics import Material
     from tissuq.studies.laws import LawStudy
     from tissuq.studies.specimen import SpecimenStudy
 
-    Study = TypeVar("Study", SpecimenStudy, LawStudy)
-
-__all__ = ["fit", "population"]
+__all__ = ["fit"]
 
 
-@reading.reads_files
-def fit(
-    file: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            help="CSV, Excel or other file, or the name of a built-in data set (tissuq datasets); several files, a "
-            "folder of them, or several tests in a file are fitted together; FILE#NAME is one of these. Or STUDY.toml, "
-            "as tissuq inspect --write makes it."
-        ),
-    ] = None,
-    material: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Material, a sum (gent+mooney-rivlin), or your own law.py:Name [neo-hookean]; see tissuq materials. "
-            "Repeat for more, or 'all', to compare laws."
-        ),
-    ] = None,
-    discrepancy: Annotated[
-        list[str] | None,
-        typer.Option(help="Discrepancy; repeat for more; 'all' fits the paper's seven and auto [auto]."),
-    ] = None,
-    noise_sd: Annotated[
-        str | None,
-        typer.Option(
-            help="Sd of the noise of the engineering stress, in the file's stress unit, or unknown [unknown]; for "
-            "several files also one for each, with commas."
-        ),
-    ] = None,
-    noise: Annotated[
-        str | None,
-        typer.Option(
-            help="Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
-            "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again)."
-        ),
-    ] = None,
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more."),
-    ] = None,
-    estimand: Annotated[
-        str | None,
-        typer.Option(
-            help="What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a "
-            "careful laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens]."
-        ),
-    ] = None,
-    tolerance: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, "
-            "length=2%, slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of "
-            "every single stretch=0.001 or stress, resolution=0.2% (of the largest); or none; repeat."
-        ),
-    ] = None,
-    specimen: Annotated[
-        list[str] | None,
-        typer.Option(help="Name of the specimen, once for each of several files [each its own]."),
-    ] = None,
-    mode: Annotated[
-        list[str] | None,
-        typer.Option(help="Loading mode [uniaxial]; once for each of several files [as they or their names say]."),
-    ] = None,
-    *,
-    read_as: dict[str, Any],
-    method: Annotated[str | None, typer.Option(help="auto, exact, nuts, smc or joint [auto].")] = None,
-    stable_in: Annotated[
-        list[str] | None,
-        typer.Option(help="Require stability in this loading mode, or in all; repeat for more."),
-    ] = None,
-    held_out: Annotated[
-        bool | None, typer.Option("--held-out", help="Also predict each of several tests from the others.")
-    ] = None,
-    seed: Seed = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/NAME].")] = None,
-    config: Config = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> None:
+class FitOptions(Written):
+    """How files are taken, and how the run is written."""
+
+    specimen: tuple[str, ...] = option(
+        (), "Name of the specimen, once for each of several files [each its own].", group="Reading files"
+    )
+
+
+@command(SpecimenSettings, FitOptions)
+def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
     from tissuq.mechanics import material_named
-    from tissuq.posterior.laws import ALL_LAWS
-    from tissuq.report.run_folder import check_target
-    from tissuq.studies.laws import LawSettings
-    from tissuq.studies.specimen import SpecimenSettings
 
-    if config is None and file and [path.suffix for path in file] == [".toml"]:
-        config, file = file[0], None
-    files = reading.files_of(file or [])
-    options: dict[str, Any] = {
-        "discrepancies": discrepancy or None, "noise": noise, "method": method, "seed": seed,
-        "estimand": estimand, "tolerances": reading.tolerances(tolerance), "stable_in": stable_in or None,
-        "held_out": held_out,
-    }  # fmt: skip
-    measured, found = reading.measured([] if config else files, read_as, mode, specimen, noise_sd)
-    options |= measured
-    if prior:
-        options["priors"] = once_each("--prior", map(parse_prior, prior))
-    if not file and not config:
+    paths: list[Path] = call.stated.pop("file", [])
+    if call.config is None and [path.suffix for path in paths] == [".toml"]:
+        call, paths = call.with_config(paths[0]), []
+    files = reading.files_of(paths)
+    read_as = {name: call.stated.pop(name) for name in ReadingSettings.model_fields if name in call.stated}
+    modes, noise = read_as.pop("mode", None), call.stated.pop("noise_sd", None)
+    of_files = [] if call.config else files
+    measured, found = reading.measured(of_files, read_as, modes, call.how.specimen, noise)
+    if not (paths or call.config):
         raise InputError("give a FILE of measurements, the name of a built-in data set, or --config run.toml.")
-    if config and len(files) > 1:
+    if call.config and len(files) > 1:
         raise InputError("give FILES or --config, not both.")
-    names = material or []
-    is_comparison = len(names) > 1 or names == [ALL_LAWS]
-    if config and not names:
-        is_comparison = setting_of(config, "laws") is not None
-    options |= {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
-    own = {name: material_named(name, laws=True) for name in names if name != ALL_LAWS}
-    kind: type[SpecimenSettings] = LawSettings if is_comparison else SpecimenSettings
-    settings = load_settings(kind, config, options, rivals=("noise", "noise_sd"))
-    beside = config.parent if config else Path()
-    sources = [beside / test.file for test in settings.tests or (settings,)]
-    if files and config:
-        _check_same(files[0], sources[0], config)
-    target = out or Path("runs") / reading.run_name(file or [], config, sources)
-    check_target(target, force=force)
-    fit_all = _compare_laws if is_comparison else _fit_one
-    fit_all(settings, beside, own, found, sources, target, figures=figures, force=force)
+    names: list[str] = call.stated.pop("material", [])
+    is_comparison = len(names) > 1 or names == [ALL]
+    if call.config and not names:
+        is_comparison = setting_of(call.config, "laws") is not None
+    chosen = {"laws": tuple(names) or None} if is_comparison else {"material": names[0] if names else None}
+    own = {name: material_named(name, laws=True) for name in names if name != ALL}
+    kind = LawSettings if is_comparison else SpecimenSettings
+    settings = call.loaded_as(kind, ("noise", "noise_sd"), **measured, **chosen)
+    sources = [call.beside / test.file for test in settings.tests or (settings,)]
+    if files and call.config:
+        _check_same(files[0], sources[0], call.config)
+    target = call.target(Path("runs") / reading.run_name(paths, call.config, sources))
+    if isinstance(settings, LawSettings):
+        _compare_laws(call, settings, own, found, sources, target)
+    else:
+        _fit_one(call, settings, next(iter(own.values()), None), found, sources, target)
 
 
 def _fit_one(
-    settings: Any,
-    beside: Path,
-    own: dict[str, Material],
+    call: Call[SpecimenSettings, FitOptions],
+    settings: SpecimenSettings,
+    law: Material | None,
     found: list[Reading | None],
     sources: list[Path],
     target: Path,
-    **options: bool,
 ) -> None:
     """Fit one material, write the run and print its summary."""
     from tissuq.cli.tables import print_summary
+    from tissuq.report.answer import answer_record, readable_estimates
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import run_specimen
 
-    run = partial(run_specimen, settings, beside, law=next(iter(own.values()), None), found=found)
-    study = _written(run, write_specimen_run, sources, target, **options)
+    study = call.written(
+        target,
+        lambda step: run_specimen(settings, call.beside, step, law, found),
+        partial(write_specimen_run, sources=sources),
+    )
     print_summary(target, study.experiment)
+    record = answer_record(study.experiment.name, study.main, study.answer, study.unit, ())
+    call.answer([
+        {"name": estimate["name"], "text": estimate["value"], "remark": f"95 % interval {estimate['interval']}"}
+        for estimate in readable_estimates(record)
+    ])  # fmt: skip
     _print_omissions(study)
 
 
 def _compare_laws(
-    settings: Any,
-    beside: Path,
+    call: Call[SpecimenSettings, FitOptions],
+    settings: LawSettings,
     own: dict[str, Material],
     found: list[Reading | None],
     sources: list[Path],
     target: Path,
-    **options: bool,
 ) -> None:
     """Fit several laws, write the run and print their table."""
     from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
     from tissuq.studies.laws import run_laws
 
-    study = _written(
-        partial(run_laws, settings, beside, own=own, found=found), write_law_run, sources, target, **options
+    study = call.written(
+        target,
+        lambda step: run_laws(settings, call.beside, step, own, found),
+        partial(write_law_run, sources=sources),
     )
     problems = [warning for warning in study.warnings if warning.severity is Severity.PROBLEM]
     print_warnings(problems)
@@ -192,26 +123,6 @@ def _compare_laws(
     print_warnings([warning for warning in study.warnings if warning not in problems])
     print(f"Report: {target / 'report.html'}")
     _print_omissions(study)
-
-
-def _written(
-    run: Callable[..., Study],
-    write: Callable[..., None],
-    sources: list[Path],
-    target: Path,
-    *,
-    figures: bool,
-    force: bool,
-) -> Study:
-    """Return what comes of a run, when it is written into its folder."""
-    from tissuq.report.run_folder import run_folder
-
-    with progress() as step:
-        study = run(step=step)
-        step("writing")
-        with run_folder(target, force=force) as folder:
-            write(study, sources, folder, figures=figures)
-    return study
 
 
 def _print_omissions(study: SpecimenStudy | LawStudy) -> None:
@@ -232,75 +143,3 @@ def _check_same(file: Path, named: Path, config: Path) -> None:
             f"FILE '{file}' is not the file that '{config}' names, '{named}'. Leave FILE out to repeat that run, or "
             "leave --config out to fit FILE."
         )
-
-
-@reading.reads_files
-def population(
-    files: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            help="Files, a specimen each; or folders of them, in which a folder is a specimen with a file a test."
-        ),
-    ] = None,
-    specimen: Annotated[
-        str | None, typer.Option("--specimen-column", help="Column of a single file that names the specimens.")
-    ] = None,
-    material: Annotated[
-        str | None, typer.Option(help="Material, as for tissuq fit [neo-hookean]; see tissuq materials.")
-    ] = None,
-    parameter: Annotated[
-        list[str] | None, typer.Option(help="Parameter to pool; repeat for more [all of the material].")
-    ] = None,
-    spread: Annotated[
-        float | None, typer.Option(help="Sd of the half-normal prior of the spread of the logarithms [1].")
-    ] = None,
-    discrepancy: Annotated[str | None, typer.Option(help="Discrepancy of every specimen [auto].")] = None,
-    noise_sd: Annotated[
-        str | None, typer.Option(help="Sd of the noise, in the files' stress unit, or unknown [unknown].")
-    ] = None,
-    noise: Annotated[
-        str | None, typer.Option(help="Instead: unknown, proportional, repeats or another one, as for tissuq fit.")
-    ] = None,
-    mode: Annotated[
-        str | None, typer.Option(help="Loading mode of all files [as they or their names say, or uniaxial].")
-    ] = None,
-    *,
-    read_as: dict[str, Any],
-    method: Annotated[
-        str | None, typer.Option(help="Of every specimen's fit: auto, exact, nuts, smc or joint [auto].")
-    ] = None,
-    seed: Seed = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the run [runs/population].")] = None,
-    config: Config = None,
-    figures: Figures = True,
-    force: Force = False,
-) -> None:
-    """Identify a population from its specimens, every specimen within it, and what to expect for a new patient."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.mechanics import material_named
-    from tissuq.report.population import HEADERS, readable_population, write_population_run
-    from tissuq.report.run_folder import check_target, run_folder
-    from tissuq.studies.population import PopulationSettings, run_population
-
-    if bool(files) == bool(config):
-        raise InputError("give the FILES of several specimens, folders of them, or --config run.toml.")
-    options: dict[str, Any] = read_as | {
-        "files": tuple(map(str, files)) if files else None, "specimen": specimen, "material": material,
-        "parameters": tuple(parameter) if parameter else None, "spread": spread, "discrepancy": discrepancy,
-        "noise_sd": one_noise(noise_sd), "noise": noise, "mode": mode, "method": method, "seed": seed,
-    }  # fmt: skip
-    law = material_named(material, laws=True) if material else None
-    settings = load_settings(PopulationSettings, config, options, rivals=("noise", "noise_sd"))
-    beside = config.parent if config else Path()
-    target = out or Path("runs") / "population"
-    check_target(target, force=force)
-    with progress() as step:
-        study = run_population(settings, beside, step, law)
-        step("writing")
-        with run_folder(target, force=force) as folder:
-            write_population_run(study, folder, beside, figures=figures)
-    print_rows(f"A population of {len(study.tests)} specimens", HEADERS, readable_population(study))
-    print("Complete pooling treats all specimens as one: its interval does not describe the range of patients.")
-    print_warnings(study.warnings)
-    print(f"Report: {target / 'report.html'}")
-    not_converged([] if study.population.converged else ["the population"])

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
 
-from typer.core import TyperCommand
-
-__all__ = ["FORMER_NAMES", "Renamed"]
+__all__ = ["FORMER_NAMES", "todays_names"]
 
 FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -27,14 +24,8 @@ FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
 """By command: the name today of every option that had another one."""
 
 
-class Renamed(TyperCommand):
-    """A command that takes its options under their former names, too."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return what Click leaves of the arguments, former names replaced."""
-        return super().parse_args(ctx, [_today(argument, FORMER_NAMES.get(self.name or "", {})) for argument in args])
-
-
-def _today(argument: str, names: Mapping[str, str]) -> str:
-    option, equals, value = argument.partition("=")
-    return names.get(option, option) + equals + value
+def todays_names(command: str, arguments: Sequence[str]) -> list[str]:
+    """Return what was typed after a command, with every option under its name today."""
+    names = FORMER_NAMES.get(command, {})
+    options = [argument.partition("=") for argument in arguments]
+    return [names.get(option, option) + equals + value for option, equals, value in options]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from tissuq.cli.ask import ask_about
-from tissuq.cli.options import Force
-from tissuq.cli.reading import Mode, files_of, find_tests, reads_files
+from tissuq.cli.call import Call
+from tissuq.cli.command import command
+from tissuq.cli.reading import files_of, find_tests
+from tissuq.cli.running import Running
 from tissuq.errors import InputError
+from tissuq.studies.measured_file import ReadingSettings
+from tissuq.studies.option import argument, option
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.experiment_file import Reading
@@ -18,38 +20,42 @@ if TYPE_CHECKING:
 __all__ = ["inspect"]
 
 
-@reads_files
-def inspect(
-    file: Annotated[
-        list[Path],
-        typer.Argument(help="CSV, Excel or other files, folders of them, FILE#NAME for one test in a file, data sets."),
-    ],
-    mode: Mode = None,
-    *,
-    read_as: dict[str, Any],
-    write: Annotated[
-        Path | None, typer.Option(help="Write what was understood into this TOML file, to edit and to fit.")
-    ] = None,
-    ask: Annotated[
-        bool, typer.Option("--ask", help="Ask where files leave a choice, and write what was understood [study.toml].")
-    ] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for figure, converted data and what is printed.")] = None,
-    force: Force = False,
-) -> None:
+class InspectedFiles(ReadingSettings):
+    """Files, and how they are read."""
+
+    file: tuple[Path, ...] = argument(
+        ...,
+        "CSV, Excel or other files, folders of them, FILE#NAME for one test in a file, data sets.",
+        takes=list[Path],
+    )
+
+
+class InspectOptions(Running):
+    """What is made of what was understood."""
+
+    write: Path | None = option(None, "Write what was understood into this TOML file, to edit and to fit.")
+    ask: bool = option(False, "Ask where files leave a choice, and write what was understood [study.toml].")
+    out: Path | None = option(None, "Folder for figure, converted data and what is printed.")
+    force: bool = option(False, "Replace an existing folder of the same kind.")
+
+
+@command(InspectedFiles, InspectOptions)
+def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
     """Show what is understood of files of measurements: tests, columns, dimensions, cycles, rows, noise, warnings."""
     from tissuq.experiments.reading.inspection import Inspection, overview
     from tissuq.report.run_folder import check_target, run_folder
     from tissuq.studies.study_file import study_file
 
+    write, ask, out, force = call.how.write, call.how.ask, call.how.out, call.how.force
     if out is not None:
         check_target(out, force=force)
     if ask and write is None:
         write = Path("study.toml")
     if write is not None and write.exists() and not force:
         raise InputError(f"'{write}' exists. Give another name, or --force to replace it.")
-    files = files_of(file)
+    settings: dict[str, Any] = dict(call.stated)
+    files = files_of(settings.pop("file"))
     tests: list[tuple[dict[str, Any], Reading]] = []
-    settings = read_as | {"mode": mode}
     for path in files:
         if ask:
             found, settings = ask_about(path, settings, is_only_file=len(files) == 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,9 @@ from tissuq.errors import InputError
 from tissuq.report.answer import ANSWER, readable_estimates, shown_and_folded
 from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, RECIPE
 from tissuq.report.tables import headline_of
-from tissuq.result_warning import Severity, in_shell
+from tissuq.report.terminal import TEXT_WIDTH, print_explanations, print_rows, print_warnings
+from tissuq.report.writer import contents_for_programs
+from tissuq.result_warning import Severity
 from tissuq.studies.settings import DAMAGE, damage_reported, load_settings
 
 if TYPE_CHECKING:
@@ -21,34 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["print_explanations", "print_json", "print_rows", "print_summary", "print_warnings"]
 
-TEXT_WIDTH = 96
-"""Letters in a line of prose."""
-
 SUMMARY = "summary.json"
-
-
-def print_rows(title: str, headers: list[str], rows: list[list[str]]) -> None:
-    """Print a table whose first column is text and whose others are numbers."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    for index, header in enumerate(headers):
-        table.add_column(header, justify="right" if index else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*map(str, row))
-    console = Console(markup=False, emoji=False)  # names may hold brackets and colons
-    needed = console.measure(table, options=console.options.update(max_width=1000)).maximum
-    console.width = max(console.width, needed)  # truncated numbers would mislead
-    console.print(table)
 
 
 def print_summary(folder: Path, experiment: Experiment | None = None, *, details: bool = False) -> None:
@@ -102,24 +76,14 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
 
 
 def print_json(folder: Path) -> None:
-    """Print all that a run says as one JSON object: answer, summary, assessment, predictions of held-out tests.
+    """Print all that a run says as one JSON object: what its JSON files hold, by their names.
 
     Raises
     ------
     InputError
         When the folder is not that of a complete run.
     """
-    files = {"answer": ANSWER, "summary": SUMMARY, "assessment": ASSESSMENT, "held_out": HELD_OUT_TESTS}
-    if not (folder / SUMMARY).exists():
-        raise InputError(f"'{folder}' is not the folder of a complete run: {SUMMARY} is missing.")
-    contents = {}
-    for name, file in files.items():
-        with damage_reported(folder / file):
-            if (folder / file).exists():
-                contents[name] = json.loads((folder / file).read_text(encoding="utf-8"))
-    if "answer" in contents:
-        contents["answer"]["next"] = str(contents["answer"]["next"]).replace("{run}", shlex.quote(str(folder)))
-    print(json.dumps(contents, indent=2))
+    print(json.dumps(contents_for_programs(folder), indent=2))
 
 
 def _answer(folder: Path) -> dict[str, Any] | None:
@@ -208,18 +172,6 @@ def _print_held_out(path: Path, headline: str, unit: str) -> None:
         rows = in_mpa(rows, [f"{headline}_{name}" for name in HELD_OUT_HEADLINE])
         cells = [list(map(str, row)) for row in readable_held_out(rows, headline, stress_unit(unit))]
     print_rows("Each test predicted from the others", [*HELD_OUT, f"{headline} of the others, {unit}"], cells)
-
-
-def print_warnings(warnings: Sequence[str]) -> None:
-    """Print warnings about a result."""
-    for text in map(in_shell, warnings):
-        print(fill(text, TEXT_WIDTH, initial_indent="Warning: ", subsequent_indent="  ", break_on_hyphens=False))
-
-
-def print_explanations(explanations: Sequence[str]) -> None:
-    """Print how to read a table."""
-    for text in explanations:
-        print(fill(text, TEXT_WIDTH, initial_indent="- ", subsequent_indent="  "))
 
 
 def _read_run(

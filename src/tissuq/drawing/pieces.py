@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
 
-__all__ = ["band", "density", "forest", "heat", "line", "outside", "points", "rows"]
+__all__ = ["band", "cut_off", "density", "forest", "heat", "line", "outside", "points", "rows"]
 
 FloatArray = NDArray[np.float64]
 
@@ -162,3 +162,15 @@ def outside(axis: Axes, low: float, high: float, label: str) -> None:
             label = ""
             edge = end if start == start_limit else start
             axis.axvline(edge, color=BASE, lw=1.1 * relative_size(), ls="--", zorder=0.5)
+
+
+def cut_off(axis: Axes, low: ArrayLike, high: ArrayLike, unit: str) -> None:
+    """Say in a corner how far bands go beyond the limits of the vertical axis, where they do."""
+    start, end = axis.get_ylim()
+    ends = float(np.nanmin(low)), float(np.nanmax(high))
+    beyond = [value for value, is_beyond in zip(ends, (ends[0] < start, ends[1] > end), strict=True) if is_beyond]
+    if beyond:
+        size = max(map(abs, beyond))
+        numbers = " and ".join(f"{value:.2g}" if size < 1e6 else f"{value:.0e}" for value in beyond)
+        axis.text(0.02, 0.98, f"bands go on to {numbers} {unit}", transform=axis.transAxes, va="top",
+                  fontsize="small", color=INK)  # fmt: skip

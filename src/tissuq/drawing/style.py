@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "ANSWER_WIDTH",
     "BAND",
     "BASE",
     "COLUMN",
@@ -37,6 +38,8 @@ MARKERS = "osD^vP*"
 """Marks of things side by side."""
 COLUMN, PAGE = 89 / 25.4, 183 / 25.4
 """Widths of a column and of a page of a journal, inches."""
+ANSWER_WIDTH = 5.0
+"""Width of a figure beside the answer of a page, whose letters can be read on a screen of 400 px; inches."""
 BASE_SIZE = 10
 """Size of letters, in points, to which widths of lines and sizes of marks are given."""
 STYLE: dict[Any, Any] = {

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.units import is_quantity, unit_of
+from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
 __all__ = ["checked", "checked_points", "in_mpa"]
@@ -41,8 +41,8 @@ def in_mpa(stress: Any, unit: str | None) -> tuple[Any, str]:
     """Return stresses in MPa, and the unit in which people want to read them."""
     if is_quantity(stress):
         return _magnitude(stress, "megapascal"), stress_unit_of(unit or unit_of(stress)).name
-    given = stress_unit_of(unit or "MPa")
-    return _numbers("stress", stress) * given.to_mpa, given.name
+    shown = stress_unit_of(unit or "MPa")
+    return _numbers("stress", stress) * shown.to_mpa, shown.name
 
 
 def _magnitude(values: Any, unit: str) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any
@@ -14,75 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from tissuq.drawing.panels import panels
 from tissuq.errors import InputError
 from tissuq.experiments.checked_arrays import checked, checked_points, in_mpa
-from tissuq.experiments.modes import LoadingMode, Path, States, loading_mode
+from tissuq.experiments.curve import Curve, draw_curves, small_svg
+from tissuq.experiments.modes import LoadingMode, States, loading_mode
 from tissuq.experiments.modes.path import UNMEASURED
-from tissuq.experiments.picture import draw_curves, small_svg
 from tissuq.experiments.units import stress_unit as stress_unit_of
 
-__all__ = ["Curve", "Experiment"]
+__all__ = ["Experiment"]
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """One stress that a test measured, and where.
-
-    Parameters
-    ----------
-    mode : LoadingMode
-        How the specimen was loaded.
-    channel : int
-        The number of the stress among those of the mode.
-    points : (n,) or (n, c) array, dimensionless
-        What the mode controls.
-    stress : (n,) array, MPa
-        Engineering stress.
-    standard_error : (n,) array, MPa
-        Of a stress that is the mean of several specimens; zero of one that is not.
-    name, source, stress_unit, specimen : str
-        Those of the test.
-    least_errors : mapping of str to float
-    direction, condition : str
-        Those of the test.
-    """
-
-    mode: LoadingMode
-    channel: int
-    points: FloatArray
-    stress: FloatArray
-    standard_error: FloatArray
-    name: str
-    source: str
-    stress_unit: str
-    specimen: str
-    least_errors: Mapping[str, float] = field(default_factory=dict)
-    direction: str = ""
-    condition: str = ""
-
-    def __len__(self) -> int:
-        return len(self.stress)
-
-    @property
-    def path(self) -> Path:
-        """What the stress does work along."""
-        return self.mode.paths[self.channel]
-
-    @property
-    def abscissa(self) -> FloatArray:
-        """What the stress is drawn against, (n,)."""
-        return np.asarray(self.path.abscissa(self.points))
-
-    @property
-    def abscissa_name(self) -> str:
-        """What `abscissa` is called on an axis."""
-        controls = self.mode.controls
-        return controls[0].name if len(controls) == 1 else "stretch"
-
-    @property
-    def quantity(self) -> str:
-        """What the mode calls the stress."""
-        return self.mode.stresses[self.channel]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -176,9 +115,9 @@ class Experiment:
             if errors.shape != stresses.shape or (errors < 0).any():
                 raise InputError(f"experiment '{name}': give one standard error for every stress, none negative.")
         columns = zip(stresses.reshape(len(stresses), -1).T, errors.reshape(len(stresses), -1).T, strict=True)
-        labels, least = (name, source, unit, specimen), dict(least_errors or {})
+        labels, errors_at_least = (name, source, unit, specimen), dict(least_errors or {})
         curves = tuple(
-            Curve(mode, channel, points, *column, *labels, least, direction, condition)
+            Curve(mode, channel, points, *column, *labels, errors_at_least, direction, condition)
             for channel, column in enumerate(columns)
         )
         object.__setattr__(self, "curves", curves)

@@ -28,8 +28,8 @@ def in_unit(table: pd.DataFrame, columns: Sequence[str], unit: str) -> pd.DataFr
     stresses in kPa  stretch  low
     0                    1.1  2.0
     """
-    given = stress_unit(unit)
-    return headed(table.assign(**{name: table[name] / given.to_mpa for name in columns}), given)
+    shown = stress_unit(unit)
+    return headed(table.assign(**{name: table[name] / shown.to_mpa for name in columns}), shown)
 
 
 def headed(table: pd.DataFrame, unit: StressUnit) -> pd.DataFrame:

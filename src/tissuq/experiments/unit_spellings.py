@@ -24,57 +24,14 @@ SPELLINGS |= {"millimeters": "mm", "millimetres": "mm", "centimeter": "cm", "cen
 SPELLINGS |= {"centimetres": "cm", "meter": "m", "metre": "m", "meters": "m", "metres": "m", "micrometers": "um"}
 SPELLINGS |= {"micrometres": "um", "millinewton": "mN", "millinewtons": "mN", "kilonewton": "kN", "kilonewtons": "kN"}
 """Units in other spellings, in small letters."""
-SYMBOLS = (
-    {"Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi"}
-    | {"bar", "mbar", "atm", "mmHg", "mmhg", "Hg", "torr", "Torr", "cmH2O", "mmH2O"}
-    | {
-        "N",
-        "mN",
-        "uN",
-        "nN",
-        "pN",
-        "cN",
-        "dN",
-        "daN",
-        "hN",
-        "kN",
-        "MN",
-        "kgf",
-        "gf",
-        "kp",
-        "dyn",
-        "dyne",
-        "lbf",
-        "lbF",
-        "lb",
-        "kg",
-        "g",
-    }
-    | {
-        "m",
-        "cm",
-        "mm",
-        "um",
-        "micron",
-        "nm",
-        "in",
-        "inch",
-        "ft",
-        "h",
-        "min",
-        "sec",
-        "Sec",
-        "s",
-        "ms",
-        "Hz",
-        "K",
-        "C",
-        "F",
-    }
-    | {"Nm", "mNm", "uNm", "nNm", "kNm", "Ncm", "mNcm", "Nmm", "mNmm"}
-    | {"px", "pixel", "pixels", "Pixel", "Pixels", "pix"}
-    | {"V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct"}
-)
+SYMBOLS = {
+    "Pa", "hPa", "kPa", "MPa", "GPa", "KPa", "kpa", "mPa", "Mpa", "MPA", "mpa", "psi", "ksi",
+    "bar", "mbar", "atm", "mmHg", "mmhg", "Hg", "torr", "Torr", "cmH2O", "mmH2O",
+    "N", "mN", "uN", "nN", "pN", "cN", "dN", "daN", "hN", "kN", "MN", "kgf", "gf", "kp", "dyn", "dyne", "lbf", "lbF",
+    "lb", "kg", "g", "m", "cm", "mm", "um", "micron", "nm", "in", "inch", "ft", "px", "pixel", "pixels", "Pixel",
+    "Pixels", "pix", "h", "min", "sec", "Sec", "s", "ms", "Hz", "K", "C", "F", "Nm", "mNm", "uNm", "nNm", "kNm", "Ncm",
+    "mNcm", "Nmm", "mNmm", "V", "mV", "deg", "degrees", "rad", "mrad", "percent", "pct",
+}  # fmt: skip
 """Of quantities of any kind."""
 
 

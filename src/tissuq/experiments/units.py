@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from math import pi, prod
 from typing import Any
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import number_and_unit, sides_and_unit
+from tissuq.experiments.pint_units import is_quantity, stress_factor, unit_of
 from tissuq.experiments.unit_spellings import SPELLINGS, SYMBOLS, in_latin
 
 __all__ = [
@@ -28,14 +28,12 @@ __all__ = [
     "TORQUE",
     "Quantity",
     "StressUnit",
-    "is_quantity",
     "looks_like_unit",
     "measured_in",
     "strain_factor",
     "stress_in_mpa",
     "stress_unit",
     "stress_units_in",
-    "unit_of",
 ]
 
 COMMON_STRESS_UNITS = {
@@ -63,13 +61,6 @@ STRAIN_UNITS |= dict.fromkeys(["%", "percent", "pct"], 0.01)
 STRAIN_UNITS |= dict.fromkeys(["‰", "permille", "mε", "millistrain"], 1e-3)
 STRAIN_UNITS |= dict.fromkeys(["µε", "με", "microstrain"], 1e-6)
 
-LONGEST_UNIT = 40
-"""Characters."""
-UNIT_EXPRESSION = re.compile(
-    r"(?:[^\W\d]\w*|(?:\^|\*\*)\s*\(?[+-]?\d(?:\.\d)?\)?(?!\s*[\d^*])|1(?![\d.])|[%‰°*/·.()\s⁻⁰¹²³⁴⁵⁶⁷⁸⁹])++"
-)
-"""Products, quotients and powers of names, and no arithmetic of numbers, which could take for ever."""
-
 POWER_OF_TEN = re.compile(
     r"(?:10\s*(?:(?:\^|\*\*)\s*\(?(?P<power>[+-]?\d+)\)?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]+))|1[eE](?P<digits>[+-]?\d+))"
     r"\s*[*·⋅]?\s*(?P<unit>[^\W\d].*)"
@@ -80,7 +71,6 @@ LARGEST_POWER = 12
 """Exponent of ten before a unit, at most."""
 BRACKETS = "[](){}<>"
 """What units stand in, not always well matched."""
-SUGGESTED_UNITS = "Write a unit of stress such as MPa, kPa, Pa, N/mm2, kgf/cm2 or psi."
 MASSES = ("g", "kg", "lb")
 """Units of mass that are written where units of force are meant."""
 
@@ -132,7 +122,7 @@ def stress_unit(text: str) -> StressUnit:
     if compact.lower() in PASCALS:
         compact = PASCALS[compact.lower()]
     factor = COMMON_STRESS_UNITS.get(compact)
-    return StressUnit(name, _factor_from_pint(in_latin(name)) if factor is None else factor)
+    return StressUnit(name, stress_factor(in_latin(name)) if factor is None else factor)
 
 
 def _without_power(unit: str) -> tuple[float, str]:
@@ -333,23 +323,6 @@ def measured_in(unit: str) -> str:
     )
 
 
-def is_quantity(values: Any) -> bool:
-    """Tell whether values are a quantity of pint, of whatever registry."""
-    return hasattr(values, "magnitude") and hasattr(values, "is_compatible_with")
-
-
-def unit_of(quantity: Any) -> str:
-    """Return the unit of a quantity of pint in short; an empty text for plain numbers.
-
-    Examples
-    --------
-    >>> import pint
-    >>> unit_of(pint.UnitRegistry().Quantity([1.0, 2.0], "kilopascal"))
-    'kPa'
-    """
-    return f"{quantity.units:~C}".replace("**", "")
-
-
 def looks_like_unit(text: str) -> bool:
     """Tell whether a cell beneath a column name reads as a unit of anything: ``[kPa]``, ``%``, ``s``."""
     text = in_latin(text.strip())
@@ -373,51 +346,3 @@ def stress_units_in(text: str) -> list[str]:
     """
     words = re.findall(r"[^\W\d_]+(?:/[^\W\d_]+[2²])?", in_latin(text.replace("^", "")))
     return [word for word in words if word in COMMON_STRESS_UNITS or word.lower() in PASCALS.keys() - {"pa"}]
-
-
-def _factor_from_pint(name: str) -> float:
-    for spelling in (name, _spelled_for_pint(name)):
-        quantity = _parsed_by_pint(spelling)
-        if quantity is not None and quantity.check("[pressure]"):
-            return float(quantity.to("megapascal").magnitude)
-        if quantity is not None and quantity.check("[mass] / [length]**2"):
-            raise InputError(
-                f"'{name}' is a mass over an area, not a stress. If the unit of force is meant, write it as "
-                "a force: kgf/cm2, gf/mm2 or lbf/in2 (psi)."
-            )
-        if quantity is not None and quantity.check("[force] / [length]"):
-            raise InputError(
-                f"'{name}' is a force over a width, not a stress. Say that the column holds forces (--column "
-                "force=NAME) and give the undeformed thickness (--thickness)."
-            )
-        if quantity is not None and quantity.check("[force]"):
-            raise InputError(
-                f"'{name}' is a force, not a stress. Say that the column holds forces (--column force=NAME) and give "
-                "the undeformed cross-section (--area)."
-            )
-        if quantity is not None:
-            raise InputError(f"'{name}' is not a unit of stress (a force over an area). {SUGGESTED_UNITS}")
-    raise InputError(f"the unit '{name}' is not known. {SUGGESTED_UNITS}")
-
-
-def _spelled_for_pint(name: str) -> str:
-    """Rewrite powers without a mark (mm2), dots as products (N.mm-2) and the kilopond."""
-    spelling = re.sub(r"(?<=[^\W\d_])(-?\d+)(?![^\W\d_])", r"^\1", name.replace("²", "2").replace("**", ""))
-    spelling = re.sub(r"(?<=\w)[.·](?=[^\W\d_])", "*", spelling)
-    return re.sub(r"\bkp\b", "kgf", spelling)
-
-
-def _parsed_by_pint(spelling: str) -> Any | None:
-    if len(spelling) > LONGEST_UNIT or not UNIT_EXPRESSION.fullmatch(spelling):
-        return None
-    try:
-        return _pint_registry().Quantity(1.0, spelling)
-    except Exception:  # pint raises a dozen unrelated types (TypeError, AttributeError, tokenize errors)
-        return None
-
-
-@cache
-def _pint_registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry()

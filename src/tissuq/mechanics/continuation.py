@@ -88,9 +88,9 @@ def sum_of_energies(
 ) -> Any:
     """Return the energy (MPa) of materials and a discrepancy at principal stretches whose product is one."""
 
-    def energy(within: tuple[Any, ...]) -> Any:
-        total = sum(material.energy(within, numbers) for material, numbers in zip(materials, values, strict=True))
-        return total if discrepancy is None else total + discrepancy(within)
+    def energy(state: tuple[Any, ...]) -> Any:
+        total = sum(material.energy(state, numbers) for material, numbers in zip(materials, values, strict=True))
+        return total if discrepancy is None else total + discrepancy(state)
 
     return energy(stretches) if continuation is None else continuation(energy, stretches)
 

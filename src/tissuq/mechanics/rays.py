@@ -78,14 +78,14 @@ class Range(NamedTuple):
     logarithms: tuple[float, float] = (-np.inf, np.inf)
     along_axes: tuple[tuple[float, float, float], ...] = ()
 
-    def within(self, other: Range) -> Range:
+    def within(self, limits: Range) -> Range:
         """Return what lies in both."""
-        (low, high), (other_low, other_high) = self.logarithms, other.logarithms
+        (low, high), (other_low, other_high) = self.logarithms, limits.logarithms
         return Range(
-            min(self.invariant_1, other.invariant_1),
-            min(self.invariant_2, other.invariant_2),
+            min(self.invariant_1, limits.invariant_1),
+            min(self.invariant_2, limits.invariant_2),
             (max(low, other_low), min(high, other_high)),
-            (*self.along_axes, *other.along_axes),
+            (*self.along_axes, *limits.along_axes),
         )
 
     @property

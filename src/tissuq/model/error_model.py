@@ -163,9 +163,11 @@ def _errors_of_tests(specimens: NDArray[np.bool_], tolerances: Tolerances, tests
     groups = []
     for shared, membership in memberships.items():
         columns = [tolerances.columns(points, shared) for points in tests]
-        widest = max(part.shape[1] for part in columns)
-        padded = [np.pad(part, [(0, 0), (0, widest - part.shape[1])]) for part in columns]
-        groups.append(np.concatenate([np.kron(part, row[None]) for part, row in zip(padded, membership, strict=True)]))
+        widest = max(column.shape[1] for column in columns)
+        padded = [np.pad(column, [(0, 0), (0, widest - column.shape[1])]) for column in columns]
+        groups.append(
+            np.concatenate([np.kron(column, row[None]) for column, row in zip(padded, membership, strict=True)])
+        )
     return np.hstack(groups)
 
 

@@ -243,7 +243,7 @@ class StatisticalModel(ErrorModel):
         numbers = np.unique(member[: len(member) * self.material.is_isotropic])
         limits = [self.energy_members[number].limits for number in numbers]
         for distinct in dict.fromkeys(limits):
-            alike = [number for number, other in zip(numbers, limits, strict=True) if other == distinct]
+            alike = [number for number, values in zip(numbers, limits, strict=True) if values == distinct]
             yield distinct, np.flatnonzero(np.isin(member, alike))
 
     def energy_features(self, member: int) -> list[FloatArray]:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution
 from tissuq.inference.threads import one_thread
-from tissuq.prediction.bands import Band, predict_band, predict_bands
+from tissuq.prediction.bands import Band, inside_band, predict_bands
 from tissuq.prediction.moments import drawn_curves
 
 __all__ = ["Described", "Way", "described", "points_along", "share_along", "ways_of"]
@@ -39,34 +40,76 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Described:
-    """A measured curve and what a posterior says of it, MPa.
+    """A measured curve and what a posterior says of it, MPa: every band is computed when it is first asked for.
 
     Attributes
     ----------
+    solution : Solution
     curve : Curve
-    measurements, stress : Band
-        Of new measurements and of the stress itself, with the discrepancy.
-    alone : Band or None
-        Of the stress of the material alone; None where there is no discrepancy.
-    ways : list of Way
-        The paths that the points of the bands follow.
+    prob : float
+        Probability of the bands, equal tails.
     """
 
+    solution: Solution
     curve: Curve
-    measurements: Band
-    stress: Band
-    alone: Band | None
-    ways: list[Way]
+    prob: float = 0.95
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """The points of the bands: over the range of the curve, or its own where the test has several controls."""
+        return points_along(self.curve, POINTS)
+
+    @property
+    def measurements(self) -> Band:
+        """Of new measurements, with the discrepancy."""
+        return self._joint[0]
+
+    @property
+    def stress(self) -> Band:
+        """Of the stress itself, with the discrepancy."""
+        return self._joint[1]
+
+    @property
+    def measurements_alone(self) -> Band:
+        """Of new measurements of the material alone."""
+        return self._alone[0]
+
+    @property
+    def stress_alone(self) -> Band:
+        """Of the stress of the material alone."""
+        return self._alone[1]
+
+    @property
+    def has_discrepancy(self) -> bool:
+        """Whether there is a discrepancy, without which the material alone is all."""
+        return bool(self.solution.model.discrepancy.parameters)
+
+    @cached_property
+    def ways(self) -> list[Way]:
+        """The paths that the points of the bands follow."""
+        return ways_of(self.curve.mode, self.points, self.stress.stretch)
+
+    @cached_property
+    def inside(self) -> NDArray[np.bool_]:
+        """Which measurements are inside the band of new ones, with the discrepancy."""
+        return inside_band(self.solution, self.curve, discrepancy=True, prob=self.prob)
+
+    @cached_property
+    def _joint(self) -> list[Band]:
+        return self._bands(True)
+
+    @cached_property
+    def _alone(self) -> list[Band]:
+        return self._bands(False) if self.has_discrepancy else self._joint
+
+    def _bands(self, discrepancy: bool) -> list[Band]:
+        options: dict[str, Any] = {"prob": self.prob, "mode": self.curve.mode, "channel": self.curve.channel}
+        return predict_bands([(1.0, self.solution)], self.points, (True, False), discrepancy=discrepancy, **options)
 
 
-def described(solution: Solution, curve: Curve, prob: float = 0.95) -> Described:
-    """Return the bands of a measured curve, over its range or at its points where the test has several controls."""
-    points = points_along(curve, POINTS)
-    options: dict[str, Any] = {"prob": prob, "mode": curve.mode, "channel": curve.channel}
-    measurements, stress = predict_bands([(1.0, solution)], points, (True, False), **options)
-    has_discrepancy = bool(solution.model.discrepancy.parameters)
-    alone = predict_band(solution, points, discrepancy=False, noise=False, **options) if has_discrepancy else None
-    return Described(curve, measurements, stress, alone, ways_of(curve.mode, points, stress.stretch))
+def described(solution: Solution, prob: float = 0.95) -> list[Described]:
+    """Return what a posterior says of every measured curve."""
+    return [Described(solution, curve, prob) for curve in solution.model.experiment.curves]
 
 
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.assessment.stability import calibrated_range, is_calibrated
 from tissuq.drawing.panels import Panels, limits_of, within
-from tissuq.drawing.pieces import band, line, outside, points
+from tissuq.drawing.pieces import band, cut_off, line, outside, points
 from tissuq.drawing.style import BASE, INK, relative_size
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.modes import LoadingMode
@@ -41,6 +41,8 @@ REACH = 0.35
 """How far a prediction goes beyond what was measured on either side, over the measured range."""
 LESSER_REACHES = (REACH, REACH / 3, REACH / 10)
 """The same where a material locks before."""
+KNOWN_MARGIN, NEAR_MARGIN = 0.75, 0.25
+"""Of calibrated bands, over the range of measurements and medians, and of others, over that: how much an axis shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,18 +168,24 @@ def prediction(drawn: Panels, found: Sequence[Predicted], unit: StressUnit, prob
 
 
 def predicted_limits(found: Sequence[Predicted]) -> tuple[float, float]:
-    """Return the ends of an axis, MPa: what is calibrated or measured, the medians, and some of the bands beyond."""
-    core, beyond = list[FloatArray](), list[FloatArray]()
+    """Return the ends of an axis, MPa: what is measured, the medians, and of bands what is not far from them."""
+    core, known_ends, beyond = list[FloatArray](), list[FloatArray](), list[FloatArray]()
     for of in found:
-        known = of.is_calibrated if of.is_calibrated.any() else np.ones_like(of.is_calibrated)
-        core += [values[known] for values in (of.measurements.low, of.measurements.high)]
-        core += [of.measured.stress] if of.measured is not None else []
+        known = _known(of)
+        core += [of.stress.median[known], *([of.measured.stress] if of.measured is not None else [])]
+        known_ends += [values[known] for values in (of.measurements.low, of.measurements.high)]
         beyond += [of.measurements.low, of.measurements.high]
+    core.append(np.array(limits_of(core, known_ends, KNOWN_MARGIN)))
     low, high = limits_of(core, [])
     extent = high - low
     medians = [np.clip(of.stress.median, low - extent, high + extent) for of in found]
-    near = [np.clip(ends, low - 0.5 * extent, high + 0.5 * extent) for ends in beyond]
+    near = [np.clip(ends, low - NEAR_MARGIN * extent, high + NEAR_MARGIN * extent) for ends in beyond]
     return limits_of([*core, *medians, *near], [])
+
+
+def _known(found: Predicted) -> NDArray[np.bool_]:
+    """Return where a prediction is calibrated, or everywhere where it is nowhere."""
+    return found.is_calibrated if found.is_calibrated.any() else np.ones_like(found.is_calibrated)
 
 
 def draw_predicted(
@@ -199,6 +207,8 @@ def draw_predicted(
     margin = 0.02 * max(float(np.ptp(at)), 0.1 * abs(float(at.max())))
     axis.set_xlim(at.min() - margin, at.max() + margin)
     axis.set_ylim(ends)
+    known = _known(found)
+    cut_off(axis, found.measurements.low[known] / scale, found.measurements.high[known] / scale, unit.name)
     axis.locator_params(axis="x", nbins=6)
     size = relative_size()
     if found.calibrated is not None:

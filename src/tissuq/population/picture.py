@@ -11,15 +11,12 @@ from numpy.typing import NDArray
 from tissuq.drawing.panels import Panels
 from tissuq.drawing.pieces import forest
 from tissuq.drawing.style import BAND, BASE, INK, TRUTH, relative_size
-from tissuq.experiments.units import StressUnit
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from tissuq.population.population import Population
-
-__all__ = ["draw_specimens", "height_of", "numbers_of", "unit_factor"]
+__all__ = ["draw_specimens", "height_of", "numbers_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -30,18 +27,21 @@ SMALL_MARKS_ABOVE = 25
 """Number of specimens above which names and marks are smaller."""
 
 
-def draw_specimens(drawn: Panels, population: Population, unit: StressUnit) -> None:
-    """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order."""
-    symbols, summary = population.symbols, numbers_of(population.summary(unit="MPa"))
-    table = numbers_of(population.specimen_summary(unit="MPa"))
-    order = sorted(population.names, key=lambda name: table[name, symbols[0]]["median"])
+def draw_specimens(
+    drawn: Panels, summary: pd.DataFrame, specimen_summary: pd.DataFrame, units: Mapping[str, str]
+) -> None:
+    """Draw a caterpillar plot, a panel a parameter: specimens alone and within the population, in the same order.
+
+    The tables are those of a `Population`, in the unit of each parameter.
+    """
+    quantities, specimens = numbers_of(summary), numbers_of(specimen_summary)
+    names, first_symbol = dict.fromkeys(name for name, _ in specimens), next(iter(units))
+    order = sorted(names, key=lambda name: specimens[name, first_symbol]["median"])
     small, size = len(order) > SMALL_MARKS_ABOVE, relative_size()
-    for number, (panel, symbol) in enumerate(zip(drawn.axes, symbols, strict=True)):
-        factor, name_of_unit = unit_factor(population, symbol, unit)
-        estimates = {key: np.array([table[name, symbol][key] for name in order]) / factor for key in COLUMNS}
+    for number, (panel, (symbol, unit)) in enumerate(zip(drawn.axes, units.items(), strict=True)):
+        estimates = {key: np.array([specimens[name, symbol][key] for name in order]) for key in COLUMNS}
         new, median, complete = (
-            [summary[symbol, name][end] / factor for end in ENDS]
-            for name in ("new patient", "median", "complete pooling")
+            [quantities[symbol, name][end] for end in ENDS] for name in ("new patient", "median", "complete pooling")
         )
         panel.axvspan(*new, color=BAND, alpha=0.10, lw=0, label="a new patient, 95 %")
         panel.axvspan(*median, color=BAND, alpha=0.28, lw=0, label="median of the population")
@@ -49,24 +49,17 @@ def draw_specimens(drawn: Panels, population: Population, unit: StressUnit) -> N
         _draw_specimens(panel, estimates, small)
         panel.set_xlim(*_limits([*new, *estimates["hdi_low"], *estimates["hdi_high"]], estimates))
         panel.locator_params(axis="x", nbins=6)
-        panel.set_xlabel(f"{symbol} [{name_of_unit}]" if name_of_unit else symbol)
-        names = order if number % drawn.columns == 0 else [""] * len(order)
-        panel.set_yticks(range(len(order)), names, fontsize=(6.5 if small else 9) * size)
+        panel.set_xlabel(f"{symbol} [{unit}]" if unit else symbol)
+        labels = order if number % drawn.columns == 0 else [""] * len(order)
+        panel.set_yticks(range(len(order)), labels, fontsize=(6.5 if small else 9) * size)
         panel.tick_params(axis="y", length=0)
         panel.set_ylim(-0.8, len(order) - 0.2)
     drawn.explain(2)
 
 
-def height_of(population: Population, letters: float = 1.0) -> float:
-    """Return the height of a panel, inches, for letters of a size over the usual one."""
-    count = len(population.names)
+def height_of(count: int, letters: float = 1.0) -> float:
+    """Return the height of a panel of so many specimens, inches, for letters of a size over the usual one."""
     return letters * (1.2 + (0.15 if count > SMALL_MARKS_ABOVE else 0.27) * count)
-
-
-def unit_factor(population: Population, symbol: str, unit: StressUnit) -> tuple[float, str]:
-    """Return what one unit of a parameter is in MPa, and the unit's name."""
-    parameter = next(p for p in population.complete.model.parameters if p.symbol == symbol)
-    return (unit.to_mpa, unit.name) if parameter.unit else (1.0, "")
 
 
 def numbers_of(table: pd.DataFrame) -> dict[Any, dict[str, float]]:

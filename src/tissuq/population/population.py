@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tissuq.drawing.panels import panels
+from tissuq.drawing.panels import Panels, panels
 from tissuq.errors import InputError
 from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
@@ -163,10 +163,10 @@ class Population:
         units = {posterior.unit().name for posterior in self.posteriors.values()}
         return stress_unit(name or (units.pop() if len(units) == 1 else "MPa"))
 
-    def _unit_of(self, symbol: str, unit: StressUnit) -> float:
-        """Return what one unit of a parameter is in MPa, or in its own unit, where stresses are in a unit."""
+    def unit_of(self, symbol: str, unit: StressUnit) -> StressUnit:
+        """Return the unit of a parameter where stresses are in a unit: that one, or none of a plain number."""
         parameters = self.complete.model.parameters
-        return unit.to_mpa if next(p for p in parameters if p.symbol == symbol).unit else 1.0
+        return unit if next(p for p in parameters if p.symbol == symbol).unit else StressUnit("", 1.0)
 
     def summary(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
         """Return median and interval of every pooled parameter, by partial and by complete pooling.
@@ -191,7 +191,7 @@ class Population:
         _check_probability(prob)
         rows = {}
         for index, (symbol, is_log) in enumerate(zip(self.symbols, self.coordinates.is_log, strict=True)):
-            factor = self._unit_of(symbol, self.unit(unit))
+            factor = self.unit_of(symbol, self.unit(unit)).to_mpa
             for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
                 is_ratio = name == "spread" and is_log
                 rows[symbol, name] = np.array(_interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
@@ -219,7 +219,7 @@ class Population:
             for column, symbol in enumerate(self.symbols):
                 marginal = posterior.marginals[symbol]
                 single = float(marginal.quantile(0.5)), *marginal.hdi(prob)
-                factor = self._unit_of(symbol, self.unit(unit))
+                factor = self.unit_of(symbol, self.unit(unit)).to_mpa
                 rows[name, symbol] = np.array([*_interval(draws[..., i, column], prob), *single]) / factor
         index = pd.MultiIndex.from_tuples(rows, names=["specimen", "parameter"])
         columns = [*INTERVAL_COLUMNS, *(f"alone_{end}" for end in INTERVAL_COLUMNS)]
@@ -317,9 +317,14 @@ class Population:
         -------
         Axes, or (d,) array of Axes
         """
-        with panels(ax, len(self.symbols), height=height_of(self, 0.8)) as drawn:
-            draw_specimens(drawn, self, self.unit(unit))
+        with panels(ax, len(self.symbols), height=height_of(len(self.names), 0.8)) as drawn:
+            self.draw(drawn, self.unit(unit))
         return drawn.result
+
+    def draw(self, drawn: Panels, unit: StressUnit) -> None:
+        """Draw `plot` on panels, one a parameter, with stresses in a unit."""
+        units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols}
+        draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units)
 
     def _repr_html_(self) -> str:
         """Return the population's parameters in the unit of the measurements as a table, which notebooks show."""

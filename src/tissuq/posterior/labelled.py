@@ -98,7 +98,8 @@ def labels_of(solution: Solution, seed: int, headline: Mapping[str, float]) -> d
     labels |= {"headline": model.headline, "stress_unit": model.experiment.stress_unit}
     labels |= {f"headline_{name}": float(headline[name]) for name in ("median", "hdi_low", "hdi_high")}
     labels |= {f"evidence_change_{name}": change for name, change in known_evidence_changes(solution).items()}
-    labels |= {f"prior_{symbol}": str(prior) for symbol, prior in model.priors.items()}
+    units = {parameter.symbol: ", in MPa" if parameter.unit else "" for parameter in model.parameters}
+    labels |= {f"prior_{symbol}": f"{prior}{units[symbol]}" for symbol, prior in model.priors.items()}
     if solution.stable_in:
         labels["stable_in"] = ", ".join(solution.stable_in)
     if solution.diagnostics is not None:

@@ -13,6 +13,7 @@ from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.solution import Solution
 from tissuq.pictures.answer import answer, discrepancy_shares, has_shares
+from tissuq.pictures.curves import described
 from tissuq.pictures.parameters import MODULUS, marginal_of, marginals, parameters_to_show, ridges
 from tissuq.pictures.prediction import prediction, predictions
 from tissuq.pictures.stability import stability
@@ -75,7 +76,7 @@ class PosteriorPlots:
         """
         count = len(self.solution.model.experiment.curves)
         with panels(ax, count, has_strips=has_shares(self.solution)) as drawn:
-            answer(self.solution, drawn, self._unit(unit), prob)
+            answer(described(self.solution, prob), drawn, self._unit(unit))
         return drawn.result
 
     def plot_prediction(

@@ -135,15 +135,15 @@ def _instability(solution: Solution, stable_range: StableRange) -> ResultWarning
 
 def _correlated_residuals(model: StatisticalModel, lag1: float) -> ResultWarning:
     """Return the warning about residuals that are not independent, and what is likely to cure it."""
-    text = f"residuals are autocorrelated (lag-1 correlation {lag1:.2f}): "
+    finding = f"residuals are autocorrelated (lag-1 correlation {lag1:.2f})"
     if not model.energy_symbols:
         return ResultWarning(
-            text + "the fitted curve departs systematically from the measured one, and the intervals do not include "
-            "that. Fit with {discrepancy}.",
+            "the fitted curve departs systematically from the measured one, and the intervals do not include that: "
+            f"{finding}. Fit with {{discrepancy}}.",
             "unmodelled-curve",
             discrepancy="auto",
         )
-    text += "the errors of consecutive measurements are not independent, and the intervals are too narrow. "
+    text = f"{finding}: the errors of consecutive measurements are not independent, and the intervals are too narrow. "
     if model.noise.is_consecutive:
         return ResultWarning(text + "Fit with fewer points.", "correlated-residuals")
     return ResultWarning(

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.experiments.checked_arrays import checked_points
-from tissuq.experiments.experiment import Curve, Experiment
+from tissuq.experiments.curve import Curve
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.quasi_monte_carlo import systematic
 from tissuq.inference.solution import Solution

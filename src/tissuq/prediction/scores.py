@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.inference.solution import Solution
 from tissuq.prediction.bands import asked_for, centre_and_ends, predictive_mixtures
 

@@ -89,7 +89,7 @@ class Stress:
         count, scores = len(self.components), self.components.root.shape[2]
         copies = -(-MIN_DRAWS // count)
         uniform = qmc.Sobol(scores + 1, rng=0).random_base2((count * copies - 1).bit_length())[: count * copies]
-        many = self.components[np.repeat(np.arange(count), copies)]
-        mean = many.mean + np.einsum("mpq,mq->mp", many.root, ndtri(uniform[:, 1:]))
+        states = self.components[np.repeat(np.arange(count), copies)]
+        mean = states.mean + np.einsum("mpq,mq->mp", states.root, ndtri(uniform[:, 1:]))
         probability = uniform[:, 0] if self.errs_beyond else np.full(len(uniform), 0.5)
-        return replace(many, mean=mean, weights=many.weights / copies), probability
+        return replace(states, mean=mean, weights=states.weights / copies), probability

@@ -5,45 +5,67 @@ The page draws it with uPlot (MIT licence, 51 kB, embedded); without scripts and
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.drawing.panels import limits_of
 from tissuq.errors import TissuqError
-from tissuq.experiments.experiment import Curve, Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
+from tissuq.pictures.curves import Described, described
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import predict_band, predict_bands
+from tissuq.prediction.bands import Band, predict_bands
 
 __all__ = ["chart_data"]
 
 FloatArray = NDArray[np.float64]
 
 GRID_POINTS = 41
-"""Stretches at which bands are drawn, besides those of the measurements."""
+"""Stretches at which the bands of a mode that was not measured are drawn."""
 MAX_MEASUREMENTS = 1000
 """Measurements of a curve that are drawn, spread over it."""
 DIGITS = 5
 """Significant digits of the numbers on the page."""
-SLIDER_SDS = 5.0
-"""Standard deviations on each side of the mean that a slider of a parameter covers."""
+SLIDER_SDS, SLIDER_TAIL = 5.0, 0.001
+"""Reach of a slider: standard deviations on each side of the mean; for an exponent the probability beyond an end."""
+NODES, MAX_ERROR = 9, 0.01
+"""Values of an exponent at which the material's curve is known, and error of a curve between them over its largest."""
 
 
-class _View(NamedTuple):
-    """A stress to draw: its name, mode and channel, the points of its curve, and the measurements there (or nan)."""
+class _Test(NamedTuple):
+    """A stress to draw: its name, mode and channel, points (g,) along one path, and the measurements, MPa."""
 
     name: str
     mode: LoadingMode
     channel: int
     points: FloatArray
+    measured_at: FloatArray
     measured: FloatArray
+    is_curve: bool = True
+
+    @property
+    def abscissa(self) -> FloatArray:
+        return np.asarray(self.mode.paths[self.channel].abscissa(self.points))
 
 
-def chart_data(posteriors: Mapping[str, Posterior], main: str, unit: StressUnit) -> dict[str, Any]:
+class _Bands(NamedTuple):
+    """Bands of new measurements and of the stress, with the discrepancy and without where there is one."""
+
+    measurements: Band
+    stress: Band
+    alone: Band | None
+
+
+def chart_data(
+    posteriors: Mapping[str, Posterior],
+    main: str,
+    unit: StressUnit,
+    found: Mapping[str, Sequence[Described]] | None = None,
+) -> dict[str, Any]:
     """Return the data of the chart, stresses in a unit.
 
     Parameters
@@ -53,100 +75,182 @@ def chart_data(posteriors: Mapping[str, Posterior], main: str, unit: StressUnit)
     main : str
         The formulation that is shown first, and alone with loading modes that were not measured.
     unit : StressUnit
+    found : mapping of str to sequence of Described, optional
+        What the posteriors say of their curves, of which nothing is computed anew.
 
     Returns
     -------
     dict
-        ``views``, one a formulation and stress, with columns x, measured, low, median, high (of measurements),
-        stress_low, stress_high (of the stress itself), alone_low, alone, alone_high (of the material alone) and basis
-        (the stress of the material per unit of each parameter); ``parameters``, the linear ones of the material; and
-        ``unit``.
+        ``tests``, one a stress, with x, the measurements, and basis (at every node of the exponent the stress of the
+        material per unit of each linear parameter); ``views``, one a formulation and test, with low, median, high (of
+        new measurements), stress_low, stress_high (of the stress itself), and alone_low, alone, alone_high (of the
+        material alone, where there is a discrepancy), and the limits of the axis; ``parameters`` with the ranges of
+        sliders, the linear ones first; ``nodes`` of an exponent that has a slider; ``fixed``, the parameters that stay
+        at their medians; and ``unit``.
     """
-    names = sorted(posteriors, key=lambda name: name != main)
-    views = [
-        _drawn(name, posteriors[name], view, unit)
-        for name in names
-        for view in (*_measured_views(posteriors[name].model.experiment), *_other_views(posteriors[name], name == main))
-    ]
+    known = found or {name: described(posterior.solution) for name, posterior in posteriors.items()}
+    first = posteriors[main]
+    tests = [*_measured(known[main]), *_others(first)]
+    sliders = _Sliders(first, unit)
+    views = []
+    for name in sorted(posteriors, key=lambda name: name != main):
+        drawn = [*_of_measured(known[name]), *(_of_others(first, tests) if name == main else [])]
+        views += [
+            {"formulation": name, "test": number, **_columns(bands, tests[number], unit)}
+            for number, bands in enumerate(drawn)
+            if bands is not None
+        ]
     return {
         "unit": unit.name,
-        "views": [view for view in views if view],
-        "parameters": _sliders(posteriors[main], unit),
+        "tests": [_test(test, sliders.basis(test), unit) for test in tests],
+        "views": views,
+        "parameters": sliders.linear + ([sliders.exponent] if sliders.exponent else []),
+        "nodes": _rounded(sliders.nodes) if sliders.exponent else [],
+        "fixed": sliders.fixed,
     }
 
 
-def _measured_views(experiment: Experiment) -> Iterator[_View]:
-    for curve in experiment.curves:
-        points, measured = _with_grid(curve)
-        name = f"{curve.name}, {curve.quantity}" if len(experiment.curves) > 1 else curve.mode.name
-        yield _View(name, curve.mode, curve.channel, points, measured)
+def _measured(found: Sequence[Described]) -> Iterator[_Test]:
+    """Yield the measured curves, of those with several paths each path."""
+    for of in found:
+        curve = of.curve
+        name = curve.name if len(found) > 1 else curve.mode.name
+        name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
+        for number, (places, is_curve) in enumerate(of.ways, 1):
+            rows = _spread(np.argsort(curve.abscissa, kind="stable") if of.points.ndim == 1 else places)
+            named = f"{name}, path {number}" if len(of.ways) > 1 else name
+            yield _Test(named, curve.mode, curve.channel, of.points[places], curve.abscissa[rows], curve.stress[rows],
+                        is_curve)  # fmt: skip
 
 
-def _with_grid(curve: Curve) -> tuple[FloatArray, FloatArray]:
-    """Return points in the order of the abscissa, measured ones with a grid between them, and the stresses or nan."""
-    order = np.argsort(curve.abscissa, kind="stable")
-    rows = order[np.unique(np.linspace(0, len(order) - 1, min(len(order), MAX_MEASUREMENTS)).astype(int))]
-    points, stress = curve.points[rows], curve.stress[rows]
-    if points.ndim > 1:
-        return points, stress
-    grid = np.linspace(points.min(), points.max(), GRID_POINTS)
-    points, stress = np.r_[points, grid], np.r_[stress, np.full(GRID_POINTS, np.nan)]
-    order = np.argsort(points, kind="stable")
-    return points[order], stress[order]
+def _spread(places: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return so many places as are drawn, spread over all."""
+    count = min(len(places), MAX_MEASUREMENTS)
+    return np.asarray(places[np.unique(np.linspace(0, len(places) - 1, count).astype(int))])
 
 
-def _other_views(posterior: Posterior, is_main: bool) -> Iterator[_View]:
+def _others(posterior: Posterior) -> Iterator[_Test]:
     """Yield the loading modes of one stretch that were not measured, over the strains that were."""
-    measured = {mode.name for mode in posterior.model.experiment.modes}
-    for name, stable_range in posterior.stable_ranges.items() if is_main else ():
+    measured, none = {mode.name for mode in posterior.model.experiment.modes}, np.zeros(0)
+    for name, stable_range in posterior.stable_ranges.items():
         if name not in measured:
             points = np.linspace(stable_range.low, stable_range.high, GRID_POINTS)
-            yield _View(f"{name} (predicted)", loading_mode(name), 0, points, np.full(GRID_POINTS, np.nan))
+            yield _Test(f"{name} (predicted)", loading_mode(name), 0, points, none, none)
 
 
-def _drawn(formulation: str, posterior: Posterior, view: _View, unit: StressUnit) -> dict[str, Any]:
-    """Return the columns of a view, none where a formulation says nothing about it."""
-    model = posterior.model
-    options: dict[str, Any] = {"mode": view.mode, "channel": view.channel}
-    unique, rows = np.unique(view.points, axis=0, return_inverse=True)
-    try:
-        of_measurements, of_stress = predict_bands([(1.0, posterior.solution)], unique, [True, False], **options)
-        alone = predict_band(posterior.solution, unique, noise=False, discrepancy=False, **options)
-    except TissuqError:
-        return {}
-    bent = [float(posterior.marginals[symbol].quantile(0.5)) for symbol in model.bent_symbols]
-    states = model.experiment.states_at(view.points, view.mode, view.channel)
+def _of_measured(found: Sequence[Described]) -> Iterator[_Bands | None]:
+    for of in found:
+        for places, _ in of.ways:
+            alone = _at(of.stress_alone, places) if of.has_discrepancy else None
+            yield _Bands(_at(of.measurements, places), _at(of.stress, places), alone)
+
+
+def _of_others(posterior: Posterior, tests: Sequence[_Test]) -> Iterator[_Bands | None]:
+    """Yield the bands of all tests that were not measured; none where a posterior says nothing about a mode."""
+    weighted = [(1.0, posterior.solution)]
+    for test in tests:
+        if len(test.measured):
+            continue
+        try:
+            measurements, stress = predict_bands(weighted, test.points, (True, False), mode=test.mode)
+            alone = None
+            if posterior.model.discrepancy.parameters:
+                (alone,) = predict_bands(weighted, test.points, (False,), discrepancy=False, mode=test.mode)
+        except TissuqError:
+            yield None
+        else:
+            yield _Bands(measurements, stress, alone)
+
+
+def _at(band: Band, places: NDArray[np.intp]) -> Band:
+    return Band(*(values[places] for values in (band.stretch, band.median, band.low, band.high)))
+
+
+def _columns(bands: _Bands, test: _Test, unit: StressUnit) -> dict[str, Any]:
     columns = {
-        "measured": view.measured,
-        "low": of_measurements.low[rows],
-        "median": of_measurements.median[rows],
-        "high": of_measurements.high[rows],
-        "stress_low": of_stress.low[rows],
-        "stress_high": of_stress.high[rows],
-        "alone_low": alone.low[rows],
-        "alone": alone.median[rows],
-        "alone_high": alone.high[rows],
+        "low": bands.measurements.low,
+        "median": bands.measurements.median,
+        "high": bands.measurements.high,
+        "stress_low": bands.stress.low,
+        "stress_high": bands.stress.high,
     }
+    core = [test.measured, bands.measurements.median]
+    if bands.alone is not None:
+        columns |= {"alone_low": bands.alone.low, "alone": bands.alone.median, "alone_high": bands.alone.high}
+    limits = np.array(limits_of(core, list(columns.values())))
+    columns["limits"] = limits
+    return {name: _rounded(values / unit.to_mpa) for name, values in columns.items()}
+
+
+def _test(test: _Test, basis: FloatArray, unit: StressUnit) -> dict[str, Any]:
+    """Return a test as the page has it, with its basis (nodes, columns, g) and measurements in a unit."""
     return {
-        "formulation": formulation,
-        "name": view.name,
-        "control": view.mode.controls[0].name,
-        "x": _rounded(view.mode.paths[view.channel].abscissa(view.points)),
-        **{name: _rounded(column / unit.to_mpa) for name, column in columns.items()},
-        "basis": [_rounded(column) for column in stress_basis(model.material, states, bent).T],
+        "name": test.name,
+        "control": test.mode.controls[0].name,
+        "is_curve": test.is_curve,
+        "x": _rounded(test.abscissa),
+        "measured_at": _rounded(test.measured_at),
+        "measured": _rounded(test.measured / unit.to_mpa),
+        "basis": [[_rounded(column) for column in columns] for columns in basis],
     }
 
 
-def _sliders(posterior: Posterior, unit: StressUnit) -> list[dict[str, Any]]:
-    """Return the material's linear parameters with mean and the range of a slider, in a unit of stress."""
-    sliders = []
-    for parameter in posterior.model.material.parameters:
-        if parameter.is_linear:
-            marginal = posterior.marginals[parameter.symbol]
-            ends = marginal.mean - SLIDER_SDS * marginal.sd, marginal.mean + SLIDER_SDS * marginal.sd
-            value, low, high = _rounded(np.array([marginal.mean, *ends]) / unit.to_mpa)
-            sliders.append({"name": parameter.symbol, "value": value, "low": low, "high": high})
-    return sliders
+class _Sliders:
+    """The material's parameters with mean and the range of a slider, and its curves from which any other is made.
+
+    A curve is a linear combination of columns. Where there is one exponent, the columns are known at Chebyshev nodes
+    of it, between which the page interpolates; several stay at their medians.
+    """
+
+    def __init__(self, posterior: Posterior, unit: StressUnit) -> None:
+        self._model = posterior.model
+        marginals, bent = posterior.marginals, posterior.model.bent_symbols
+        self._medians = np.array([float(marginals[symbol].quantile(0.5)) for symbol in bent])
+        self.linear: list[dict[str, Any]] = []
+        for parameter in self._model.material.parameters:
+            if parameter.is_linear:
+                mean, sd = marginals[parameter.symbol].mean, marginals[parameter.symbol].sd
+                numbers = np.array([mean, mean - SLIDER_SDS * sd, mean + SLIDER_SDS * sd]) / unit.to_mpa
+                self.linear.append(_slider(parameter.symbol, unit.name, numbers))
+        self.exponent: dict[str, Any] | None = None
+        self.nodes, self.fixed = np.zeros(1), list(bent)
+        if len(bent) == 1:
+            ends = [float(marginals[bent[0]].quantile(tail)) for tail in (SLIDER_TAIL, 1 - SLIDER_TAIL)]
+            nodes = np.mean(ends) + np.ptp(ends) / 2 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+            if self._is_known_between(nodes):
+                self.nodes, self.fixed = nodes, []
+                self.exponent = _slider(bent[0], "", np.array([self._medians[0], *ends]))
+
+    def basis(self, test: _Test) -> FloatArray:
+        """Return the stress of the material at every node per unit of each linear parameter: (nodes, columns, g)."""
+        return self._basis(test, self.nodes[:, None] if self.exponent else self._medians[None])
+
+    def _basis(self, test: _Test, settings: FloatArray) -> FloatArray:
+        states = self._model.experiment.states_at(test.points, test.mode, test.channel)
+        return np.asarray(stress_basis(self._model.material, states, settings)).swapaxes(1, 2)
+
+    def _is_known_between(self, nodes: FloatArray) -> bool:
+        """Return whether the columns of every measured curve are finite at nodes, and right between two of them."""
+        from scipy.interpolate import BarycentricInterpolator
+
+        between = 0.5 * (nodes[:1] + nodes[1:2])
+        for curve in self._model.experiment.curves:
+            test = _Test("", curve.mode, curve.channel, curve.points, np.zeros(0), np.zeros(0))
+            try:
+                at_nodes, exact = (self._basis(test, values[:, None]) for values in (nodes, between))
+            except TissuqError:
+                return False
+            if not np.isfinite(at_nodes).all():
+                return False
+            error = np.abs(BarycentricInterpolator(nodes, at_nodes)(between) - exact).max()
+            if error > MAX_ERROR * np.abs(exact).max():
+                return False
+        return True
+
+
+def _slider(name: str, unit: str, numbers: FloatArray) -> dict[str, Any]:
+    value, low, high = _rounded(numbers)
+    return {"name": name, "unit": unit, "value": value, "low": low, "high": high}
 
 
 def _rounded(values: FloatArray) -> list[float | None]:

@@ -1,17 +1,17 @@
-"""The folder of a ranking of tests: table, figure and page."""
+"""The result of a ranking of tests: the best next test for every target, table and figures."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isnan
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.drawing.style import BAND, BASE, INK, UNSTABLE, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, UNSTABLE, new_figure
 from tissuq.next_test.candidates import Target
-from tissuq.report.run_folder import write_figures, write_page, write_recipe
-from tissuq.report.tables import Row, significant, write_csv, write_json
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.tables import Row, significant
 from tissuq.studies.design import DesignSettings, DesignStudy
 
 if TYPE_CHECKING:
@@ -19,12 +19,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["HEADERS", "design_figure", "heading", "readable_design", "write_design"]
+__all__ = ["HEADERS", "design_figure", "design_result", "heading", "readable_design"]
 
 HEADERS = ["test", "expected sd", "reduction", "note"]
 """Of `readable_design`."""
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
+FEW_ROWS, WIDTH = 6, 9.5
+"""Number of tests in the figure beside the answer, and width of that of all, inches."""
+CAPTION = (
+    "Expected standard deviation after each test, the best on top. Lines reach from it to the standard deviation now; "
+    "a black bar is twice the error of the simulation to either side, an open dot an unreliable number."
+)
+NEXT = "make the first of these tests, and fit it together with the data: tissuq fit DATA.csv NEW.csv"
 BEYOND = UNSTABLE
 SDS = ("sd_now", "sd_after")
 """Columns in the unit of a target."""
@@ -56,20 +63,24 @@ def heading(study: DesignStudy, target: Target) -> str:
 
 def design_figure(study: DesignStudy) -> Figure:
     """Return the expected standard deviation after every test, a panel for each target, the best on top."""
-    shown = [_shown(_rows_of(study, target)) for target in study.targets]
+    return _figure(study, study.targets, MAX_ROWS, WIDTH)
+
+
+def _figure(study: DesignStudy, targets: Sequence[Target], most: int, width: float) -> Figure:
+    shown = [_shown(_rows_of(study, target), most) for target in targets]
     height = 1.5 + 0.3 * max(map(len, shown))
-    with new_figure(9.5, 0.4 + height * len(shown)) as figure:
+    with new_figure(width, 0.4 + height * len(shown)) as figure:
         axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
-        for axis, target, table in zip(axes, study.targets, shown, strict=True):
+        for axis, target, table in zip(axes, targets, shown, strict=True):
             _panel(axis, study, target, table)
         marks: list[Any] = [axes[0].plot([], [], "o", color=color)[0] for color in (BAND, BEYOND, BASE)]
         words = ["within the measured I1 and I2", "beyond", "repeats of the tests of the data"]
-        figure.legend(marks, words, loc="outside lower right", ncols=3, fontsize=9)
+        figure.legend(marks, words, loc="outside lower right", ncols=3 if width == WIDTH else 1, fontsize=9)
     return figure
 
 
-def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, figures: bool = True) -> None:
-    """Write design.csv and design.json, the figure, run.toml and report.html into an empty folder.
+def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
+    """Return what a ranking of tests says.
 
     Standard deviations are in the unit of the data, which stands beside each.
 
@@ -78,33 +89,35 @@ def write_design(study: DesignStudy, recipe: DesignSettings, folder: Path, *, fi
     study : DesignStudy
     recipe : DesignSettings
         The settings, with the run as it is seen from the folder.
-    folder : Path
-        Exists and is empty.
-    figures : bool
-        Draw it, too.
     """
-    rows = _rows_in_unit(study)
-    write_csv(folder / "design.csv", rows)
-    write_json(folder / "design.json", rows)
-    write_recipe(folder, "design", recipe)
-    if figures:
-        write_figures(folder, {"design": design_figure(study)})
-    model = study.posterior.model
-    write_page(
-        folder,
-        "design.html",
-        data=model.experiment.name,
-        material=model.material.name,
-        discrepancy=model.discrepancy.name,
-        lead=_lead(study),
-        tables=[
-            (heading(study, target), [HEADERS[0], f"{HEADERS[1]}{_in(study, target)}", *HEADERS[2:]],
-             readable_design(study, target))
-            for target in study.targets
-        ],
-        explanations=study.explanations,
-        warnings=study.warnings,
+    rows, model = _rows_in_unit(study), study.posterior.model
+    every = Picture("design", lambda: design_figure(study), "Expected standard deviations after each test", CAPTION)
+    how_to_read = (
+        *study.explanations,
+        "The ranking does not know what a laboratory can do: of two tests with nearly the same number choose the one "
+        "that is easier to do well.",
+    )
+    best = [number for target in study.targets if (number := _best(study, target))]
+    return Result(
         command="design",
+        title="Which test to make next",
+        subject=f"{model.experiment.name} · {model.material.name}, discrepancy {model.discrepancy.name}",
+        numbers=tuple(best),
+        finding=" ".join(_sentences(study)),
+        next_step=NEXT if best else "",
+        picture=Picture(
+            "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
+            "Expected standard deviation after the best tests", "Expected standard deviation after a test; line: now."
+        ),
+        tables=tuple(
+            Table([HEADERS[0], f"{HEADERS[1]}{_in(study, target)}", *HEADERS[2:]], readable_design(study, target),
+                  _capitalised(heading(study, target)), (0, 3))
+            for target in study.targets
+        ),
+        sections=(Section("Every test", (every,)), Section("How to read it", (how_to_read,))),
+        warnings=tuple(study.warnings),
+        files={"design.csv": rows, "design.json": rows},
+        recipe=recipe,
     )  # fmt: skip
 
 
@@ -134,16 +147,33 @@ def _in(study: DesignStudy, target: Target) -> str:
     return f", {unit}" if unit else ""
 
 
-def _lead(study: DesignStudy) -> list[str]:
+def _ranked(study: DesignStudy, target: Target) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return the tests of a target with numbers, the best first: new ones, and repeats of those of the data."""
+    table = _rows_of(study, target).dropna(subset=["reduction"])
+    return table[~table["is_repeat"]], table[table["is_repeat"]]
+
+
+def _best(study: DesignStudy, target: Target) -> Number | None:
+    """Return the best new test for a target, compared with repeating the tests of the data."""
+    best, again = _ranked(study, target)
+    if not len(best):
+        return None
+    row = best.iloc[0]
+    remark = f"lowers its sd by {row['reduction']:.0%}"
+    if len(again):
+        remark += f"; repeating the data, by {again.iloc[-1]['reduction']:.0%}"
+    return Number(f"For {target.title(study.posterior.model)}:", str(row["candidate"]), remark=remark)
+
+
+def _sentences(study: DesignStudy) -> list[str]:
     """Return the best test for each target in a sentence, compared with repeating the tests of the data."""
     sentences = []
     for target in study.targets:
-        table = _rows_of(study, target).dropna(subset=["reduction"])
-        best, again = table[~table["is_repeat"]], table[table["is_repeat"]]
+        best, again = _ranked(study, target)
         if not len(best):
             continue
         row = best.iloc[0]
-        title = target.title(study.posterior.model)
+        title = _capitalised(target.title(study.posterior.model))
         words = f"{title}: {row['candidate']}, is expected to lower its sd by {row['reduction']:.0%}"
         if len(again):
             repeat = again.iloc[-1]
@@ -152,11 +182,15 @@ def _lead(study: DesignStudy) -> list[str]:
     return sentences
 
 
-def _shown(table: pd.DataFrame) -> pd.DataFrame:
+def _capitalised(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _shown(table: pd.DataFrame, most: int) -> pd.DataFrame:
     """Return the best tests with numbers, and the tests of the data again."""
     ranked = table.dropna(subset=["reduction"])
     ranks = np.arange(len(ranked))
-    return ranked[ranked["is_repeat"].to_numpy() | (ranks < MAX_ROWS)]
+    return ranked[ranked["is_repeat"].to_numpy() | (ranks < most)]
 
 
 def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,14 +12,13 @@ from tissuq.assessment.extent import has_energy
 from tissuq.drawing.panels import Panels, columns_of, legend_above, limits_of, on_figure, shortened
 from tissuq.drawing.pieces import band, line, points
 from tissuq.drawing.style import BAND, BASE, INK, STYLE, TRUTH, new_figure, save_figure
-from tissuq.experiments.experiment import Curve
+from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import StressUnit
 from tissuq.pictures.answer import answer_on_new_figure
-from tissuq.pictures.curves import Way, points_along, ways_of
+from tissuq.pictures.curves import Described, described
 from tissuq.pictures.parameters import ridges
 from tissuq.pictures.stability import shade_instability
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import Band, predict_band
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,19 +39,19 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-POINTS = 161
-"""Of a band."""
 WIDTHS = {1: 6.0, 2: 9.2, 3: 11.5}
 """Of figures with so many panels side by side, inches."""
 
 
-def answer_figure(posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False) -> Figure:
+def answer_figure(
+    posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False, found: Sequence[Described] | None = None
+) -> Figure:
     """Return `Posterior.plot` for the head of a page: 1000 x 480 px, or 400 px wide with larger letters.
 
     Further rows of panels make it taller. Its SVG has these sizes at 96 px an inch; a page embeds both, and shows the
-    narrow one on screens of up to 600 px.
+    narrow one on screens of up to 600 px. What ``found`` has computed of the posterior's curves is not computed anew.
     """
-    return answer_on_new_figure(posterior.solution, unit, is_narrow=is_narrow)
+    return answer_on_new_figure(found or described(posterior.solution), unit, is_narrow=is_narrow)
 
 
 def predictive_figure(
@@ -61,6 +60,7 @@ def predictive_figure(
     discrepancy: bool,
     unit: StressUnit,
     true_curve: tuple[FloatArray, FloatArray] | None = None,
+    found: Mapping[str, Sequence[Described]] | None = None,
 ) -> Figure:
     """Return one panel a formulation, or one for each measured stress: data, 95 % predictive band and mean.
 
@@ -79,24 +79,27 @@ def predictive_figure(
         Unit of the stress axis.
     true_curve : (stretch, stress) arrays, MPa
         Drawn where it is known.
+    found : mapping of str to sequence of Described, optional
+        What the posteriors say of their curves, of which nothing is computed anew.
     """
+    known = found or {name: described(posterior.solution) for name, posterior in posteriors.items()}
     curves = next(iter(posteriors.values())).model.experiment.curves
-    panels = [(name, curve) for name in posteriors for curve in curves]
+    panels = [(name, of) for name in posteriors for of in known[name]]
     columns = columns_of(len(panels))
     with new_figure(WIDTHS[columns], 3.3 * -(-len(panels) // columns) + 0.5) as figure:
         drawn = on_figure(figure, len(panels), columns)
-        found = [_band_over(posteriors[name], curve, discrepancy) for name, curve in panels]
-        base = found[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
-        for index, (axis, (name, curve)) in enumerate(zip(drawn.axes, panels, strict=True)):
-            posterior, (ways, of_panel) = posteriors[name], found[index]
+        bands = [of.measurements if discrepancy else of.measurements_alone for _, of in panels]
+        base = bands[list(posteriors).index("none") * len(curves) :] if "none" in posteriors else []
+        for index, (axis, (name, of_curve)) in enumerate(zip(drawn.axes, panels, strict=True)):
+            posterior, curve, of_panel = posteriors[name], of_curve.curve, bands[index]
             inside = posterior.inside_bands(discrepancy=discrepancy)[index % len(curves)].sum()
             axis.set_title(f"{_label(posteriors, name, curve, drawn.letters)}{inside} of {len(curve)} inside")
-            for places, is_curve in ways:
+            for places, is_curve in of_curve.ways:
                 low, high, median = (of[places] / unit.to_mpa for of in (of_panel.low, of_panel.high, of_panel.median))
                 band(axis, of_panel.stretch[places], low, high, is_path=is_curve, label="95 % predictive band")
                 line(axis, of_panel.stretch[places], median, is_path=is_curve, label="predicted median")
                 if name != "none" and base:
-                    none = base[index % len(curves)][1]
+                    none = base[index % len(curves)]
                     line(axis, none.stretch[places], none.median[places] / unit.to_mpa, color=BASE, style=":",
                          width=1.4, is_path=is_curve, label="median of the fit 'none'")  # fmt: skip
             if curve.mode.is_curve and (discrepancy == has_energy(posterior.model) or name == "none"):
@@ -109,7 +112,7 @@ def predictive_figure(
             if len(curves) > 1:
                 axis.set_xlabel(curve.abscissa_name, fontsize=9)
         if len(curves) == 1:
-            shown = [end / unit.to_mpa for _, of_panel in found for end in (of_panel.low, of_panel.high)]
+            shown = [end / unit.to_mpa for of_panel in bands for end in (of_panel.low, of_panel.high)]
             _share_axes(drawn, columns, limits_of([curves[0].stress / unit.to_mpa, *shown], []))
             figure.supxlabel(curves[0].abscissa_name, fontsize=10.5)
         measured = {stress for curve in curves for stress in curve.mode.stresses}
@@ -127,13 +130,6 @@ def marginal_figure(
         solutions = {name: posterior.solution for name, posterior in posteriors.items()}
         ridges(figure.subplots(), solutions, symbol, unit, truth=truth)
     return figure
-
-
-def _band_over(posterior: Posterior, curve: Curve, discrepancy: bool) -> tuple[list[Way], Band]:
-    """Return the band of a stress over the range of its curve, or at its points where the test has several controls."""
-    at = points_along(curve, POINTS)
-    found = predict_band(posterior.solution, at, discrepancy=discrepancy, mode=curve.mode, channel=curve.channel)
-    return ways_of(curve.mode, at, found.stretch), found
 
 
 def _label(posteriors: Mapping[str, Posterior], name: str, curve: Curve, letters: int) -> str:

@@ -16,7 +16,7 @@ from tissuq.drawing.style import BASE, TRUTH, new_figure
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
-from tissuq.population.picture import draw_specimens, height_of, numbers_of, unit_factor
+from tissuq.population.picture import height_of, numbers_of
 from tissuq.report.run_folder import (
     INPUT,
     copied_laws,
@@ -52,8 +52,10 @@ Bands: TypeAlias = "tuple[pd.DataFrame, pd.DataFrame]"
 def specimens_figure(population: Population, unit: StressUnit) -> Figure:
     """Return `Population.plot` as a figure of the report, its panels side by side."""
     count = len(population.symbols)
-    with new_figure(6.4 if count == 1 else min(3.6 * count + 0.6, 12.0), height_of(population) + 0.7) as figure:
-        draw_specimens(on_figure(figure, count, count), population, unit)
+    with new_figure(
+        6.4 if count == 1 else min(3.6 * count + 0.6, 12.0), height_of(len(population.names)) + 0.7
+    ) as figure:
+        population.draw(on_figure(figure, count, count), unit)
     return figure
 
 
@@ -238,7 +240,8 @@ def _readable_specimens(study: PopulationStudy) -> list[list[str]]:
 
 def _scale(study: PopulationStudy, symbol: str) -> tuple[float, str]:
     """Return what one unit of a parameter is in MPa, and the unit's name."""
-    return unit_factor(study.population, symbol, study.unit)
+    unit = study.population.unit_of(symbol, study.unit)
+    return unit.to_mpa, unit.name
 
 
 def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -> tuple[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import platform
+import re
 import shutil
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
@@ -31,6 +32,7 @@ from tissuq.studies.settings import RECIPE
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
     from matplotlib.figure import Figure
     from pydantic import BaseModel
 
@@ -213,10 +215,20 @@ def _templates() -> Environment:
     """Return the templates of this package, each compiled once in a process."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    return Environment(
+    templates = Environment(
         loader=PackageLoader("tissuq.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
+    templates.filters["prose"] = _prose
+    return templates
+
+
+def _prose(text: str) -> Markup:
+    """Return a text as HTML, with its ``**strong**`` and `` `code` ``; everything else in it is escaped."""
+    from markupsafe import Markup, escape
+
+    marked = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", str(escape(text)))
+    return Markup(re.sub(r"`(.+?)`", r"<code>\1</code>", marked))  # noqa: S704 (escaped above)
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
 from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.pictures.curves import Described, described
 from tissuq.posterior.posterior import Posterior
 from tissuq.report.answer import ANSWER, answer_record, readable_estimates, shown_and_folded
 from tissuq.report.chart import chart_data
@@ -111,9 +112,12 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
     record = answer_record(_title(study), study.main, study.answer, study.unit, study.warnings)
     write_json(folder / ANSWER, record)
+    found = {name: described(posterior.solution) for name, posterior in study.posteriors.items()}
     if figures:
-        write_figures(folder, _figures(study))
-    write_page(folder, "specimen.html", **_context(study, summary, record), command=command)
+        write_figures(folder, _figures(study, found))
+    context = _context(study, summary, record)
+    context["chart_data"] = chart_data(study.posteriors, study.main, study.unit, found) if figures else None
+    write_page(folder, "specimen.html", **context, command=command)
 
 
 def write_inputs(
@@ -174,14 +178,14 @@ def specimen_summary(study: SpecimenStudy) -> list[Row]:
     return rows
 
 
-def _figures(study: SpecimenStudy) -> dict[str, Figure]:
+def _figures(study: SpecimenStudy, found: Mapping[str, Sequence[Described]]) -> dict[str, Figure]:
     from tissuq.report.figures import answer_figure, marginal_figure, predictive_figure
 
     return {
-        "answer": answer_figure(study.posteriors[study.main], study.unit, is_narrow=True),
+        "answer": answer_figure(study.posteriors[study.main], study.unit, is_narrow=True, found=found[study.main]),
         "marginals": marginal_figure(study.posteriors, study.headline, study.unit),
-        "with_discrepancy": predictive_figure(study.posteriors, discrepancy=True, unit=study.unit),
-        "model_alone": predictive_figure(study.posteriors, discrepancy=False, unit=study.unit),
+        "with_discrepancy": predictive_figure(study.posteriors, discrepancy=True, unit=study.unit, found=found),
+        "model_alone": predictive_figure(study.posteriors, discrepancy=False, unit=study.unit, found=found),
     }
 
 
@@ -192,7 +196,6 @@ def _title(study: SpecimenStudy) -> str:
 def _context(study: SpecimenStudy, summary: list[Row], record: dict[str, Any]) -> dict[str, Any]:
     shown, folded = shown_and_folded(record)
     return {
-        "chart_data": chart_data(study.posteriors, study.main, study.unit),
         "answer": record | {"estimates": readable_estimates(record), "next": record["next"].replace("{run}", "RUN")},
         "shown_warnings": shown,
         "folded_warnings": folded,

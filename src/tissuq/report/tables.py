@@ -191,7 +191,7 @@ def _without_nan(value: Any) -> Any:
 
 HELD_OUT_HEADLINE = ("median", "hdi_low", "hdi_high")
 """What is said of the headline parameter from the other tests."""
-HELD_OUT = ["formulation", "test", "measured", "inside", "beyond", "half width", "error"]
+HELD_OUT = ["formulation", "test left out", "measured", "inside band", "extrapolated", "band ±", "off by"]
 """What `readable_held_out` gives, before the headline parameter."""
 
 

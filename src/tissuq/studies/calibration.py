@@ -2,109 +2,27 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from tissuq.emulation import Calibration, FileForward, UmbridgeForward
-from tissuq.emulation.forward import Forward
-from tissuq.emulation.length_scales import Kernel, Trend
+from tissuq.emulation import Calibration
 from tissuq.emulation.material_posterior import check_material
-from tissuq.emulation.problem import Method
-from tissuq.emulation.runs import PointSet
 from tissuq.errors import InputError
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
-from tissuq.parameters.priors import Prior, prior_from
-from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.calibrate import calibrate
+from tissuq.studies.calibration_settings import CalibrationSettings
 from tissuq.studies.stream import Step, silent
 
 __all__ = ["CalibrationSettings", "CalibrationStudy", "Measured", "run_calibration"]
 
 FloatArray = NDArray[np.float64]
-
-
-NUMBER = r"\d+\.?\d*"
-RANGE = re.compile(rf"{NUMBER}:{NUMBER}")
-"""Smallest and largest stretch."""
-
-
-class CalibrationSettings(BaseModel):
-    """Everything that a calibration depends on, in the units of the forward model."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    file: str
-    control: str | int | None = None
-    measured: str | int | None = None
-    sheet: str | int | None = None
-    skip_rows: int = Field(0, ge=0)
-    every: int = Field(1, ge=1)
-    forward: str | None = None
-    umbridge: str | None = None
-    model: str = "forward"
-    priors: dict[str, dict[str, Any]] = Field(min_length=1)
-    discrepancy: str = "none"
-    noise_sd: float | Literal["unknown"] = "unknown"
-    zero_load: float = 0.0
-    runs: int = Field(40, ge=1)
-    refine: int = Field(0, ge=0)
-    design: PointSet = "sobol"
-    kernel: Kernel = "squared-exponential"
-    trend: Trend = "linear"
-    method: Method = "auto"
-    material: str | None = None
-    range: str | None = None
-    mode: str = "uniaxial"
-    unit: str = "MPa"
-    seed: int = Field(0, ge=0, le=MAX_SEED)
-
-    @field_validator("noise_sd", mode="before")
-    @classmethod
-    def _positive_or_unknown(cls, value: Any) -> Any:
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if value != "unknown" and not (is_number and 0 < value < inf):
-            raise ValueError(
-                f"must be a positive number in the unit of the measured values, or 'unknown', not {value!r}"
-            )
-        return value
-
-    @model_validator(mode="after")
-    def _one_model(self) -> Self:
-        if (self.forward is None) == (self.umbridge is None):
-            raise ValueError("give one forward model: a function in a file (forward) or a server (umbridge), not both")
-        if (self.material is None) != (self.range is None):
-            raise ValueError("material and range belong together: the law of the forward model, and its stretches, "
-                             "such as 0.7:1.3")  # fmt: skip
-        if self.range is not None and not RANGE.fullmatch(self.range):
-            raise ValueError(f"range must be the smallest and the largest stretch, such as 0.7:1.3, not {self.range!r}")
-        return self
-
-    @property
-    def stretches(self) -> tuple[float, float]:
-        """The smallest and the largest stretch in the forward model."""
-        low, high = str(self.range).split(":")
-        return float(low), float(high)
-
-    @property
-    def forward_model(self) -> Forward:
-        """What is run."""
-        return UmbridgeForward(self.umbridge, self.model) if self.umbridge else FileForward(str(self.forward))
-
-    @property
-    def parameter_priors(self) -> dict[str, Prior]:
-        """Of the parameters, by name."""
-        return {symbol: prior_from(prior) for symbol, prior in self.priors.items()}
 
 
 @dataclass(frozen=True, eq=False)

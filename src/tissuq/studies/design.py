@@ -5,58 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import TYPE_CHECKING
 
 from tissuq.errors import InputError
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
-from tissuq.next_test.candidates import MODULUS, Candidate, Target, candidate_named, target_named
+from tissuq.next_test.candidates import Target, target_named
 from tissuq.next_test.next_test import NextTest
 from tissuq.next_test.ranking import rank_tests
-from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.posterior import Posterior
+from tissuq.studies.design_settings import DesignSettings
 from tissuq.studies.earlier_run import load
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["CandidateSettings", "DesignSettings", "DesignStudy", "run_design"]
-
-
-class CandidateSettings(BaseModel):
-    """A test that could be made, at any stretches."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    mode: str
-    stretch: tuple[float, ...] = Field(min_length=1)
-    name: str = ""
-
-
-class DesignSettings(BaseModel):
-    """Everything that a ranking of tests depends on."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    run: str
-    discrepancy: str | None = None
-    candidates: tuple[str | CandidateSettings, ...] = ()
-    targets: tuple[str, ...] = Field((MODULUS,), min_length=1)
-    points: tuple[int, ...] = ()
-    specimen: Literal["same", "other"] | None = None
-    seed: int = Field(0, ge=0, le=MAX_SEED)
-
-    @property
-    def tests(self) -> list[Candidate]:
-        """The candidates; empty for the default ones."""
-        return [
-            candidate_named(candidate)
-            if isinstance(candidate, str)
-            else Candidate(candidate.mode, candidate.stretch, candidate.name)
-            for candidate in self.candidates
-        ]
+__all__ = ["DesignSettings", "DesignStudy", "run_design"]
 
 
 @dataclass(frozen=True)

@@ -8,69 +8,29 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
-from pydantic import BaseModel, ConfigDict, Field
+if TYPE_CHECKING:
+    from tissuq.posterior.ensemble import Sampling
 
 from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
 from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out, sets_of
 from tissuq.errors import InputError
-from tissuq.export import Cards, CardSettings, card_format
+from tissuq.export import Cards, card_format
 from tissuq.finite_elements.simulation import COMPLETE, MATERIAL_ONLY
 from tissuq.mechanics import Material
 from tissuq.mechanics.user_law import LAW
-from tissuq.parameters.seeds import MAX_SEED
-from tissuq.posterior.ensemble import Ensemble, Sampling
+from tissuq.posterior.ensemble import Ensemble
 from tissuq.studies.earlier_run import load
 from tissuq.studies.ensemble_files import DRAWS, MODEL, extra_files
+from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
 
 __all__ = [
     "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "prepare_ensemble", "run_ensemble",
 ]  # fmt: skip
-
-
-class EnsembleSettings(BaseModel):
-    """Everything that the results of an ensemble depend on.
-
-    ``materials`` has the folder of a run for each material of the model, ``quantities`` what each quantity is.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    model: str
-    materials: dict[str, str] = Field(min_length=1)
-    quantities: dict[str, str] = Field(min_length=1)
-    deck: str | None = None
-    solver: str | None = None
-    command: str = ""
-    card_format: str | None = None
-    discrepancy: str | None = None
-    law: str | None = None
-    order: int | None = None
-    unit: str = "MPa"
-    bulk_modulus: float | None = Field(None, gt=0, lt=inf)
-    poisson: float | None = None
-    draws: int = Field(64, ge=2)
-    sampling: Sampling = "sobol"
-    all_draws: bool = False
-    seed: int = Field(0, ge=0, le=MAX_SEED)
-    shares: bool = True
-    also: list[str] = Field(default_factory=list)
-
-    def card_settings(self, **changes: Any) -> CardSettings:
-        """Return the settings of the cards.
-
-        Raises
-        ------
-        InputError
-            When they have no meaning.
-        """
-        names = "law", "order", "unit", "bulk_modulus", "poisson"
-        return CardSettings(**{name: getattr(self, name) for name in names}, **changes)
 
 
 @dataclass(frozen=True)
@@ -194,8 +154,8 @@ def prepare_ensemble(
         step(f"draws of {name}")
         posterior = load(beside / run, settings.discrepancy, law)
         seed = settings.seed + runs.index(run)  # materials of different runs are independent
-        admissible = not settings.all_draws
-        ensembles[name] = posterior.ensemble(settings.draws, seed, settings.sampling, admissible=admissible)
+        sampling = cast("Sampling", settings.sampling)
+        ensembles[name] = posterior.ensemble(settings.draws, seed, sampling, admissible=not settings.all_draws)
     all_draws = [draw for ensemble in ensembles.values() for draw in ensemble]
     is_shared = settings.shares and any(draw.discrepancy or len(draw.parts) > 1 for draw in all_draws)
     if is_shared:

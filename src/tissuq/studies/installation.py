@@ -28,6 +28,10 @@ PROGRAMS = {
     "ANSYS": (("ansys", "mapdl"), "runs the cards of tissuq export --format ansys"),
     "FEBio": (("febio4", "febio3", "febio"), "runs the cards of tissuq export --format febio"),
     "LS-DYNA": (("lsdyna", "ls-dyna", "ls-dyna_smp_d"), "runs the cards of tissuq export --format ls-dyna"),
+    "Chromium": (
+        ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge"),
+        "prints reports (tissuq show RUN --pdf)",
+    ),
     "ParaView": (("paraview",), "opens the fields that tissuq structure writes"),
 }
 """Programs, the names that they may have on the PATH, and what each is for. None of them is needed to fit."""

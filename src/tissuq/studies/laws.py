@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
-
-from pydantic import Field, model_validator
 
 from tissuq.assessment.measurements import measurement_warnings
 from tissuq.experiments.experiment import Experiment
@@ -17,31 +14,10 @@ from tissuq.mechanics import Material
 from tissuq.model.tolerances import Tolerances
 from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws, laws_named
 from tissuq.result_warning import ResultWarning, merged, most_severe_first
-from tissuq.studies.specimen import (
-    ALL,
-    SpecimenSettings,
-    parameters_of,
-    priors_in_mpa,
-    warnings_of_files,
-)
+from tissuq.studies.specimen import parameters_of, priors_in_mpa, warnings_of_files
+from tissuq.studies.specimen_settings import LawSettings
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
-
-
-class LawSettings(SpecimenSettings):
-    """Everything that a comparison of laws depends on: as of a fit, but for the material."""
-
-    laws: tuple[str, ...] = Field((ALL_LAWS,), min_length=1)
-
-    @model_validator(mode="after")
-    def _one_discrepancy(self) -> Self:
-        if len(self.discrepancies) > 1 or self.discrepancies == (ALL,):
-            raise ValueError("laws are compared with one discrepancy: give one, or one material")
-        if self.held_out:
-            raise ValueError("held_out is for one material: give one")
-        if ALL_LAWS in self.laws and self.laws != (ALL_LAWS,):
-            raise ValueError(f"'{ALL_LAWS}' cannot be combined with other materials; give '{ALL_LAWS}', or names")
-        return self
 
 
 @dataclass(frozen=True)

@@ -3,60 +3,114 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, Self, cast
+from typing import TYPE_CHECKING, Any, Literal, Self, cast
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.experiment_file import Reading, read_file
-from tissuq.experiments.reading.options import ReadingOptions
-from tissuq.experiments.units import StressUnit
-from tissuq.model.noise import Noise, noise_named
-from tissuq.parameters.seeds import MAX_SEED
-from tissuq.posterior.solver import Method
+from tissuq.studies.option import Settings, option
+from tissuq.studies.option_texts import column, one_noise, pairs_of, range_of
+from tissuq.studies.shared_options import seed
+
+if TYPE_CHECKING:
+    from tissuq.experiments.experiment import Experiment
+    from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.reading.options import ReadingOptions
+    from tissuq.experiments.units import StressUnit
+    from tissuq.model.noise import Noise
 
 __all__ = ["FittedSettings", "MeasuredFile", "MeasuredTest", "ReadingSettings"]
 
+reading = partial(option, group="Reading files")
+"""Declares an option of reading."""
 
-class ReadingSettings(BaseModel):
+
+class ReadingSettings(Settings):
     """The options of :func:`tissuq.read_experiment`."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    mode: str | None = None
-    columns: dict[str, str | int] = Field(default_factory=dict)
-    stress_unit: str | None = None
-    stress_type: str | None = None
-    strain_type: str | None = None
-    strain_unit: str | None = None
-    force_unit: str | None = None
-    displacement_unit: str | None = None
-    zero: str | None = None
-    mean_of: int | None = Field(None, ge=2)
-    dimensions: dict[str, str] = Field(default_factory=dict)
-    only: dict[str, str | int] = Field(default_factory=dict)
-    compression_positive: bool | None = None
-    turn: str | None = None
-    load_zero: str | None = None
-    cycle: str | int | None = None
-    branch: str | None = None
-    compliance: str | None = None
-    leave_out: str | None = None
-    preload: str | None = None
-    stretch_range: tuple[float, float] | None = None
-    until_peak: bool = False
-    every: int = Field(1, ge=1)
-    axis: str | None = None
-    sheet: str | int | None = None
-    table: int | None = Field(None, ge=1)
-    skip_rows: int = Field(0, ge=0)
+    mode: str | None = option(None, "Loading mode [as file and columns say, or uniaxial].")
+    columns: dict[str, str | int] = reading(
+        default_factory=dict,
+        help="ROLE=COLUMN for stretch, strain, displacement, length, shear or twist, and stress, force or torque, or "
+        "pressure and outer_diameter (or inner_diameter) of a tube, such as stretch=Strain; of the spread of a "
+        "mean: sd or sem, and n; repeat. Of a second axis or stress: stretch2 ... sem2.",
+        name="column",
+        parse=pairs_of("--column", "a column", "ROLE=COLUMN, such as stress='Stress (kPa)'", column),
+    )
+    stress_unit: str | None = reading(
+        None, "Unit of the stress column [the file's, or MPa]; for forces, the unit shown [kPa]."
+    )
+    stress_type: str | None = reading(
+        None,
+        "engineering, cauchy (true), second-piola-kirchhoff, or torsion (as rheometers state it for a disc) [what the "
+        "column's name says, or engineering].",
+    )
+    strain_type: str | None = reading(
+        None, "engineering, true (logarithmic), green, almansi or angle (of shear) [likewise]."
+    )
+    strain_unit: str | None = reading(None, "Unit of a strain column: 1 or percent; of an angle of shear: rad or deg.")
+    force_unit: str | None = reading(None, "Unit of a force, torque or pressure column that states none, such as mN.")
+    displacement_unit: str | None = reading(None, "Unit of a displacement column that states none.")
+    zero: str | None = reading(
+        None, "Value from which displacements are counted ('35.2 mm'), or first: that of the first row."
+    )
+    mean_of: int | None = reading(
+        None,
+        "Number of specimens that the stresses are means of, for a column of standard deviations [the file's].",
+        ge=2,
+    )
+    dimensions: dict[str, str] = reading(
+        default_factory=dict,
+        entries={
+            "length": "Undeformed length, such as '20 mm' [the file's]; in mode biaxial that along x.",
+            "area": "Undeformed cross-section, such as '10 mm2' [the file's].",
+            "width": "With --thickness, instead of --area; in mode biaxial the size along y.",
+            "thickness": "With --width, instead of --area; with --diameter of a tube its undeformed wall.",
+            "diameter": "Of a round specimen, instead of --area; of a tube the undeformed outer one.",
+        },
+    )
+    only: dict[str, str | int] = reading(
+        default_factory=dict,
+        help="COLUMN=VALUE: the only rows to read, such as Specimen=S1 [all of one specimen]; repeat.",
+        parse=pairs_of("--only", "a choice of rows", "COLUMN=VALUE, such as Specimen=S1", divided_last=True),
+    )
+    compression_positive: bool | None = reading(
+        None, "Which the file counts as positive [its sign].", negative="tension-positive"
+    )
+    turn: str | None = reading(
+        None, "Signs to change: load (of a cell that counts tension as negative), deformation or both."
+    )
+    load_zero: str | None = reading(
+        None, "What the load cell reads without load ('0.02 N'), or first: the load of the first row."
+    )
+    cycle: str | int | None = reading(None, "Use only this cycle: first, last or its number [all].")
+    branch: str | None = reading(None, "Use only loading or unloading [both].")
+    compliance: str | None = reading(None, "Of the machine ('0.5 um/N'): what it gives way is taken off displacements.")
+    leave_out: str | None = reading(None, "Lines of the file to leave out, such as 31,45:50.")
+    preload: str | None = reading(
+        None,
+        "Force or stress at which the specimen is taut ('0.05 N'), or auto, where load begins: stretch 1 is there.",
+    )
+    stretch_range: tuple[float, float] | None = reading(
+        None,
+        "LOW:HIGH, the only stretches to use, such as 1:1.2 [all].",
+        name="stretch",
+        takes=str,
+        parse=range_of("--stretch", "1:1.2"),
+    )
+    until_peak: bool = reading(False, "Leave out the rows after the largest stress.")
+    every: int = reading(1, "Use only every N-th row [1].", ge=1)
+    axis: str | None = reading(None, "x or y: the only axis to read from a biaxial machine's file.")
+    sheet: str | int | None = reading(None, "Sheet of a workbook, by name or number.", parse=column)
+    table: int | None = reading(None, "Which of several tables of a text or sheet, from 1.", ge=1)
+    skip_rows: int = reading(0, "Lines to skip at the top of the file.", ge=0)
 
     @property
     def reading_options(self) -> ReadingOptions:
         """How to read a file."""
-        return cast(ReadingOptions, {name: getattr(self, name) for name in ReadingSettings.model_fields})
+        return cast("ReadingOptions", {name: getattr(self, name) for name in ReadingSettings.model_fields})
 
 
 class MeasuredFile(ReadingSettings):
@@ -70,6 +124,8 @@ class MeasuredFile(ReadingSettings):
 
         It is named as the settings say, or as the file.
         """
+        from tissuq.experiments.reading.experiment_file import read_file
+
         reading = found or read_file(folder / self.file, **self.reading_options)
         return replace(reading, experiment=reading.experiment.labelled(name=self.name or Path(self.file).stem))
 
@@ -94,16 +150,20 @@ class MeasuredTest(MeasuredFile):
         return replace(reading, experiment=reading.experiment.labelled(**labels))
 
 
-class FittedSettings(BaseModel):
+class FittedSettings(Settings):
     """What is fitted; the noise is in the files' unit of stress."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    material: str = "neo-hookean"
-    noise_sd: float | Literal["unknown"] = "unknown"
-    noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = None
-    method: Method = "auto"
-    seed: int = Field(0, ge=0, le=MAX_SEED)
+    material: str = option("neo-hookean", "Material, as for tissuq fit [neo-hookean]; see tissuq materials.")
+    noise_sd: float | Literal["unknown"] = option(
+        "unknown", "Sd of the noise, in the files' stress unit, or unknown.", takes=str, parse=one_noise
+    )
+    noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
+        None, "Instead: unknown, proportional, repeats or another one, as for tissuq fit."
+    )
+    method: str = option(
+        "auto", "Of every specimen's fit: auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method"
+    )
+    seed: int = seed()
 
     @field_validator("noise_sd", mode="before")
     @classmethod
@@ -124,6 +184,8 @@ class FittedSettings(BaseModel):
 
     def noise_in(self, unit: StressUnit) -> Noise:
         """Return the noise, a known standard deviation converted from a unit to MPa."""
+        from tissuq.model.noise import noise_named
+
         if self.noise_sd == "unknown":
             return noise_named(self.noise or "unknown")
         return noise_named(self.noise_sd * unit.to_mpa)

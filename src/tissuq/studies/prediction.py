@@ -28,17 +28,18 @@ from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, extrapolation_share, predict_bands, speaks_of, stress_ratio
 from tissuq.studies.earlier_run import load
 from tissuq.studies.prediction_picture import draw_prediction
+from tissuq.studies.prediction_settings import POINTS
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["POINTS", "Prediction", "predict_run", "predicted"]
+__all__ = ["Prediction", "predict_run", "predicted"]
 
 FloatArray = NDArray[np.float64]
 
-POINTS, ROWS_SHOWN = 101, 9
-"""Number of stretches of a band by default, and of rows of a notebook's table."""
+ROWS_SHOWN = 9
+"""Rows of a notebook's table."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from typing import TYPE_CHECKING, Any, Literal
 
 from tissuq.errors import InputError
-from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import loading_mode
-from tissuq.experiments.reading.stated_mode import mode_in_comment
-from tissuq.mechanics import Material
-from tissuq.studies.earlier_run import modes_of
-from tissuq.studies.measured_file import MeasuredFile
-from tissuq.studies.prediction import POINTS, Prediction, predict_run
+from tissuq.studies.measured_file import MeasuredFile, ReadingSettings
+from tissuq.studies.option import option
+from tissuq.studies.shared_options import RunSettings
 
-__all__ = ["ComparedFile", "PredictionSettings", "run_prediction", "stretches"]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+    from tissuq.experiments.experiment import Experiment
+    from tissuq.mechanics import Material
+    from tissuq.studies.prediction import Prediction
+
+__all__ = ["POINTS", "ComparedFile", "PredictionSettings", "run_prediction", "stretches"]
+
+POINTS = 101
+"""Number of stretches of a band by default."""
 
 
 class ComparedFile(MeasuredFile):
@@ -30,20 +31,28 @@ class ComparedFile(MeasuredFile):
     mode: str = ""
 
 
-class PredictionSettings(BaseModel):
+class PredictionSettings(RunSettings):
     """Everything that a prediction depends on."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    run: str
-    discrepancy: str | None = None
-    mode: str = ""
-    stretch: str | None = None
-    stretch2: str | None = None
-    points: int = Field(POINTS, ge=2, le=10_001)
-    prob: float = Field(0.95, gt=0, lt=1)
-    stress_type: Literal["engineering", "cauchy"] = "engineering"
-    data: ComparedFile | None = None
+    mode: str = option("", "Loading mode to predict [that of the data, or of the run]; see tissuq modes.")
+    stretch: str | None = option(
+        None, "Stretches (amounts of shear): a range 0.7:2.0, or a list 1.1,1.2,1.5 [where calibrated]."
+    )
+    stretch2: str | None = option(
+        None, "Of the second control of a mode with two, such as biaxial; one number where it is held."
+    )
+    points: int = option(POINTS, "Stretches in a range.", name="grid-points", ge=2, le=10_001)
+    prob: float = option(0.95, "Probability of the bands.", gt=0, lt=1)
+    stress_type: Literal["engineering", "cauchy"] = option("engineering", "Predict engineering or cauchy stress.")
+    data: ComparedFile | None = option(
+        None,
+        "Measurements of that mode to compare with: a file or a built-in data set. The options of reading, and "
+        "--data-stress-type, say how to read it.",
+        entry="file",
+        takes=Path,
+        of=ReadingSettings,
+        renamed={"stress_type": "data_stress_type", "stretch": "data_stretch", "mode": ""},
+    )
 
     def mode_in(self, folder: Path) -> str:
         """Return the mode to predict: the one asked for, that of the data, or else that of the run.
@@ -53,6 +62,10 @@ class PredictionSettings(BaseModel):
         InputError
             When the data say that they are of another mode, or the run is of several modes.
         """
+        from tissuq.experiments.modes import loading_mode
+        from tissuq.experiments.reading.stated_mode import mode_in_comment
+        from tissuq.studies.earlier_run import modes_of
+
         stated = None if self.data is None else self.data.mode or mode_in_comment(folder / self.data.file)
         if self.mode and stated and loading_mode(self.mode) != loading_mode(stated):
             assert self.data is not None  # noqa: S101 (they told)
@@ -67,7 +80,7 @@ class PredictionSettings(BaseModel):
             )
         return self.mode or stated or modes[0]
 
-    def points_of(self, mode: str) -> FloatArray | None:
+    def points_of(self, mode: str) -> NDArray[np.float64] | None:
         """Return the points that were asked for, (g,) or (g, 2); None where none were.
 
         Raises
@@ -75,6 +88,10 @@ class PredictionSettings(BaseModel):
         InputError
             When a text is no list or range of numbers, or there is not one for every control of the mode.
         """
+        import numpy as np
+
+        from tissuq.experiments.modes import loading_mode
+
         controls = loading_mode(mode).controls
         if self.stretch2 is not None and len(controls) == 1:
             raise InputError(f"mode '{mode}' has one control, {controls[0].name}: leave --stretch2 out.")
@@ -95,7 +112,7 @@ class PredictionSettings(BaseModel):
         return np.column_stack([axis1, axis2])
 
 
-def stretches(text: str, points: int = POINTS) -> FloatArray:
+def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
     """Return the numbers that a text means: ``0.7:2.0`` so many from end to end, ``1.1,1.2,1.5`` these.
 
     Raises
@@ -108,6 +125,8 @@ def stretches(text: str, points: int = POINTS) -> FloatArray:
     >>> stretches("1:2", points=3).tolist(), stretches("1.1, 1.5").tolist()
     ([1.0, 1.5, 2.0], [1.1, 1.5])
     """
+    import numpy as np
+
     is_range = ":" in text
     try:
         numbers = np.array([float(number) for number in text.split(":" if is_range else ",")])
@@ -134,6 +153,8 @@ def run_prediction(
     InputError, ModelError, ConvergenceError
         When run, files or settings cannot be used.
     """
+    from tissuq.studies.prediction import predict_run
+
     step("reading")
     mode = settings.mode_in(folder)
     options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tissuq.errors import InputError, TissuqError
@@ -26,11 +27,16 @@ Named = TypeVar("Named")
 
 
 def load_settings(
-    kind: type[Settings], config: Path | None, options: dict[str, Any], rivals: tuple[str, ...] = ()
+    kind: type[Settings],
+    config: Path | None,
+    options: dict[str, Any],
+    rivals: tuple[str, ...] = (),
+    typed: Mapping[str, str] = MappingProxyType({}),
 ) -> Settings:
     """Return validated settings from a TOML file (or nothing) and the options of the command line, which prevail.
 
-    Of ``rivals`` only one can be set: an option for one of them overrides the others in the file.
+    Of ``rivals`` only one can be set: an option for one of them overrides the others in the file. ``typed`` says as
+    what an option was typed, for messages.
     """
     from pydantic import ValidationError
 
@@ -48,7 +54,7 @@ def load_settings(
         return kind.model_validate(values)
     except ValidationError as error:
         prefix = f"{config}: " if config else ""
-        raise InputError(prefix + "; ".join(_explanations(error, kind)) + ".") from error
+        raise InputError(prefix + "; ".join(_explanations(error, kind, typed)) + ".") from error
 
 
 @contextmanager
@@ -105,24 +111,26 @@ def is_inside(file: Path, folder: Path) -> bool:
         return False
 
 
-def _explanations(error: ValidationError, kind: type[BaseModel]) -> list[str]:
+def _explanations(error: ValidationError, kind: type[BaseModel], typed: Mapping[str, str]) -> list[str]:
     """Return one explanation for each error; all unknown settings share one."""
     items = error.errors()
     unknown = [_place(item) for item in items if item["type"] == "extra_forbidden"]
-    explanations = [_explain(item) for item in items if item["type"] != "extra_forbidden"]
+    explanations = [_explain(item, typed) for item in items if item["type"] != "extra_forbidden"]
     if unknown:
         settings = ", ".join(kind.model_fields)
         explanations.append(f"there is no setting {', '.join(map(repr, unknown))}; the settings are {settings}")
     return explanations
 
 
-def _explain(item: Any) -> str:
+def _explain(item: Any, typed: Mapping[str, str]) -> str:
     location, message = _place(item), str(item["msg"]).removeprefix("Value error, ").rstrip(".")
     if item["type"] == "missing":
         return f"setting '{location}' is missing"
     is_told = item["type"] == "value_error" or isinstance(item["input"], dict)
     value = "" if is_told else f" (it is {item['input']!r})"
-    return f"{location}: {message}{value}" if location else f"{message}{value}"
+    option = next((typed[name] for name in (location, location.partition(".")[0]) if name in typed), None)
+    place = location if option in (None, f"--{location}") else f"{location} ({option})"
+    return f"{place}: {message}{value}" if location else f"{message}{value}"
 
 
 def _place(item: Any) -> str:

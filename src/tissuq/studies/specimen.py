@@ -6,12 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import repeat
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Self
-
-from pydantic import Field, field_validator, model_validator
+from typing import Any
 
 from tissuq.assessment import Assessment, measurement_warnings
 from tissuq.assessment.answer import Answer
@@ -19,7 +16,7 @@ from tissuq.errors import ConvergenceError, InputError, ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.assumptions import is_doubtful
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.findings import data_warnings
+from tissuq.experiments.reading.findings import STRESS_AT_REST, data_warnings
 from tissuq.experiments.reading.notes import each_once
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
@@ -30,7 +27,6 @@ from tissuq.model.discrepancy import (
     discrepancies,
     discrepancy_named,
 )
-from tissuq.model.noise import Noise, noise_named
 from tissuq.model.tolerances import Tolerances
 from tissuq.parameters.parameter import Parameter
 from tissuq.parameters.priors import Prior, prior_from
@@ -38,8 +34,7 @@ from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.result_warning import ResultWarning, Severity, merged, most_severe_first
 from tissuq.studies.held_out import held_out_tests
-from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
-from tissuq.studies.settings import looked_up
+from tissuq.studies.specimen_settings import ALL, SpecimenSettings
 
 __all__ = [
     "ALL",
@@ -51,86 +46,6 @@ __all__ = [
     "run_specimen",
     "warnings_of_files",
 ]
-
-ALL = "all"
-"""In place of discrepancies: the paper's and the average of energies, where they apply to the material."""
-
-
-class SpecimenSettings(FittedSettings, MeasuredFile):
-    """Everything that a fit depends on; stresses (noise, priors) in the unit of stress of the file, or the first one.
-
-    It is of one ``file``, or of several ``tests`` together.
-    """
-
-    file: str = ""
-    tests: tuple[MeasuredTest, ...] = ()
-    estimand: str | None = None
-    tolerances: dict[str, float] | None = None
-    discrepancies: tuple[str, ...] = Field((Auto.name,), min_length=1)
-    priors: dict[str, dict[str, float | str]] = Field(default_factory=dict)
-    held_out: bool = False
-    stable_in: tuple[str, ...] = ()
-
-    @field_validator("discrepancies")
-    @classmethod
-    def _all_or_named(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        if ALL in names and names != (ALL,):
-            raise ValueError(f"'{ALL}' cannot be combined with other names; give '{ALL}', or names")
-        return names
-
-    @field_validator("tolerances")
-    @classmethod
-    def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        looked_up(lambda given: Tolerances(**given), sizes or {})
-        return sizes
-
-    @field_validator("estimand")
-    @classmethod
-    def _estimand_there_is(cls, name: str | None) -> str | None:
-        if name is not None:
-            looked_up(Tolerances, name)
-        return name
-
-    @model_validator(mode="after")
-    def _measured(self) -> Self:
-        if bool(self.file) == bool(self.tests):
-            raise ValueError("give one file, or several tests with a file each")
-        reading = {"name", *ReadingSettings.model_fields}
-        if self.tests and self.model_fields_set & reading:
-            misplaced = ", ".join(sorted(self.model_fields_set & reading))
-            raise ValueError(f"reading options belong in each of the tests, not beside them ({misplaced})")
-        has_noise_sd = [test.noise_sd is not None for test in self.tests]
-        if any(has_noise_sd) and (not all(has_noise_sd) or self.noise or self.noise_sd != "unknown"):
-            raise ValueError("give noise_sd for each of the tests, or once for all of them")
-        if self.held_out and (len(self.tests) < 2 or any(has_noise_sd)):
-            raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
-        return self
-
-    def readings(self, folder: Path = Path(), found: Sequence[Reading | None] = ()) -> list[Reading]:
-        """Return what is read from the file, or those of all tests, unless that is found."""
-        tests = self.tests or (self,)
-        of_tests = found or repeat(None, len(tests))
-        return [test.reading(folder, of_test) for test, of_test in zip(tests, of_tests, strict=True)]
-
-    def experiment(self, folder: Path = Path()) -> Experiment:
-        """Read the measurements, of all tests together."""
-        return Experiment.of([reading.experiment for reading in self.readings(folder)])
-
-    def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
-        """Return the tolerances, those of stresses converted from a unit to MPa; None for those of `tissuq.fit`."""
-        if self.tolerances is None and self.estimand is None:
-            return None
-        sizes = self.tolerances or {}
-        is_stress = {error.name for error, _ in Tolerances(**sizes) if error.is_stress}
-        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in sizes}
-        return Tolerances(self.estimand or "", **{name: size * scale[name] for name, size in sizes.items()})
-
-    def noise_in(self, unit: StressUnit) -> Noise:
-        """Return the noise, known standard deviations converted from a unit to MPa."""
-        values = [test.noise_sd for test in self.tests if test.noise_sd is not None]
-        if values:
-            return noise_named([value * unit.to_mpa for value in values])
-        return super().noise_in(unit)
 
 
 @dataclass(frozen=True)
@@ -325,10 +240,13 @@ def warnings_of_files(readings: Sequence[Reading]) -> tuple[ResultWarning, ...]:
     A unit that was assumed may make the answer wrong by a factor of 100 or 1000.
     """
     messages = ((reading.experiment.name, text) for reading in readings for text in data_warnings(reading))
-    return tuple(
-        ResultWarning(text, "doubtful-reading", Severity.PROBLEM) if is_doubtful(text) else ResultWarning(text)
-        for text in each_once(messages, len(readings), "all tests")
-    )
+    return tuple(map(_warning_of_file, each_once(messages, len(readings), "all tests")))
+
+
+def _warning_of_file(text: str) -> ResultWarning:
+    if is_doubtful(text):
+        return ResultWarning(text, "doubtful-reading", Severity.PROBLEM)
+    return ResultWarning(text, "stress-at-rest" if STRESS_AT_REST in text else "measurements")
 
 
 def _every() -> list[str]:

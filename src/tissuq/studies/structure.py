@@ -5,65 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, fields
-from math import inf
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
-
-from tissuq.errors import ConvergenceError, InputError, ModelError
-from tissuq.finite_elements.case import Case
-from tissuq.finite_elements.response import BULK_RATIO, Solve, solved
+from tissuq.errors import ConvergenceError, ModelError
+from tissuq.finite_elements.response import Solve, solved
 from tissuq.finite_elements.simulation import Simulation, simulate, simulation_warnings
 from tissuq.finite_elements.solver import felupe
 from tissuq.mechanics import Material
 from tissuq.model.discrepancy import NoDiscrepancy
-from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.posterior import Posterior
-from tissuq.registry import find
 from tissuq.studies.earlier_run import load, load_without_discrepancy
+from tissuq.studies.simulation_settings import SimulationSettings
 from tissuq.studies.stream import Step, run_tasks, silent
 
 __all__ = ["Posteriors", "SimulationSettings", "SimulationStudy", "load_posteriors", "run_simulation"]
-
-
-class SimulationSettings(BaseModel):
-    """Everything that a simulation depends on.
-
-    ``sizes`` are fields of the case (mm); ``force_noise`` is in N.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    run: str
-    case: str = "indentation"
-    discrepancy: str | None = None
-    sizes: dict[str, float | str] = Field(default_factory=dict)
-    draws: int = Field(64, ge=2)
-    steps: int = Field(8, ge=1)
-    seed: int = Field(0, ge=0, le=MAX_SEED)
-    force_noise: float | None = Field(None, ge=0, lt=inf)
-    bulk_ratio: float = Field(BULK_RATIO, gt=0, lt=inf)
-
-    def sized_case(self) -> Case:
-        """Return the case with its sizes.
-
-        Raises
-        ------
-        InputError
-            When there is no such case or size, or a size is not possible.
-        """
-        kind = find(Case, "case", self.case, InputError)
-        sizes = {field.name: field.default for field in fields(kind)}
-        for name, value in self.sizes.items():
-            if name not in sizes:
-                defaults = ", ".join(f"{size}={default}" for size, default in sizes.items())
-                raise InputError(f"case '{self.case}' has no size '{name}'; its sizes are {defaults}.")
-            if isinstance(value, str) != isinstance(sizes[name], str):
-                wanted = "a word" if isinstance(sizes[name], str) else "a number"
-                raise InputError(f"case '{self.case}': {name} must be {wanted} like {sizes[name]}, not '{value}'.")
-        return kind(**self.sizes)
 
 
 @dataclass(frozen=True)

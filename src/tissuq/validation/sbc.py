@@ -8,21 +8,21 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from tissuq.errors import ModelError, TissuqError
 from tissuq.experiments.experiment import Experiment
 from tissuq.inference.marginal import Marginal
 from tissuq.mechanics import material_named
-from tissuq.model.discrepancy import discrepancies, discrepancy_named
+from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
-from tissuq.parameters.seeds import MAX_SEED
+from tissuq.studies.campaign_settings import SbcOptions
 from tissuq.studies.stream import Step, run_tasks, silent
 from tissuq.validation.coverage.fitted import fit_all, model_of, parameters_of
 from tissuq.validation.coverage.settings import BLOCK, Design
@@ -61,22 +61,15 @@ POSITIVE, ABOUT_ZERO = Uniform(0.5, 1.5), Normal(0, 0.3)
 """Priors of a material's linear parameters that have none above, MPa."""
 
 
-class SbcSettings(BaseModel):
+class SbcSettings(SbcOptions):
     """Formulations x noise x replicates of a material; in each, parameters from the priors, data, and a fit.
 
     The priors (MPa; psi in stretch) are the same for every data set: none is taken from the data. Known noise is that
     of the design.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    material: str = "neo-hookean"
-    formulations: tuple[str, ...] = Field(default_factory=lambda: tuple(discrepancies()), min_length=1)
-    noise: tuple[Literal["known", "unknown"], ...] = Field(("known", "unknown"), min_length=1)
     design: Design = Design(low=0.6, high=2.0, points=30, noise_sd=0.2)
     priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
-    replicates: int = Field(300, ge=20, le=100_000)
-    seed: int = Field(0, ge=0, le=MAX_SEED)
 
     @field_validator("noise", mode="before")
     @classmethod

@@ -103,10 +103,10 @@ class States:
     def __len__(self) -> int:
         return sum(self._counts)
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, States) or (self.paths, self.curves) != (other.paths, other.curves):
+    def __eq__(self, states: object) -> bool:
+        if not isinstance(states, States) or (self.paths, self.curves) != (states.paths, states.curves):
             return False
-        return all(np.array_equal(*pair) for pair in zip(self.points, other.points, strict=True))
+        return all(np.array_equal(*pair) for pair in zip(self.points, states.points, strict=True))
 
     def __hash__(self) -> int:
         ends = tuple((points.shape, points[:1].tobytes(), points[-1:].tobytes()) for points in self.points)
@@ -230,12 +230,12 @@ class States:
 
     def among(self, numbers: Sequence[int] | NDArray[np.intp]) -> States:
         """Return the states of increasing numbers."""
-        ends, chosen = np.cumsum(self._counts), np.asarray(numbers)
-        parts = zip(self.paths, self.points, self.curves, ends, self._counts, strict=True)
+        ends, rows = np.cumsum(self._counts), np.asarray(numbers)
+        pieces = zip(self.paths, self.points, self.curves, ends, self._counts, strict=True)
         taken = [
-            States((path,), (points[chosen[is_here] - end + count],), (curve,))
-            for path, points, curve, end, count in parts
-            if (is_here := (end - count <= chosen) & (chosen < end)).any()
+            States((path,), (points[rows[is_here] - end + count],), (curve,))
+            for path, points, curve, end, count in pieces
+            if (is_here := (end - count <= rows) & (rows < end)).any()
         ]
         return self.joined(taken)
 

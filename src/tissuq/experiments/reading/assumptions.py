@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tissuq.experiments.reading.column_units import MPA_ASSUMED
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
-from tissuq.experiments.reading.plausibility import RATIO_ASSUMED
-from tissuq.experiments.reading.positions import ZERO_ASSUMED
+from tissuq.experiments.reading.plausibility import RATIO_ASSUMED, ZERO_ASSUMED
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stated_mode import is_torque
 from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
@@ -32,33 +31,33 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
     The type of stress is that which is asked for, if one is.
     """
     source = "; ".join(measured.steps)
-    found = []
+    sentences = []
     if MPA_ASSUMED in source:
-        found.append(
+        sentences.append(
             f"{DOUBTFUL_UNIT} the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit "
             "kPa, or --stress-unit MPa."
         )
     if RATIO_ASSUMED in source:
         strain = STRAIN_MEASURES[choices[0].strain_type].strain
         largest = float(np.abs(strain(measured.stretch)).max()) if strain else 0.0
-        found.append(
+        sentences.append(
             f"{DOUBTFUL_UNIT} the file states no unit of strain, and {largest:g} was taken as {largest:.0%}; say which "
             "it is: --strain-unit % or --strain-unit 1."
         )
     if UNIT_ASSUMED in source:
-        found.append(
+        sentences.append(
             f"{DOUBTFUL_UNIT} the file states no unit of the sizes of specimens, so that of displacements was assumed, "
             f"{source[: source.index(UNIT_ASSUMED)].split()[-1].lstrip('(')}. If it is another, read one specimen at a "
             'time, and give its sizes: --length "20 mm", --area "10 mm2".'
         )
     for choice in choices:
         roles = {choice.deformation: choice.measure, choice.stress: choice.load}
-        found += [_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit]
+        sentences += [_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit]
     if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
-        found += [_about_rim(name) for name in measured.table.names if is_torque(name)]
+        sentences += [_about_rim(name) for name in measured.table.names if is_torque(name)]
     if ZERO_ASSUMED in source:
-        found += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
-    return tuple(found)
+        sentences += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
+    return tuple(sentences)
 
 
 def _about_name(measured: MeasuredRows, column: int, role: str) -> str:

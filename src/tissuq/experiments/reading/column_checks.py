@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import split
 from tissuq.experiments.reading.recognition import (
     DEFORMATIONS,
@@ -19,15 +17,13 @@ from tissuq.experiments.reading.recognition import (
     LOADS,
     OTHER_MEASURE,
     SHEARS,
+    ColumnChoice,
     Contents,
     say_which,
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import PRESSURE
 from tissuq.experiments.units import measured_in
-
-if TYPE_CHECKING:
-    from tissuq.experiments.reading.columns import ColumnChoice
 
 __all__ = ["SPREAD_ROLES", "check_machine", "check_roles", "check_test", "check_together", "with_types"]
 
@@ -119,10 +115,10 @@ def _ratio_role(table: Table, column: int) -> str:
     return "stretch" if abs(values[0] - 1) < abs(values[0]) else "strain"
 
 
-def _is_same(table: Table, first: int, second: int) -> bool:
+def _is_same(table: Table, column: int, same_column: int) -> bool:
     """Return whether two columns say the same."""
-    one, other = table.numbers([first, second])
-    return bool(np.abs(other - one).max() <= MAX_DIFFERENCE * np.ptp(one))
+    values, same_values = table.numbers([column, same_column])
+    return bool(np.abs(same_values - values).max() <= MAX_DIFFERENCE * np.ptp(values))
 
 
 def _columns_on_specimen(table: Table, quantities: Sequence[str]) -> list[int]:
@@ -198,13 +194,13 @@ def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> Column
     is_told = contents.strain_type or contents.stress_type
     if is_strain and choice.load == "stress" and not is_told and (strain_type == "") != (stress_type == ""):
         stated, unstated = ("strain", "stress") if strain_type else ("stress", "strain")
-        column, other = choice.stress, choice.deformation
+        column, column_of_type = choice.stress, choice.deformation
         if unstated == "strain":
-            column, other = other, column
+            column, column_of_type = column_of_type, column
         if (strain_type or stress_type) != "engineering":
             raise InputError(
                 f"{table.place(column)} does not say which type of {unstated} it is, and {stated} "
-                f"{table.label(other)} is {strain_type or stress_type}. {say_which(unstated)}"
+                f"{table.label(column_of_type)} is {strain_type or stress_type}. {say_which(unstated)}"
             )
     return replace(choice, strain_type=strain_type or "engineering", stress_type=stress_type or "engineering")
 
@@ -235,7 +231,7 @@ def _check_lines_above(table: Table, column: int, kind: str) -> None:
 
 def check_test(table: Table, stress: int, mapping: Mapping[str, str | int], is_shear: bool) -> None:
     """Refuse a shear stress where nothing is sheared, and amplitudes of oscillations, which are no curve."""
-    quantities = [heading(name).quantity for name in table.names]
+    quantities = table.quantities
     if is_shear and not mapping.keys() & LOADS and NORMAL.search(quantities[stress]):
         raise InputError(
             f"{table.place(stress)} is normal to the sheared planes, and no column is recognised as a shear stress, a "

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments import units
-from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, Quantity
 
-__all__ = ["MPA_ASSUMED", "declared_unit", "factor_of", "strain_factor_of", "stress_unit_of"]
+__all__ = ["MPA_ASSUMED", "UnitOption", "declared_unit", "factor_of", "strain_factor_of", "stress_unit_of"]
 
+UnitOption = Literal["force_unit", "displacement_unit", "strain_unit"]
+"""Options of reading that state the unit of a column."""
 MPA_ASSUMED = "MPa (assumed: the file states no unit)"
 LARGEST_ASSUMED_STRESS = 100.0
 """Largest stress, MPa, of a soft material: numbers beyond it that have no unit are not taken as MPa."""
@@ -34,8 +39,11 @@ def declared_unit(table: Table, column: int) -> str:
     return table.unit(column)
 
 
-def factor_of(table: Table, column: int, quantity: Quantity, option: str, unit: str | None) -> tuple[float, str]:
-    """Return the factor from a column's unit of force or length, and the words for where it comes from."""
+def factor_of(
+    table: Table, column: int, quantity: Quantity, option: UnitOption, options: ReadingOptions
+) -> tuple[float, str]:
+    """Return the factor from a column's unit, which an option may state, and the words for where it comes from."""
+    unit = options.get(option)
     declared = declared_unit(table, column)
     proposed = f"{declared}f" if quantity is FORCE and declared in units.MASSES else quantity.unit
     hint = f"give {option} (--{option.replace('_', '-')} {proposed})"
@@ -56,8 +64,9 @@ def factor_of(table: Table, column: int, quantity: Quantity, option: str, unit: 
     return factor, f"{unit} (as given)"
 
 
-def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, strain_unit: str | None) -> float:
+def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, options: ReadingOptions) -> float:
     """Return what one unit of a column of strains is as a plain ratio."""
+    strain_unit = options.get("strain_unit")
     column = table.place(choice.deformation)
     try:
         in_file = units.strain_factor(declared)
@@ -78,10 +87,10 @@ def strain_factor_of(table: Table, choice: ColumnChoice, declared: str, strain_u
 
 
 def stress_unit_of(
-    table: Table, choice: ColumnChoice, stress_unit: str | None, largest: float
+    table: Table, choice: ColumnChoice, values: Column, options: ReadingOptions
 ) -> tuple[units.StressUnit, str]:
-    """Return the unit of the stresses, the largest of which is given, and the words for where it comes from."""
-    declared = declared_unit(table, choice.stress)
+    """Return the unit of stresses, and the words for where it comes from."""
+    declared, stress_unit = declared_unit(table, choice.stress), options.get("stress_unit")
     if stress_unit is not None:
         unit = units.stress_unit(stress_unit)
         in_file = _unit_or_none(declared)
@@ -92,7 +101,7 @@ def stress_unit_of(
             )
         return unit, f"{unit.name} (as given)"
     if not declared:
-        _check_assumed_mpa(table, choice, largest)
+        _check_assumed_mpa(table, choice, float(np.abs(values).max()))
         return units.StressUnit("MPa", 1.0), MPA_ASSUMED
     try:
         unit = units.stress_unit(declared)
@@ -107,16 +116,16 @@ def _check_assumed_mpa(table: Table, choice: ColumnChoice, largest: float) -> No
     """Refuse to take stresses without a unit as MPa where the file speaks of another one, or by their size."""
     texts = {"the name": table.names[choice.stress], "the row of units": " ".join(table.units)}
     texts |= {f"line {line}": text for line, text in table.head}
-    mentions = ((where, unit) for where, text in texts.items() for unit in units.stress_units_in(text))
-    where, unit = next((mention for mention in mentions if units.stress_unit(mention[1]).to_mpa != 1.0), ("", ""))
+    mentions = ((source, unit) for source, text in texts.items() for unit in units.stress_units_in(text))
+    source, unit = next((mention for mention in mentions if units.stress_unit(mention[1]).to_mpa != 1.0), ("", ""))
     if unit:
-        found, likely = f"but {where} speaks of {unit}", unit
+        reason, likely = f"but {source} speaks of {unit}", unit
     elif largest > LARGEST_ASSUMED_STRESS:
-        found, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
+        reason, likely = f"and {largest:g} MPa would be more than soft materials bear", "kPa"
     else:
         return
     raise InputError(
-        f"{table.place(choice.stress)}: no unit of stress is stated for it, {found}. Give stress_unit={likely!r} "
+        f"{table.place(choice.stress)}: no unit of stress is stated for it, {reason}. Give stress_unit={likely!r} "
         f"(--stress-unit {likely}), or whichever it is."
     )
 

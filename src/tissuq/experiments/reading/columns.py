@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 from tissuq.errors import InputError
@@ -21,7 +20,6 @@ from tissuq.experiments.reading.column_checks import (
 from tissuq.experiments.reading.headings import (
     AXES,
     COMPONENTS,
-    heading,
     measure_in,
     of_spread,
     on_axis,
@@ -36,6 +34,7 @@ from tissuq.experiments.reading.recognition import (
     DEFORMATIONS_OF_UNITS,
     LENGTHENINGS,
     LOADS,
+    ColumnChoice,
     Contents,
     ambiguous,
     columns_there_are,
@@ -48,40 +47,11 @@ from tissuq.experiments.reading.vocabulary import DEFORMATION_NOUNS, OPEN_WITHOU
 from tissuq.experiments.units import FORCE_PER_WIDTH, measured_in
 
 __all__ = [
-    "ColumnChoice",
     "about_stress",
     "choose_columns",
     "find_column",
     "mapping_of_each_stress",
 ]
-
-
-@dataclass(frozen=True)
-class ColumnChoice:
-    """The columns (counted from 0) of the deformation and of the stress or force, and what they hold.
-
-    Parameters
-    ----------
-    deformation, stress : int
-        The columns.
-    measure : str
-        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear, its rate, twist, or
-        outer or inner diameter.
-    load : str
-        What the other column holds: stress, torque, force or pressure.
-    strain_type, stress_type : str
-        Which measure of strain, or of shear, and of stress.
-    by_unit : frozenset of int
-        Which of the columns were told by their units alone, under names that are not known.
-    """
-
-    deformation: int
-    stress: int
-    measure: str = "stretch"
-    load: str = "stress"
-    strain_type: str = "engineering"
-    stress_type: str = "engineering"
-    by_unit: frozenset[int] = frozenset()
 
 
 def choose_columns(
@@ -122,7 +92,8 @@ def choose_columns(
         raise InputError(f"loading mode '{mode.name}' reads both axes; leave axis (--axis) out, or give another mode.")
     mappings = mapping_of_each_stress(mode, mapping)
     is_of_axes = bool(mode.machine_axes) and _axes_of(table) == list(mode.machine_axes)
-    if not is_of_axes and not all(_has_roles(mode, roles) for roles in mappings[1:]):
+    needed = (LOADS,) if len(mode.controls) == 1 else (LOADS, DEFORMATIONS)
+    if not is_of_axes and not all(roles.keys() & kind for roles in mappings[1:] for kind in needed):
         raise _roles_missing(table, mode)
     axes = mode.machine_axes if is_of_axes else (axis,) * count
     labels = [f"axis {name}" for name in axes] if is_of_axes else list(mode.stresses) if count > 1 else [""]
@@ -158,7 +129,7 @@ def find_column(table: Table, role: str, wanted: str | int) -> int:
     readings = (
         table.names,
         [name.lower() for name in table.names],
-        [heading(name).quantity for name in table.names],
+        table.quantities,
     )
     for names, key in zip(readings, (text, text.lower(), plain(text)), strict=True):
         columns = [column for column, name in enumerate(names) if name and name == key]
@@ -185,7 +156,7 @@ def _names(table: Table) -> list[tuple[str, str]]:
 
     Beside columns of a spread without words for a mean.
     """
-    quantities = [heading(name).quantity for name in table.names]
+    quantities = table.quantities
     is_less_one = stretches_less_one(table.names)
     quantities = ["strain" if less_one else name for name, less_one in zip(quantities, is_less_one, strict=True)]
     is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]
@@ -206,11 +177,6 @@ def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] |
     return mappings
 
 
-def _has_roles(mode: LoadingMode, mapping: Mapping[str, str | int]) -> bool:
-    """Return whether a mapping holds a stress or force, and a deformation where each stress has one of its own."""
-    return bool(mapping.keys() & LOADS and (len(mode.controls) == 1 or mapping.keys() & DEFORMATIONS))
-
-
 def _choice(
     table: Table,
     mode: LoadingMode,
@@ -219,7 +185,7 @@ def _choice(
     axis: str | None,
 ) -> ColumnChoice:
     """Return the columns of one stress; ``types`` are the measures of strain and stress that are asked for."""
-    is_shear, told = mode.controls == (SHEAR,), set[int]()
+    is_shear, unnamed = mode.controls == (SHEAR,), set[int]()
     check_roles(table, mapping, is_shear)
     contents = Contents(_quantities(table, axis, mapping), [measure for _, measure in _names(table)], *types)
     mapping = with_columns_of_tube(table, mode, mapping, contents.quantities)
@@ -231,7 +197,7 @@ def _choice(
         load = next((role for role in loads if contents.fitting(role)), "")
         by_unit = None if load else told_by_unit(table, contents, loads)
         load, stress = by_unit or (load, recognise(table, contents, [load or "force"], loads))
-        told |= {stress} if by_unit else set()
+        unnamed |= {stress} if by_unit else set()
         is_per_width = measured_in(table.unit(stress)) == FORCE_PER_WIDTH.name
         load = "force" if load == "stress" and is_per_width else load
     measure = next((role for role in DEFORMATIONS if role in mapping), None)
@@ -252,7 +218,7 @@ def _choice(
         by_unit = None if is_named else told_by_unit(table, contents, kinds, stress)
         if by_unit:
             measure, deformation = DEFORMATIONS_OF_UNITS[by_unit[0]], by_unit[1]
-            told |= {deformation} if contents.quantities[deformation] not in OPEN_WITHOUT_UNIT else set()
+            unnamed |= {deformation} if contents.quantities[deformation] not in OPEN_WITHOUT_UNIT else set()
         else:
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
@@ -273,7 +239,7 @@ def _choice(
             f"give two columns. {columns_there_are(table)}"
         )
     check_test(table, stress, mapping, is_shear)
-    return with_types(table, ColumnChoice(deformation, stress, measure, load, by_unit=frozenset(told)), contents)
+    return with_types(table, ColumnChoice(deformation, stress, measure, load, by_unit=frozenset(unnamed)), contents)
 
 
 def _quantities(table: Table, axis: str | None, mapping: Mapping[str, str | int]) -> list[str]:

@@ -11,14 +11,16 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.columns import ColumnChoice, about_stress, mapping_of_each_stress
+from tissuq.experiments.reading.columns import about_stress, mapping_of_each_stress
 from tissuq.experiments.reading.deformations import stretch_of, without_machine
-from tissuq.experiments.reading.dimensions import Dimensions, dimensions_of, dimensions_of_stresses
+from tissuq.experiments.reading.dimensions import Dimensions
+from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimensions_of_stresses
 from tissuq.experiments.reading.height_of_block import of_block
 from tissuq.experiments.reading.labels import columns_only
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
 from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
 from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.repeated_sizes import test_beside
 from tissuq.experiments.reading.several_specimens import check_one_specimen
 from tissuq.experiments.reading.spread import Spread, spread_of
@@ -61,19 +63,16 @@ def measured_rows(
         words += ["compression"] if options.get("compression_positive") else []
         dimensions = of_block(table, columns[0], (numbers[0][0], numbers[0][1]), dimensions, words)
     sizes = dimensions_of_stresses(table, dimensions, mode, columns, [deformation for deformation, _ in numbers])
-    units = options.get("strain_unit"), options.get("displacement_unit"), options.get("zero")
-    compliance = options.get("compliance"), options.get("force_unit")
-    units_of_load = options.get("stress_unit"), options.get("force_unit")
     stretches, loads, stretch_steps, spreads = [], [], [], []
     mappings = mapping_of_each_stress(mode, options.get("columns"))
     for number, (choice, size, (deformation, load)) in enumerate(zip(columns, sizes, numbers, strict=True)):
-        is_force = choice.load == "force" and force_in(table, choice.stress, compliance[1]) is FORCE
+        is_force = choice.load == "force" and force_in(table, choice.stress, options) is FORCE
         size = replace(size, divide_forces=is_force)
         with about_stress(number, labels, mode):
-            load, counted = without_zero(table, choice, load, options.get("load_zero"), *units_of_load)
-            deformation, given_way = without_machine(table, choice, deformation, load, units[1], *compliance)
-            stretch, step = stretch_of(table, choice, deformation, load, size, *units)
-            stress = stress_of(table, choice, load, size, *units_of_load)
+            load, counted = without_zero(table, choice, load, options)
+            deformation, given_way = without_machine(table, choice, deformation, load, options)
+            stretch, step = stretch_of(table, choice, deformation, load, size, options)
+            stress = stress_of(table, choice, load, size, options)
             spreads.append(spread_of(table, choice, mappings[number], stress, options.get("mean_of")))
         stretches.append(stretch)
         stretch_steps.append(f"{step}{given_way}")

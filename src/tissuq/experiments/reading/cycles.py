@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
@@ -106,12 +105,11 @@ def _cycle_labels(table: Table) -> list[str]:
 
     CellScale's machines write the phase beside the number (``2-Stretch``, ``2-Recover``), which is left out.
     """
-    quantities = [heading(name).quantity for name in table.names]
-    cycle = [column for column, name in enumerate(quantities) if name in CYCLE_NAMES]
+    cycle = [column for column, name in enumerate(table.quantities) if name in CYCLE_NAMES]
     if len(cycle) != 1:
         return []
     numbers = [re.sub(r"^(\d+)-.*$", r"\1", text) for text in table.texts(cycle[0])]
-    sets = [column for column, name in enumerate(quantities) if name in SET_NAMES]
+    sets = [column for column, name in enumerate(table.quantities) if name in SET_NAMES]
     if not sets:
         return numbers
     return [f"{name} {number}" for name, number in zip(table.texts(sets[0]), numbers, strict=True)]

@@ -1,19 +1,21 @@
-"""Tables in memory as columns with units: of pandas, polars and xarray, none of which is imported, and mappings."""
+"""Tables in memory as columns with units: of pandas, polars and xarray, or mappings; and files that store them."""
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, as_text
-from tissuq.experiments.units import is_quantity, unit_of
+from tissuq.experiments.pint_units import is_quantity, unit_of
+from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, FileFormat, as_text, explained, line_of
 
-__all__ = ["DataColumn", "columns_of", "is_data_frame", "kind_of", "lines_of"]
+__all__ = ["DataColumn", "ParquetFile", "columns_of", "is_data_frame", "kind_of", "lines_of"]
 
 PANDAS, XARRAY, POLARS, LAZY, OTHERS = "iloc", "to_dataframe", "get_columns", "collect", "to_pandas"
 """What a table of each library can do, and no path can."""
@@ -21,6 +23,8 @@ NUMBERS = "iuf"
 """Kinds of numpy's arrays of numbers."""
 NO_NAME = "Unnamed:"
 """How pandas begins the name of a column whose heading is empty."""
+MOST_ROWS = 10_000_000
+"""Rows of a file that is read; one of a few bytes may say that it has any number."""
 
 
 class DataColumn(NamedTuple):
@@ -109,8 +113,8 @@ def _of_pandas(frame: Any) -> Iterator[DataColumn]:
     if any(name is not None and name not in frame.columns for name in frame.index.names):
         frame = frame.reset_index()
     for number, name in enumerate(frame.columns):
-        parts = [str(part) for part in (name if isinstance(name, tuple) else (name,))]
-        heading = " ".join(part for part in parts if part and not part.startswith(NO_NAME))
+        levels = [str(level) for level in (name if isinstance(name, tuple) else (name,))]
+        heading = " ".join(level for level in levels if level and not level.startswith(NO_NAME))
         column = frame.iloc[:, number]
         if hasattr(column.dtype, "units"):  # of pint-pandas
             yield _of_array(heading, column.array.quantity)
@@ -137,3 +141,22 @@ def _of_array(name: str, values: Any) -> DataColumn:
     if array.ndim != 1:
         raise InputError(f"column '{name}' must be one-dimensional, not of shape {array.shape}.")
     return DataColumn(name, unit, array)
+
+
+class ParquetFile(FileFormat):
+    """A table of columns with names, as dataframes are stored."""
+
+    name = "parquet"
+    signature = b"PAR1"
+
+    def sheets(self, path: str | os.PathLike[str]) -> dict[str, list[str]]:
+        with explained(path, "a Parquet file", "polars", "export the table as CSV", extra="parquet"):
+            import polars
+
+            content = polars.scan_parquet(Path(path))
+            rows = int(content.select(polars.len()).collect().item())
+            frame = content.collect() if rows <= MOST_ROWS else None
+        if frame is None:
+            raise InputError(f"{path} has {rows} rows; at most {MOST_ROWS} are read. Export fewer.")
+        columns = columns_of(frame)
+        return {"table": [line_of([column.name for column in columns]), *lines_of(columns)]}

@@ -7,11 +7,21 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
-from tissuq.experiments.reading.column_units import declared_unit, factor_of, strain_factor_of
-from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words, initial_size, tube_of
-from tissuq.experiments.reading.plausibility import DOUBTFUL_STRAIN, RATIO_ASSUMED, check_strain
-from tissuq.experiments.reading.positions import FIRST_ROW, LITTLE_LOAD, ZERO_ASSUMED, check_lengths, check_positions
+from tissuq.experiments.reading.column_units import UnitOption, declared_unit, factor_of, strain_factor_of
+from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words, tube_of
+from tissuq.experiments.reading.dimensions_of_table import initial_size
+from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.plausibility import (
+    DOUBTFUL_STRAIN,
+    FIRST_ROW,
+    LITTLE_LOAD,
+    RATIO_ASSUMED,
+    ZERO_ASSUMED,
+    check_lengths,
+    check_positions,
+    check_strain,
+)
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS
@@ -24,16 +34,9 @@ NOTABLE_TWIST = 0.05
 
 
 def stretch_of(
-    table: Table,
-    choice: ColumnChoice,
-    values: Column,
-    load: Column,
-    dimensions: Dimensions,
-    strain_unit: str | None,
-    displacement_unit: str | None,
-    zero: str | None,
+    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions, options: ReadingOptions
 ) -> tuple[Column, str]:
-    """Return the stretches and how they were obtained; `zero` is where displacements are counted from.
+    """Return the stretches, or amounts of shear, and how they were obtained.
 
     Raises
     ------
@@ -41,24 +44,28 @@ def stretch_of(
         When units contradict each other or are missing, or the length of the specimen is not known.
     """
     if choice.measure == "twist":
-        return _from_twist(table, choice, values, dimensions, strain_unit, zero)
+        return _from_twist(table, choice, values, dimensions, options)
     if choice.measure == "rate":
         return _from_rate(table, choice, values)
-    if choice.measure == "sliding":
-        stretch, step = _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
-        return stretch - 1, step.replace("stretch = 1 +", "amount of shear =")
-    if choice.measure == "displacement":
-        return _from_displacement(table, choice, values, load, dimensions, displacement_unit, zero)
-    if zero is not None:
+    if choice.measure in ("displacement", "sliding"):
+        return _from_displacement(table, choice, values, load, dimensions, options)
+    if (zero := options.get("zero")) is not None:
         raise InputError(
             f"{table.place(choice.deformation)} is read as {choice.measure}, but zero='{zero}' is given, which is for "
             "displacements. Leave zero (--zero) out, or give the column as displacement."
         )
     if choice.measure == "length":
-        return _from_length(table, choice, values, load, dimensions, displacement_unit)
+        return _from_length(table, choice, values, load, dimensions, options)
     if choice.measure in DIAMETERS:
-        return _from_diameter(table, choice, values, dimensions, displacement_unit)
-    _refuse(table, choice, "displacement_unit", displacement_unit)
+        return _from_diameter(table, choice, values, dimensions, options)
+    return _from_ratio(table, choice, values, load, dimensions, options)
+
+
+def _from_ratio(
+    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions, options: ReadingOptions
+) -> tuple[Column, str]:
+    """Return stretches, or the stretches or amounts of shear that strains or angles tell, and how."""
+    _refuse(table, choice, "displacement_unit", options)
     if "length" in dimensions.set_by_user:
         raise InputError(
             f"{table.place(choice.deformation)} is read as {choice.measure}, which needs no length. Leave --length "
@@ -66,19 +73,19 @@ def stretch_of(
         )
     is_strain = choice.measure == "strain"
     if not is_strain and choice.strain_type != "angle":
-        _refuse(table, choice, "strain_unit", strain_unit)
+        _refuse(table, choice, "strain_unit", options)
     declared = declared_unit(table, choice.deformation)
     if not is_strain and not units.looks_like_unit(declared):
         declared = ""
     label, is_shear = table.label(choice.deformation), choice.measure == "shear"
     if choice.strain_type == "angle":
-        factor, unit_source = factor_of(table, choice.deformation, ANGLE, "strain_unit", strain_unit)
+        factor, unit_source = factor_of(table, choice.deformation, ANGLE, "strain_unit", options)
         scaled = f" in {unit_source}"
     else:
-        factor = strain_factor_of(table, choice, declared, strain_unit)
+        factor = strain_factor_of(table, choice, declared, options)
         scaled = "" if factor == 1 else f" x {factor:g}"
     if is_strain:
-        has_unit = bool(declared or strain_unit)
+        has_unit = bool(declared or options.get("strain_unit"))
         check_strain(table, choice, values * factor, load, has_unit=has_unit)
         is_doubtful = not has_unit and np.abs(values).max() > DOUBTFUL_STRAIN
         scaled += f" {RATIO_ASSUMED}" if is_doubtful else ""
@@ -93,13 +100,7 @@ def stretch_of(
 
 
 def without_machine(
-    table: Table,
-    choice: ColumnChoice,
-    displacement: Column,
-    load: Column,
-    displacement_unit: str | None,
-    compliance: str | None,
-    force_unit: str | None,
+    table: Table, choice: ColumnChoice, displacement: Column, load: Column, options: ReadingOptions
 ) -> tuple[Column, str]:
     """Return displacements of the specimen alone, in the unit of the file, and how the machine's were taken off.
 
@@ -110,7 +111,7 @@ def without_machine(
     InputError
         When the compliance is not a length over a force, or the file does not give displacement and force.
     """
-    if compliance is None:
+    if (compliance := options.get("compliance")) is None:
         return displacement, ""
     if (choice.measure, choice.load) != ("displacement", "force"):
         raise InputError(
@@ -122,8 +123,8 @@ def without_machine(
     length, slash, force = unit.partition("/")
     if number is None or number < 0 or not slash:
         raise InputError(f"compliance must be a length over a force such as '0.5 um/N', not '{compliance}'.")
-    in_newtons, _ = factor_of(table, choice.stress, FORCE, "force_unit", force_unit)
-    in_mm, _ = factor_of(table, choice.deformation, LENGTH, "displacement_unit", displacement_unit)
+    in_newtons, _ = factor_of(table, choice.stress, FORCE, "force_unit", options)
+    in_mm, _ = factor_of(table, choice.deformation, LENGTH, "displacement_unit", options)
     per_newton = number * LENGTH.factor(length.strip()) / FORCE.factor(force.strip())
     away = displacement - displacement[0]
     direction = np.sign(away[np.argmax(np.abs(away))] * load[np.argmax(np.abs(load))])
@@ -134,39 +135,34 @@ def without_machine(
 
 
 def _from_displacement(
-    table: Table,
-    choice: ColumnChoice,
-    values: Column,
-    load: Column,
-    dimensions: Dimensions,
-    unit: str | None,
-    zero: str | None,
+    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions, options: ReadingOptions
 ) -> tuple[Column, str]:
-    factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", unit)
+    """Return displacements over the length as stretches, or those of sheared planes over the height as shear."""
+    factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", options)
     in_column = initial_size(table, choice, values) if "length" not in dimensions.sizes else None
     length = in_column or dimensions.length
     displacement, label = values * factor, table.label(choice.deformation)
     start, counted = 0.0, ""
-    if zero is not None:
-        start = float(displacement[0]) if zero == FIRST_ROW else _position(zero, LENGTH)
-        counted = f", counted from {start:g} mm ({'its first row' if zero == FIRST_ROW else 'as given'})"
+    if (zero := options.get("zero")) is not None:
+        start, counted = _zero(zero, float(displacement[0]), LENGTH)
     elif in_column is None and check_positions(table, choice, displacement, load, length.value):
         start = float(displacement[0])
         counted = f", counted from {start:g} mm {ZERO_ASSUMED}"
     source = f"column {label} in {unit_source}{counted} / {length.value:g} mm (length {length.source})"
-    return 1 + (displacement - start) / length.value, f"stretch = 1 + {source}"
+    stretch = 1 + (displacement - start) / length.value
+    is_shear = choice.measure == "sliding"
+    return (stretch - 1, f"amount of shear = {source}") if is_shear else (stretch, f"stretch = 1 + {source}")
 
 
 def _from_twist(
-    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None, zero: str | None
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, options: ReadingOptions
 ) -> tuple[Column, str]:
     """Return the amount of shear at the rim of a disc, and how it was obtained."""
-    factor, unit_source = factor_of(table, choice.deformation, ANGLE, "strain_unit", unit)
+    factor, unit_source = factor_of(table, choice.deformation, ANGLE, "strain_unit", options)
     radius, height, twist = dimensions.radius, dimensions.length, values * factor
     start, counted = 0.0, ""
-    if zero is not None:
-        start = float(twist[0]) if zero == FIRST_ROW else _position(zero, ANGLE)
-        counted = f", counted from {start:g} rad ({'its first row' if zero == FIRST_ROW else 'as given'})"
+    if (zero := options.get("zero")) is not None:
+        start, counted = _zero(zero, float(twist[0]), ANGLE)
     elif abs(twist[0]) > NOTABLE_TWIST * float(np.ptp(twist)):
         raise InputError(
             f"{table.place(choice.deformation, 0)}: the twist begins at {values[0]:g}, not at 0. If the disc is "
@@ -188,24 +184,24 @@ def _from_rate(table: Table, choice: ColumnChoice, values: Column) -> tuple[Colu
             f"{table.place(choice.deformation)} is a rate of shear, which over time makes the amount of shear, but "
             f"{len(times)} columns are times. Add a column of shear to the file (--column shear=NAME)."
         )
-    rate, rate_source = factor_of(table, choice.deformation, RATE, "strain_unit", None)
-    second, _ = factor_of(table, times[0], TIME, "strain_unit", None)
+    rate, rate_source = factor_of(table, choice.deformation, RATE, "strain_unit", {})
+    seconds, _ = factor_of(table, times[0], TIME, "strain_unit", {})
     (time,) = table.numbers(times)
     if (np.diff(time) < 0).any():
         row = int(np.argmax(np.diff(time) < 0)) + 1
         raise InputError(f"{table.place(times[0], row)}: the time goes back, so that no shear follows from its rate.")
-    shear = cumulative_trapezoid(values * rate, time * second, initial=0.0)
+    shear = cumulative_trapezoid(values * rate, time * seconds, initial=0.0)
     label, over = table.label(choice.deformation), table.label(times[0])
     return shear, f"amount of shear = integral of column {label} in {rate_source} over {over}, 0 in the first row"
 
 
 def _from_length(
-    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions, unit: str | None
+    table: Table, choice: ColumnChoice, values: Column, load: Column, dimensions: Dimensions, options: ReadingOptions
 ) -> tuple[Column, str]:
     """Return current lengths, heights or distances over the undeformed one, or the first, and how that was done."""
-    if PIXELS.factor_or_none(unit or declared_unit(table, choice.deformation)):
+    if PIXELS.factor_or_none(options.get("displacement_unit") or declared_unit(table, choice.deformation)):
         return _from_distance(table, choice, values, load, dimensions)
-    factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", unit)
+    factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", options)
     current = values * factor
     length = dimensions.length if "length" in dimensions.sizes else Dimension(float(current[0]), "in its first row")
     check_lengths(table, choice, current)
@@ -234,10 +230,10 @@ def _from_distance(
 
 
 def _from_diameter(
-    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, unit: str | None
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, options: ReadingOptions
 ) -> tuple[Column, str]:
     """Return the hoop stretches in the middle of the wall of a tube, and how they were obtained."""
-    factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", unit)
+    factor, unit_source = factor_of(table, choice.deformation, LENGTH, "displacement_unit", options)
     tube, words = tube_of(dimensions)
     is_outer = choice.measure == DIAMETERS[0]
     face, letter = (tube.outer, "B") if is_outer else (tube.inner, "A")
@@ -249,18 +245,21 @@ def _from_diameter(
     return stretch, f"hoop stretch in the middle of the wall = sqrt(1 + (d^2/4 - {letter}^2)/(A B)): {side}, {words}"
 
 
-def _position(text: str, quantity: Quantity) -> float:
-    """Return the position from which displacements, or the angle from which twists are counted."""
+def _zero(text: str, first_value: float, quantity: Quantity) -> tuple[float, str]:
+    """Return the position from which displacements, or the angle from which twists are counted, and words for it."""
+    if text == FIRST_ROW:
+        return first_value, f", counted from {first_value:g} {quantity.unit} (its first row)"
     number, unit = number_and_unit(text)
     if number is None or not unit:
         raise InputError(
             f"zero must be 'first', or a {quantity.name} with its unit such as '35.2 {quantity.unit}', not '{text}'."
         )
-    return number * quantity.factor(unit)
+    start = number * quantity.factor(unit)
+    return start, f", counted from {start:g} {quantity.unit} (as given)"
 
 
-def _refuse(table: Table, choice: ColumnChoice, option: str, value: str | None) -> None:
-    if value is not None:
+def _refuse(table: Table, choice: ColumnChoice, option: UnitOption, options: ReadingOptions) -> None:
+    if (value := options.get(option)) is not None:
         role = option.removesuffix("_unit")
         raise InputError(
             f"{table.place(choice.deformation)} is read as {choice.measure}, but {option}='{value}' is "

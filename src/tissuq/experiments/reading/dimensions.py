@@ -1,34 +1,24 @@
-"""Cross-section and length of a specimen: as the user gives them, or as the file states them, along each axis."""
+"""Dimensions of a specimen, and the length, cross-section or wall that follow from them where they are known."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isclose, pi, prod
 
-import numpy as np
-
 from tissuq.errors import InputError
-from tissuq.experiments.modes import LoadingMode
-from tissuq.experiments.numbers import number_and_unit
-from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import heading, on_axis
-from tissuq.experiments.reading.inflation import Tube
-from tissuq.experiments.reading.mean_size import MEAN_OF, statements_of_size
-from tissuq.experiments.reading.repeated_sizes import TestBeside
-from tissuq.experiments.reading.stated_sizes import StatedSize, stated_sizes
-from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES
+from tissuq.experiments.reading.stated_sizes import StatedSize
+from tissuq.experiments.reading.uneven_stress import Tube
 from tissuq.experiments.units import AREA, LENGTH, PIXELS, Quantity
 
 __all__ = [
+    "SECTIONS",
     "Dimension",
     "Dimensions",
-    "dimensions_of",
-    "dimensions_of_stresses",
-    "given_size",
+    "agree",
     "in_words",
-    "initial_size",
+    "quantity_of",
+    "sections_of",
     "tube_of",
 ]
 
@@ -45,8 +35,6 @@ SECTIONS = {"area": ("area",), "rectangle": ("width", "thickness"), "circle": ("
 EACH_ALONE = " If they differ from test to test, read each by its name, FILE#NAME, with its own."
 PLURALS = {"thickness": "thicknesses"}
 """Of names of sizes that do not end in s alone."""
-TURNED = {"length": "width", "width": "length"}
-"""What the undeformed sizes along the first and the second axis are to the second one."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +60,7 @@ class Dimensions:
     sizes: Mapping[str, Dimension]
     set_by_user: frozenset[str]
     ambiguous: Mapping[str, str]
-    others: tuple[StatedSize, ...] = ()
+    further_sizes: tuple[StatedSize, ...] = ()
     contradictions: tuple[str, ...] = ()
     divide_forces: bool = False
     averages: tuple[str, ...] = ()
@@ -94,10 +82,10 @@ class Dimensions:
             "to turn displacements into stretches give the undeformed length: length '20 mm' "
             '(--length "20 mm"; in Python dimensions={"length": "20 mm"}).'
             + area_too
-            * (self.divide_forces and not _sections(self.sizes)),
+            * (self.divide_forces and not sections_of(self.sizes)),
         )
 
-    def distance(self, first: float) -> Dimension:
+    def distance(self, first_distance: float) -> Dimension:
         """Return the undeformed distance of marks in pixels: the one that is given, or else the first of the test.
 
         Raises
@@ -106,11 +94,11 @@ class Dimensions:
             When a length is given that is not in pixels.
         """
         if "length" not in self.set_by_user:
-            return Dimension(first, "in its first row", PIXELS.unit)
+            return Dimension(first_distance, "in its first row", PIXELS.unit)
         if self.sizes["length"].unit != PIXELS.unit:
             raise InputError(
                 f"{self.file}: distances are in pixels, and so must be the undeformed one: give it as "
-                f'--length "{first:.4g} px", or leave it out where the test begins undeformed.'
+                f'--length "{first_distance:.4g} px", or leave it out where the test begins undeformed.'
             )
         return self.sizes["length"]
 
@@ -145,8 +133,8 @@ class Dimensions:
             'dimensions={"diameter": "3 mm", "thickness": "0.5 mm"}).'
         )
         diameter, thickness = self._size("diameter", advice), self._size("thickness", advice)
-        if others := sorted(self.set_by_user - {"diameter", "thickness"}):
-            raise InputError(f"{self.file} is read as pressure and diameter of a tube, which need no {others[0]}.")
+        if unneeded := sorted(self.set_by_user - {"diameter", "thickness"}):
+            raise InputError(f"{self.file} is read as pressure and diameter of a tube, which need no {unneeded[0]}.")
         if thickness.value >= diameter.value / 2:
             raise InputError(
                 f"{self.file}: a wall of {thickness.value:g} mm (thickness {thickness.source}) does not fit into an "
@@ -163,7 +151,7 @@ class Dimensions:
         InputError
             When it is not known, or follows in two ways that contradict each other.
         """
-        areas = _sections(self.sizes)
+        areas = sections_of(self.sizes)
         self._refuse_open_height("area", "width", "thickness", "diameter")
         areas_of_user = {name: area for name, area in areas.items() if self.set_by_user & set(SECTIONS[name])}
         if not areas_of_user:
@@ -175,7 +163,7 @@ class Dimensions:
                 f"{self._partly_known()}"
             )
         area, *alternatives = areas.values()
-        if any(not _agree(area, alternative) for alternative in alternatives):
+        if any(not agree(area, alternative) for alternative in alternatives):
             words = " or ".join(f"{section.value:g} mm2 ({section.source})" for section in areas.values())
             raise InputError(
                 f"{self.file}: the cross-section could be {words}. "
@@ -192,9 +180,9 @@ class Dimensions:
         InputError
             When it is not known, or sizes are given that a force per width does not need.
         """
-        if others := sorted(self.set_by_user & {"area", "width", "diameter"}):
+        if unneeded := sorted(self.set_by_user & {"area", "width", "diameter"}):
             raise InputError(
-                f"{self.file} holds a force per width, which over the thickness is a stress: leave {others[0]} out, "
+                f"{self.file} holds a force per width, which over the thickness is a stress: leave {unneeded[0]} out, "
                 'and give the undeformed thickness (--thickness "2 mm").'
             )
         return self._size(
@@ -220,156 +208,36 @@ class Dimensions:
                 sizes = f"{count} {PLURALS.get(name, f'{name}s')}"
                 raise InputError(
                     f"{self.file}: the file states {sizes}: {self.ambiguous[name]}. Say which: --{name} "
-                    f'"NUMBER {_quantity(name).unit}".{EACH_ALONE * self.is_one_of_several}'
+                    f'"NUMBER {quantity_of(name).unit}".{EACH_ALONE * self.is_one_of_several}'
                 )
 
     def _partly_known(self) -> str:
         sides = [name for name in ("width", "thickness") if name in self.sizes]
         if sides:
-            other = "thickness" if sides[0] == "width" else "width"
-            return f"Known is only the {sides[0]}. {self._others(LENGTH, other, default='')}".rstrip()
+            missing_side = "thickness" if sides[0] == "width" else "width"
+            return f"Known is only the {sides[0]}. {self._others(LENGTH, missing_side, default='')}".rstrip()
         areas = self._others(AREA, "area", default="")
         return areas or self._others(LENGTH, "width", "thickness", "diameter")
 
     def _others(self, kind: Quantity, *names: str, default: str = "None is recognised in the file.") -> str:
         """Return what other sizes the file states, and the options that say what they are."""
-        sizes = [size for size in self.others if size.kind is kind][:SHOWN]
+        sizes = [size for size in self.further_sizes if size.kind is kind][:SHOWN]
         if not sizes:
             return default
         said = ", ".join(f"{size.source} '{size.text}'" for size in sizes)
-        which = "that" if len(sizes) == 1 else "one of these"
+        reference = "that" if len(sizes) == 1 else "one of these"
         number = f"{sizes[0].value:g}" if len(sizes) == 1 else "NUMBER"
         options = " or ".join(f'--{name} "{number} {kind.unit}"' for name in names)
         each_alone = EACH_ALONE * self.is_one_of_several
-        return f"The file says {said}: if {which} is the {' or '.join(names)}, give {options}.{each_alone}"
+        return f"The file says {said}: if {reference} is the {' or '.join(names)}, give {options}.{each_alone}"
 
 
-def dimensions_of(
-    table: Table,
-    set_by_user: Mapping[str, str] | None,
-    specimens: Collection[str],
-    test: TestBeside | None = None,
-) -> Dimensions:
-    """Return the dimensions that the user gives, and those of the file where the user gives none.
-
-    The file may state those of several specimens; that in the table is the one which it calls by some names, or over
-    whose columns they stand.
-
-    Raises
-    ------
-    InputError
-        When a dimension is unknown or has no unit.
-    """
-    texts = dict(set_by_user or {})
-    unknown = [name for name in texts if name not in DIMENSION_NAMES]
-    if unknown:
-        raise InputError(f"there is no dimension '{unknown[0]}'; give {', '.join(DIMENSION_NAMES)}.")
-    if len([name for name in ("area", "diameter", "width") if name in texts]) > 1:
-        raise InputError("give the cross-section in one way: area, or width and thickness, or diameter.")
-    every_size = stated_sizes(table, specimens, test)
-    is_cylinder = "diameter" in texts or any(size.is_of("diameter", is_cylinder=False) for size in every_size)
-    stated, ambiguous, others, averages = dict[str, Dimension](), dict[str, str](), every_size, list[str]()
-    for name in DIMENSION_NAMES:
-        of_name = [size for size in every_size if size.is_of(name, is_cylinder=is_cylinder)]
-        others = [size for size in others if size not in of_name]
-        sizes = [Dimension(*statement) for statement in statements_of_size(of_name)]
-        means = [size for size in sizes if size.source.startswith(MEAN_OF) and name not in texts]
-        averages += [f"the {name} is the {mean.source}: {mean.value:.4g} {_quantity(name).unit}." for mean in means]
-        if name not in texts and any(not _agree(size, sizes[0]) for size in sizes):
-            ambiguous[name] = " and ".join(f"{size.value:g} {_quantity(name).unit} {size.source}" for size in sizes)
-        elif sizes:
-            stated[name] = sizes[0]
-    of_user = {name: given_size(name, str(text)) for name, text in texts.items()}
-    dimensions = Dimensions(
-        table.file,
-        stated | of_user,
-        frozenset(texts),
-        ambiguous,
-        tuple(others),
-        averages=tuple(averages),
-        is_one_of_several=test is not None,
-    )
-    return replace(dimensions, contradictions=tuple(_contradictions(dimensions, stated)))
-
-
-def dimensions_of_stresses(
-    table: Table,
-    dimensions: Dimensions,
-    mode: LoadingMode,
-    choices: Sequence[ColumnChoice],
-    deformations: Sequence[Column],
-) -> list[Dimensions]:
-    """Return the dimensions that belong to every stress: the same, unless the mode is that of a machine with two axes.
-
-    There the specimen's length is that along the first axis, its width that along the second one; each is the width of
-    the other axis. Where neither the user nor the lines above the table say them, the file's columns of sizes may.
-
-    Raises
-    ------
-    InputError
-        When a diameter is given for two axes.
-    """
-    if not mode.machine_axes:
-        return [dimensions] * len(choices)
-    if "diameter" in dimensions.set_by_user:
-        raise InputError(
-            f"{table.file}: the cross-sections of two axes do not follow from a diameter. Give thickness, and length "
-            "and width (the undeformed sizes along the first and the second axis) where the file does not say them."
-        )
-    sizes = {name: size for name, size in dimensions.sizes.items() if name != "diameter"}
-    along_first = replace(dimensions, sizes=sizes)
-    along = along_first, _turned(along_first)
-    across = choices[::-1], deformations[::-1]
-    return [_of_axis(table, *axis) for axis in zip(along, choices, *across, strict=True)]
-
-
-def initial_size(table: Table, choice: ColumnChoice, displacement: Column) -> Dimension | None:
-    """Return the length from a column of sizes beside that of displacements (CellScale's machines write one)."""
-    moved = heading(table.names[choice.deformation])
-    axis, _ = on_axis(moved.quantity)
-    headings = [heading(name) for name in table.names]
-    columns = [
-        k for k, name in enumerate(headings) if on_axis(name.quantity) == (axis, "size") or name.quantity == "size"
-    ]
-    if len(columns) != 1 or headings[columns[0]].unit != moved.unit or LENGTH.factor_or_none(moved.unit) is None:
-        return None
-    (size,) = table.taken(np.arange(1)).numbers(columns)
-    value = float(size[0] - displacement[0]) * LENGTH.factor(moved.unit)
-    return Dimension(value, f"from column {table.label(columns[0])} less the displacement")
-
-
-def _of_axis(
-    table: Table, dimensions: Dimensions, choice: ColumnChoice, across: ColumnChoice, moved_across: Column
-) -> Dimensions:
-    """Return the dimensions of an axis, with the width from a column of sizes along the axis across it."""
-    unneeded = {"length"} if choice.measure != "displacement" and across.load == "force" else set()
-    unneeded |= {"width"} if choice.load != "force" and across.measure == "displacement" else set()
-    sizes = dict(dimensions.sizes)
-    is_sought = "width" not in sizes and ("area" not in sizes or "thickness" in dimensions.set_by_user)
-    if is_sought and across.measure == "displacement" and (width := initial_size(table, across, moved_across)):
-        sizes["width"] = width
-    return replace(dimensions, sizes=sizes, set_by_user=dimensions.set_by_user - unneeded)
-
-
-def _turned(dimensions: Dimensions) -> Dimensions:
-    """Return the dimensions as the second axis has them."""
-
-    def turned(name: str) -> str:
-        return TURNED.get(name, name)
-
-    return replace(
-        dimensions,
-        sizes={turned(name): size for name, size in dimensions.sizes.items()},
-        set_by_user=frozenset(map(turned, dimensions.set_by_user)),
-        ambiguous={turned(name): text for name, text in dimensions.ambiguous.items()},
-    )
-
-
-def _agree(size: Dimension, alternative: Dimension) -> bool:
+def agree(size: Dimension, alternative: Dimension) -> bool:
+    """Tell whether two statements of one dimension do not contradict each other."""
     return isclose(size.value, alternative.value, rel_tol=CONTRADICTION)
 
 
-def _sections(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:
+def sections_of(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:
     """Return the cross-section in every way in which it follows from sizes."""
     sections = {}
     for form, names in SECTIONS.items():
@@ -381,31 +249,8 @@ def _sections(sizes: Mapping[str, Dimension]) -> dict[str, Dimension]:
     return sections
 
 
-def _contradictions(dimensions: Dimensions, stated: Mapping[str, Dimension]) -> Iterator[str]:
-    """Yield a sentence where the file states another length or cross-section than the user."""
-    pairs = []
-    is_length = "length" in dimensions.set_by_user and not dimensions.sizes["length"].unit
-    if is_length and "length" in stated:
-        pairs.append(("length", "mm", dimensions.length, stated["length"]))
-    is_set_by_user = any(dimensions.set_by_user & set(SECTIONS[form]) for form in _sections(dimensions.sizes))
-    if is_set_by_user and _sections(stated):
-        pairs.append(("cross-section", "mm2", dimensions.area, next(iter(_sections(stated).values()))))
-    for what, unit, size, in_file in pairs:
-        if not _agree(size, in_file):
-            yield (
-                f"the {what} is {size.value:g} {unit} ({size.source}), but the file says {in_file.value:g} {unit} "
-                f"({in_file.source})."
-            )
-
-
-def given_size(name: str, text: str) -> Dimension:
-    """Return a dimension that the user gives with its unit; a length may be in pixels."""
-    if name == "length" and PIXELS.factor_or_none(number_and_unit(text)[1]):
-        return Dimension(PIXELS.value(text), "as given", PIXELS.unit)
-    return Dimension(_quantity(name).value(text), "as given")
-
-
-def _quantity(name: str) -> Quantity:
+def quantity_of(name: str) -> Quantity:
+    """Return what a dimension of that name is, an area or a length."""
     return AREA if name == "area" else LENGTH
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.experiments.reading.averages import averaged, scatter_of_neighbours
+from tissuq.experiments.reading.load_cell import averaged, scatter_of_neighbours
 from tissuq.experiments.reading.table import Column
 
 __all__ = ["Event", "find_holds", "find_rupture", "find_slips"]
@@ -62,15 +62,15 @@ def find_rupture(stretch: Column, stress: Column, reference: float = 1.0) -> Eve
         return None
     ends, (course, load) = averaged(MOST_POINTS, stretch, stress)
     span, load = float(np.ptp(course)), load / load[np.argmax(np.abs(load))]
-    least = max(RUPTURE_FALL, SCATTERS_OF_RUPTURE * float(np.median(np.abs(np.diff(load)))))
+    least_fall = max(RUPTURE_FALL, SCATTERS_OF_RUPTURE * float(np.median(np.abs(np.diff(load)))))
     peaks = np.maximum.accumulate(load)
     at_peak = np.maximum.accumulate(np.where(load == peaks, np.arange(len(load)), 0))
     fall, way = peaks - load, course - reference
-    further = (way - way[at_peak]) * np.sign(way[at_peak])
-    goes_on = (fall > least) & (further > FURTHER * span)
-    before = np.concatenate([np.full(SUDDEN_ROWS, load[0]), load[:-SUDDEN_ROWS]])[: len(load)]
-    sudden = max(SUDDEN_FALL, least)
-    is_sudden = (fall > sudden) & (before - load > sudden) & (further > -FURTHER * span)
+    advance = (way - way[at_peak]) * np.sign(way[at_peak])
+    goes_on = (fall > least_fall) & (advance > FURTHER * span)
+    earlier_load = np.concatenate([np.full(SUDDEN_ROWS, load[0]), load[:-SUDDEN_ROWS]])[: len(load)]
+    sudden = max(SUDDEN_FALL, least_fall)
+    is_sudden = (fall > sudden) & (earlier_load - load > sudden) & (advance > -FURTHER * span)
     for row in np.flatnonzero(goes_on | is_sudden).tolist():
         lasting = fall[row : row + LASTING_ROWS]
         if len(lasting) == LASTING_ROWS and (lasting > RUPTURE_FALL).all():
@@ -91,27 +91,27 @@ def find_slips(stretch: Column, stress: Column, step: float = 0.0) -> list[Event
     course = np.abs(course - course[0])
     count, advance_of_point = len(load), float(np.median(np.diff(course)))
     scatter = max(scatter_of_neighbours(load), RESOLUTION, UNIFORM_SD * step_of_load)
-    least = max(SLIP, STEPS * step_of_load)
+    least_drop = max(SLIP, STEPS * step_of_load)
     clarity, fall, width = np.zeros(count), np.zeros(count), np.ones(count, dtype=np.intp)
     for points in [points for points in WINDOWS if points <= max(WINDOWS[2], count // 10)]:
         for gap in GAPS:
-            before = np.arange(points - 1, count - gap - points + 1)  # the last point before the fall
-            after, advance = before + gap, course[before + gap] - course[before]
-            middle = (course[before] + course[after]) / 2
-            left, right = (_lines(course, load, points, starts) for starts in (before - points + 1, after))
-            drop = left.at(middle) - right.at(middle)
-            error = scatter * np.hypot(left.error(middle), right.error(middle))
-            local = load[before] + np.minimum(left.slope, right.slope) * advance - load[after]
-            is_no_kink = (right.mean < left.at(right.centre)) & (left.mean > right.at(left.centre))
-            is_slip = (drop > least) & (local > LOCAL * drop) & (load[after] < load[before]) & is_no_kink
+            last = np.arange(points - 1, count - gap - points + 1)  # the last point before the fall
+            following, advance = last + gap, course[last + gap] - course[last]
+            middle = (course[last] + course[following]) / 2
+            line, next_line = (_lines(course, load, points, starts) for starts in (last - points + 1, following))
+            drop = line.at(middle) - next_line.at(middle)
+            error = scatter * np.hypot(line.error(middle), next_line.error(middle))
+            local = load[last] + np.minimum(line.slope, next_line.slope) * advance - load[following]
+            is_no_kink = (next_line.mean < line.at(next_line.centre)) & (line.mean > next_line.at(line.centre))
+            is_slip = (drop > least_drop) & (local > LOCAL * drop) & (load[following] < load[last]) & is_no_kink
             is_slip &= advance > SLIP_ADVANCE * gap * advance_of_point
-            is_clearer = is_slip & (drop > error * np.maximum(clarity[before], SLIP_SCATTERS))
-            clearer = before[is_clearer]
+            is_clearer = is_slip & (drop > error * np.maximum(clarity[last], SLIP_SCATTERS))
+            clearer = last[is_clearer]
             clarity[clearer], fall[clearer], width[clearer] = (drop / error)[is_clearer], drop[is_clearer], gap
     slips = []
-    while (place := int(np.argmax(clarity))) and clarity[place]:
-        slips.append(Event(int(ends[place + 1]), int(ends[place + width[place]]) + 1, float(fall[place])))
-        clarity[max(0, place - WINDOWS[-1]) : place + WINDOWS[-1] + 1] = 0.0
+    while (peak := int(np.argmax(clarity))) and clarity[peak]:
+        slips.append(Event(int(ends[peak + 1]), int(ends[peak + width[peak]]) + 1, float(fall[peak])))
+        clarity[max(0, peak - WINDOWS[-1]) : peak + WINDOWS[-1] + 1] = 0.0
     return sorted(slips, key=lambda slip: slip.start)
 
 
@@ -124,13 +124,13 @@ class _Lines(NamedTuple):
     size: Column
     points: int
 
-    def at(self, places: Column) -> Column:
+    def at(self, course: Column) -> Column:
         """Return their values."""
-        return np.asarray(self.mean + self.slope * (places - self.centre))
+        return np.asarray(self.mean + self.slope * (course - self.centre))
 
-    def error(self, places: Column) -> Column:
+    def error(self, course: Column) -> Column:
         """Return the standard errors of these, for noise of one."""
-        return np.sqrt(1 / self.points + (places - self.centre) ** 2 / self.size)
+        return np.sqrt(1 / self.points + (course - self.centre) ** 2 / self.size)
 
 
 def _lines(course: Column, load: Column, points: int, starts: NDArray[np.intp]) -> _Lines:
@@ -147,23 +147,23 @@ def find_holds(stretch: Column, stress: Column) -> list[Event]:
     """Return the rows in which the stretch rests while the size of the stress falls: relaxation."""
     ends, (course, load) = averaged(MOST_POINTS, stretch, np.abs(stress))
     count, load = len(course), load / max(float(load.max()), np.finfo(float).tiny)
-    rest, least = REST * float(np.ptp(course)), max(HOLD_ROWS, int(np.ceil(HOLD_SHARE * count)))
+    band, fewest = REST * float(np.ptp(course)), max(HOLD_ROWS, int(np.ceil(HOLD_SHARE * count)))
     holds, start = [], 0
-    while start + least <= count:
+    while start + fewest <= count:
         low, high = (np.asarray(limit.accumulate(course[start:])) for limit in (np.minimum, np.maximum))
-        length = int(np.count_nonzero(high - low <= rest))
-        fall = _fall(course[start : start + length], load[start : start + length], rest) if length >= least else 0.0
+        length = int(np.count_nonzero(high - low <= band))
+        fall = _fall(course[start : start + length], load[start : start + length], band) if length >= fewest else 0.0
         if fall:
             holds.append(Event(int(ends[start]), int(ends[start + length]), fall))
         start += length if fall else 1
     return holds
 
 
-def _fall(course: Column, load: Column, rest: float) -> float:
+def _fall(course: Column, load: Column, band: float) -> float:
     """Return by how much the load falls while the course rests; 0 where it does not clearly, or the course turns."""
     third = len(course) // 3
     outer = np.concatenate([course[:third], course[-third:]])
-    if abs(course[third:-third].mean() - outer.mean()) > BEND * rest:
+    if abs(course[third:-third].mean() - outer.mean()) > BEND * band:
         return 0.0
     fall = float(load[:2].mean() - load[-third:].mean())
     scatter = float(np.median(np.abs(np.diff(load[-third:])))) if third > 2 else 0.0

@@ -16,7 +16,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
-from tissuq.experiments.reading.columns import ColumnChoice, choose_columns
+from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.conversion import (
     columns_of_stresses,
     measured_rows,
@@ -30,7 +30,8 @@ from tissuq.experiments.reading.data_frame import is_data_frame
 from tissuq.experiments.reading.labels import check_labels, columns_only, labels_of
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
-from tissuq.experiments.reading.plausibility import check_signs, check_stretches
+from tissuq.experiments.reading.plausibility import check_stretches
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.regions import (
     AUTO,
     Region,
@@ -45,7 +46,7 @@ from tissuq.experiments.reading.several_specimens import (
     only_rows,
     specimen_of,
 )
-from tissuq.experiments.reading.signs import with_signs
+from tissuq.experiments.reading.signs import check_signs, with_signs
 from tissuq.experiments.reading.spread import Spread
 from tissuq.experiments.reading.stated_mode import (
     DEFAULT_SOURCE,
@@ -340,9 +341,9 @@ def read_rows(
         )
         if mode.controls != (SHEAR,) or stress_measure.name != "cauchy":
             used = used.with_step(stress_measure.step)
-    if (every := options.get("every", 1)) > 1:
-        rows = np.arange(0, len(used), every)
-        used = used.kept(rows, f"one row in {every} asked for").with_step(f"one row in {every}")
+    if (step := options.get("every", 1)) > 1:
+        rows = np.arange(0, len(used), step)
+        used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
     check_signs(used, choices, bool(is_positive), options.get("turn"))
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)

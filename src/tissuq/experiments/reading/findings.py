@@ -9,14 +9,14 @@ import numpy as np
 
 from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.reading.experiment_file import Reading
-from tissuq.experiments.reading.headings import heading, on_axis
+from tissuq.experiments.reading.headings import on_axis
 from tissuq.experiments.reading.measured_rows import labelled
 from tissuq.experiments.reading.regions import Region
 from tissuq.experiments.reading.several_specimens import advice_on_numbered_tests
 from tissuq.experiments.reading.vocabulary import ROLES
 from tissuq.experiments.units import stress_unit
 
-__all__ = ["data_warnings"]
+__all__ = ["STRESS_AT_REST", "data_warnings"]
 
 MANY_ROWS = 10_000
 """Rows from which thinning is worth a word."""
@@ -30,6 +30,8 @@ PLAUSIBLE_STRESS = (1e-6, 1e3)
 """Largest stresses, MPa, between which units are hardly mistaken."""
 LARGE_STRETCH = 10.0
 """Stretch beyond which lengths are likely mistaken."""
+STRESS_AT_REST = "the stress is already"
+"""Words of a warning about a curve that does not begin at zero."""
 DISTURBED = {"rupture", "hold", "slip"}
 """What makes loading and unloading differ without hysteresis."""
 
@@ -100,12 +102,14 @@ def _reference(reading: Reading, number: int) -> str:
     nearest = int(np.argmin(change))
     gap, furthest = float(change[nearest]), float(change.max())
     if gap > NOTABLE_SHARE * furthest:
+        if points.ndim == 1 and points.min() < mode.reference < points.max():
+            return ""  # between measurements, which says neither where the test begins nor what its zero is
         return f"the measurements begin at {control.name} {stretch[nearest]:.4g}, not near {control.reference:g}."
     at_reference, largest = float(stress[nearest]), float(np.abs(stress).max())
     if abs(at_reference) <= NOTABLE_SHARE * largest:
         return ""
     return (
-        f"at {control.name} {stretch[nearest]:.4g} the stress is already {at_reference / unit.to_mpa:.3g} {unit.name}, "
+        f"at {control.name} {stretch[nearest]:.4g} {STRESS_AT_REST} {at_reference / unit.to_mpa:.3g} {unit.name}, "
         f"{abs(at_reference) / largest:.0%} of the largest: a preload, or the zero of the load cell, which --load-zero "
         f"{_load_zero(reading, number, nearest)} takes off. A hyperelastic material has no stress at {control.name} "
         f"{control.reference:g}."
@@ -145,10 +149,10 @@ def _other_axis(reading: Reading, number: int) -> str:
     """Return a sentence about a biaxial test that is read as uniaxial."""
     table = reading.table
     choice = reading.choices[number]
-    axis, _ = on_axis(heading(table.names[choice.deformation]).quantity)
+    axis, _ = on_axis(table.quantities[choice.deformation])
     if not axis or not isinstance(reading.experiment.mode, Uniaxial):
         return ""
-    names = [on_axis(heading(name).quantity) for name in table.names]
+    names = map(on_axis, table.quantities)
     is_across = [name_axis not in ("", axis) and name in ROLES["force"] for name_axis, name in names]
     if not any(is_across):
         return ""

@@ -290,13 +290,13 @@ def on_axis(quantity: str) -> tuple[str, str]:
     >>> on_axis("xforce"), on_axis("stress y"), on_axis("stretch 1"), on_axis("sigma yy"), on_axis("load")
     (('x', 'force'), ('y', 'stress'), ('x', 'stretch'), ('y', 'sigma'), ('', 'load'))
     """
-    parts = [(quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())]
+    splits = [(quantity[:1], quantity[1:].strip()), (quantity[-1:], quantity[:-1].strip())]
     if quantity[-1:] == quantity[-2:-1]:
         component = quantity[-1:], quantity[:-2].strip()
         if component[0] in AXES and component[1] in frozenset().union(*COMPONENTS.values()):
             return AXES[component[0]], component[1]
-        parts.append(component)
-    for axis, name in parts:
+        splits.append(component)
+    for axis, name in splits:
         if axis in AXES and (name in ROLES_AND_SIZES or name in STRESS_NOUNS):
             return AXES[axis], name
     for axis, words in DIRECTIONS_OF_WALL.items():

@@ -8,10 +8,9 @@ from math import isclose
 
 import numpy as np
 
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions
 from tissuq.experiments.reading.headings import dimensions_named
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE, LENGTH
@@ -64,7 +63,7 @@ def of_block(
     how = _how(table, choice, numbers, words)
     if not how or "diameter" in dimensions.sizes or "length" in dimensions.ambiguous:
         return dimensions
-    heights = [size for size in dimensions.others if dimensions_named(size.name, is_cylinder=True) == {"length"}]
+    heights = [size for size in dimensions.further_sizes if dimensions_named(size.name, is_cylinder=True) == {"length"}]
     if len({size.value for size in heights}) == 1:
         return _with_height(dimensions, Dimension(heights[0].value, heights[0].source), how)
     sides = {name: dimensions.sizes[name] for name in SIDES if name in dimensions.sizes}
@@ -110,8 +109,12 @@ def _with_height(dimensions: Dimensions, height: Dimension, how: str) -> Dimensi
         )
         return replace(dimensions, open_height=text)
     note = f"the height, {height.value:g} mm {height.source}, was taken for the length, which it is in {how}."
-    others = tuple(size for size in dimensions.others if size.value != height.value or size.source != height.source)
-    return replace(dimensions, sizes=sizes | {"length": height}, others=others, averages=(*dimensions.averages, note))
+    unnamed = tuple(
+        size for size in dimensions.further_sizes if size.value != height.value or size.source != height.source
+    )
+    return replace(
+        dimensions, sizes=sizes | {"length": height}, further_sizes=unnamed, averages=(*dimensions.averages, note)
+    )
 
 
 def _how(table: Table, choice: ColumnChoice, numbers: tuple[Column, Column], words: Sequence[str]) -> str:

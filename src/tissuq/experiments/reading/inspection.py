@@ -89,8 +89,8 @@ class Inspection:
         table, used = self.reading.table, self.reading.used
         head = f"{len(table.head)} lines above them" if len(table.head) != 1 else "1 line above them"
         cells = f", separated by {SEPARATORS[table.separator]}; rows in lines {_span(table.lines)}, {head}"
-        other = f"; {table.counted}s {_span(table.lines)}, counted from {int(table.counted != 'row')}"
-        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else other}"
+        spans_of_rows = f"; {table.counted}s {_span(table.lines)}, counted from {int(table.counted != 'row')}"
+        yield "table", f"{len(table.names)} columns{cells if table.counted == 'line' else spans_of_rows}"
         yield "columns", ", ".join(self._columns())
         dropped = filter(None, labelled(used.labels, used.reasons))
         yield "rows", "; ".join([f"{len(used)} of {len(table.rows)} used", *dropped])

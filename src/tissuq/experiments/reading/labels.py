@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.reading.headings import NEXT_WORD, heading
+from tissuq.experiments.reading.headings import NEXT_WORD
 from tissuq.experiments.reading.several_specimens import row_names
 from tissuq.experiments.reading.table import Table
 
@@ -54,7 +54,7 @@ def labels_of(table: Table, names: Sequence[str]) -> dict[str, str]:
 
 def columns_only(table: Table, only: Mapping[str, str | int] | None) -> dict[str, str | int]:
     """Return what of ``only`` is asked of cells of columns; directions and conditions may be said elsewhere."""
-    stated = LABELS.keys() - {heading(name).quantity for name in table.names}
+    stated = LABELS.keys() - {*table.quantities}
     return {name: value for name, value in (only or {}).items() if name.lower() not in stated}
 
 
@@ -67,15 +67,15 @@ def check_labels(table: Table, experiment: Experiment, only: Mapping[str, str | 
         With what it is, as far as anything says so.
     """
     for name in set(only or {}) - columns_only(table, only).keys():
-        wanted, found = str((only or {})[name]), getattr(experiment, name.lower())
-        if found.lower() != wanted.strip().lower():
-            is_what = f"is '{found}'" if found else "is not said by a column or a name"
+        wanted, stated_label = str((only or {})[name]), getattr(experiment, name.lower())
+        if stated_label.lower() != wanted.strip().lower():
+            is_what = f"is '{stated_label}'" if stated_label else "is not said by a column or a name"
             raise InputError(f"{table.file}: the {name.lower()} of the test {is_what}, not '{wanted}'. Leave it out.")
 
 
 def _in_column(table: Table, pattern: str) -> str:
     """Return the text in all rows of the only column of a label."""
-    columns = [k for k, name in enumerate(table.names) if re.fullmatch(pattern, heading(name).quantity)]
+    columns = [k for k, quantity in enumerate(table.quantities) if re.fullmatch(pattern, quantity)]
     cells = set(row_names(table, columns[0])) if len(columns) == 1 else set[str]()
     return cells.pop() if len(cells) == 1 else ""
 
@@ -84,7 +84,7 @@ def _in_names(names: Sequence[str], pattern: str) -> str:
     """Return the word in the last name that says a label; nothing where one says two."""
     for name in reversed(names):
         words = re.sub(r"[\s_-]+", " ", NEXT_WORD.sub(" ", name)).lower()
-        found = {match[0] for match in re.finditer(rf"(?<!\w)(?:{pattern})(?!\w)", words)}
-        if found:
-            return found.pop() if len(found) == 1 else ""
+        labels = {match[0] for match in re.finditer(rf"(?<!\w)(?:{pattern})(?!\w)", words)}
+        if labels:
+            return labels.pop() if len(labels) == 1 else ""
     return ""

@@ -10,12 +10,13 @@ from tissuq.errors import InputError
 from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
-from tissuq.experiments.reading.positions import FIRST_ROW
+from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.plausibility import FIRST_ROW
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stress_measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.table import Column, Table
-from tissuq.experiments.reading.torsion import apparent_stress
+from tissuq.experiments.reading.uneven_stress import apparent_stress
 from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
 
 __all__ = ["Load", "force_in", "stress_of", "without_zero"]
@@ -44,12 +45,7 @@ class Load:
 
 
 def stress_of(
-    table: Table,
-    choice: ColumnChoice,
-    values: Column,
-    dimensions: Dimensions,
-    stress_unit: str | None,
-    force_unit: str | None,
+    table: Table, choice: ColumnChoice, values: Column, dimensions: Dimensions, options: ReadingOptions
 ) -> Load:
     """Return the stresses, of the kind that the file gives, and how they were obtained.
 
@@ -60,55 +56,56 @@ def stress_of(
     """
     label = table.label(choice.stress)
     if choice.load == "torque":
-        factor, unit_source = factor_of(table, choice.stress, TORQUE, "force_unit", force_unit)
+        factor, unit_source = factor_of(table, choice.stress, TORQUE, "force_unit", options)
         radius = dimensions.radius
         source = f"apparent stress 2 T / (pi R^3): T = column {label} in {unit_source}, R = {in_words(radius)}"
         scale = float(apparent_stress(np.array(factor), radius.value))
-        return Load(values * scale, units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), source, scale=scale)
+        return Load(values * scale, _unit_shown(options), source, scale=scale)
     if choice.load == "pressure":
-        factor, unit_source = factor_of(table, choice.stress, PRESSURE, "force_unit", force_unit)
+        factor, unit_source = factor_of(table, choice.stress, PRESSURE, "force_unit", options)
         tube, _ = tube_of(dimensions)
         source = f"mean stress of the wall p / ln(B/A): p = column {label} in {unit_source}"
-        shown, scale = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES), factor / tube.log_ratio
-        return Load(values * scale, shown, source, scale=scale, measure=measure_of_tube(tube), note=tube.note)
+        scale = factor / tube.log_ratio
+        return Load(
+            values * scale, _unit_shown(options), source, scale=scale, measure=measure_of_tube(tube), note=tube.note
+        )
     if choice.load == "force":
         if choice.stress_type != "engineering":
             raise InputError(
                 f"{table.place(choice.stress)} holds forces, which over the undeformed cross-section are engineering "
                 "stress. Leave stress_type (--stress-type) out."
             )
-        divided = force_in(table, choice.stress, force_unit)
-        factor, unit_source = factor_of(table, choice.stress, divided, "force_unit", force_unit)
+        divided = force_in(table, choice.stress, options)
+        factor, unit_source = factor_of(table, choice.stress, divided, "force_unit", options)
         size, of_size = (dimensions.area, "mm2") if divided is FORCE else (dimensions.thickness, "mm")
         source = f"engineering stress = column {label} in {unit_source} / {size.value:g} {of_size} ({size.source})"
-        shown = units.stress_unit(stress_unit or UNIT_OF_STRESSES_FROM_FORCES)
-        return Load(values * factor / size.value, shown, source, divided, size.value, factor / size.value)
+        return Load(
+            values * factor / size.value, _unit_shown(options), source, divided, size.value, factor / size.value
+        )
     sections = sorted(dimensions.set_by_user - {"length"})
-    if sections or force_unit is not None:
+    if sections or options.get("force_unit") is not None:
         unneeded = sections[0] if sections else "force_unit"
         raise InputError(
             f"{table.place(choice.stress)} is read as stress, which needs no {unneeded}. "
             "Leave it out, or name the column of forces: --column force=NAME."
         )
-    unit, unit_source = stress_unit_of(table, choice, stress_unit, float(np.abs(values).max()))
+    unit, unit_source = stress_unit_of(table, choice, values, options)
     source = f"{choice.stress_type} stress from column {label} in {unit_source}"
     return Load(values * unit.to_mpa, unit, source, scale=unit.to_mpa)
 
 
-def force_in(table: Table, column: int, force_unit: str | None) -> Quantity:
+def _unit_shown(options: ReadingOptions) -> units.StressUnit:
+    """Return the unit in which people want to read stresses that the file does not state."""
+    return units.stress_unit(options.get("stress_unit") or UNIT_OF_STRESSES_FROM_FORCES)
+
+
+def force_in(table: Table, column: int, options: ReadingOptions) -> Quantity:
     """Return what a column of forces holds by its unit, or the one that is given: forces, or forces per width."""
-    is_per_width = FORCE_PER_WIDTH.factor_or_none(force_unit or table.unit(column)) is not None
+    is_per_width = FORCE_PER_WIDTH.factor_or_none(options.get("force_unit") or table.unit(column)) is not None
     return FORCE_PER_WIDTH if is_per_width else FORCE
 
 
-def without_zero(
-    table: Table,
-    choice: ColumnChoice,
-    values: Column,
-    load_zero: str | None,
-    stress_unit: str | None,
-    force_unit: str | None,
-) -> tuple[Column, str]:
+def without_zero(table: Table, choice: ColumnChoice, values: Column, options: ReadingOptions) -> tuple[Column, str]:
     """Return the loads of a column, in its unit, less what the load cell reads without load, and words that say so.
 
     Raises
@@ -116,12 +113,13 @@ def without_zero(
     InputError
         When that is not ``first``, or a number with a unit of what the column holds.
     """
+    load_zero = options.get("load_zero")
     if load_zero is None:
         return values, ""
     if load_zero == FIRST_ROW:
         return values - values[0], f", counted from {values[0]:g} (its first row)"
     number, unit = number_and_unit(str(load_zero))
-    quantities = {"force": force_in(table, choice.stress, force_unit), "torque": TORQUE, "pressure": PRESSURE}
+    quantities = {"force": force_in(table, choice.stress, options), "torque": TORQUE, "pressure": PRESSURE}
     quantity = quantities.get(choice.load)
     example = f"0.05 {quantity.unit if quantity else 'kPa'}"
     if number is None or not unit or measured_in(unit) not in (choice.load, "stress", "pressure", "force per width"):
@@ -130,8 +128,8 @@ def without_zero(
             f"'{load_zero}'."
         )
     if quantity is None:
-        of_column, _ = stress_unit_of(table, choice, stress_unit, float(np.abs(values).max()))
+        of_column, _ = stress_unit_of(table, choice, values, options)
         offset = number * units.stress_unit(unit).to_mpa / of_column.to_mpa
     else:
-        offset = number * quantity.factor(unit) / factor_of(table, choice.stress, quantity, "force_unit", force_unit)[0]
+        offset = number * quantity.factor(unit) / factor_of(table, choice.stress, quantity, "force_unit", options)[0]
     return values - offset, f", counted from {number:g} {unit} (as given)"

@@ -55,10 +55,10 @@ def _variables(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _of_hdf5(item: Any) -> Any:
     """Return a dataset as an array, its axes as in MATLAB, or as a text; a group as a mapping; cells as a list."""
     if hasattr(item, "items"):
-        fields = {str(name): _of_hdf5(part) for name, part in item.items()}
-        lists = [part for part in fields.values() if isinstance(part, list)]
-        if len(lists) == len(fields) and len({len(part) for part in lists}) == 1:
-            return [dict(zip(fields, parts, strict=True)) for parts in zip(*lists, strict=True)]
+        fields = {str(name): _of_hdf5(member) for name, member in item.items()}
+        lists = [member for member in fields.values() if isinstance(member, list)]
+        if len(lists) == len(fields) and len({len(member) for member in lists}) == 1:
+            return [dict(zip(fields, values_of_one, strict=True)) for values_of_one in zip(*lists, strict=True)]
         return fields
     values = np.asarray(item)
     if values.dtype == object:
@@ -71,7 +71,7 @@ def _of_hdf5(item: Any) -> Any:
 def _fields(value: Any) -> dict[str, Any]:
     """Return the fields of a structure; nothing of anything else."""
     fields = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
-    return {field: part for field, part in fields.items() if not field.startswith("_")}
+    return {field: member for field, member in fields.items() if not field.startswith("_")}
 
 
 def _sheets(name: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
@@ -133,7 +133,9 @@ def _of_tests(matrices: Mapping[str, Any], vectors: Mapping[str, Any]) -> _Table
     Their names say that they do. Two columns may be of two axes, and are named so that they are asked about.
     """
     named = {key: value for key, value in matrices.items() if is_of_role(key)}
-    common = {key: value for key, value in vectors.items() if any(len(value) in part.shape for part in named.values())}
+    common = {
+        key: value for key, value in vectors.items() if any(len(value) in matrix.shape for matrix in named.values())
+    }
     if len({value.shape for value in named.values()}) != 1 or len(named) + sum(map(is_of_role, common)) < 2:
         return None
     shape = next(iter(named.values())).shape
@@ -143,13 +145,13 @@ def _of_tests(matrices: Mapping[str, Any], vectors: Mapping[str, Any]) -> _Table
     rows = lengths.pop()
     upright = {key: value if value.shape[0] == rows else value.T for key, value in named.items()}
     count = min(shape) if rows == max(shape) else max(shape)
-    above, names, columns = [""] * len(common), list(common), list(common.values())
+    tests_above, names, columns = [""] * len(common), list(common), list(common.values())
     for number in range(1, count + 1):
         for key, value in upright.items():
-            above.append(f"test {number}")
+            tests_above.append(f"test {number}")
             names.append(key if count > AXES else _numbered(key, number))
             columns.append(value[:, number - 1])
-    lines = [line_of(above)] if count > AXES else []
+    lines = [line_of(tests_above)] if count > AXES else []
     content = [*lines, line_of(names), *map(line_of, np.column_stack(columns).tolist())]
     return _TableOfTests(frozenset([*named, *common]), content)
 

@@ -100,8 +100,10 @@ class MeasuredRows:
         """Return the rows up to the largest stress; of several, to where they are largest together."""
         size = np.abs(self.stress)
         peak = int(np.argmax((size / np.maximum(size.max(axis=1, keepdims=True), np.finfo(float).tiny)).sum(axis=0)))
-        kept = self.kept(np.arange(peak + 1), "after the largest stress")
-        return kept.with_step(f"only rows up to the largest stress, in {self.table.counted} {self.table.lines[peak]}")
+        rows_to_peak = self.kept(np.arange(peak + 1), "after the largest stress")
+        return rows_to_peak.with_step(
+            f"only rows up to the largest stress, in {self.table.counted} {self.table.lines[peak]}"
+        )
 
     def without_lines(self, lines: str, absent: Collection[int] = ()) -> MeasuredRows:
         """Return the rows but those of some lines of the file, such as ``31,45:50``; some may be absent already.
@@ -114,8 +116,8 @@ class MeasuredRows:
         is_left_out = rows_in(lines, [*self.table.lines, *absent], self.table.file)[: len(self)]
         if is_left_out.all():
             raise InputError(f"{self.table.file}: no row is left without lines {lines}.")
-        kept = self.kept(np.flatnonzero(~is_left_out), "in lines to leave out")
-        return kept.with_step(f"without the rows in lines {lines}")
+        remaining = self.kept(np.flatnonzero(~is_left_out), "in lines to leave out")
+        return remaining.with_step(f"without the rows in lines {lines}")
 
     def within(self, low: float, high: float) -> MeasuredRows:
         """Return the rows whose stretches, all of them, lie from one to another.
@@ -132,8 +134,8 @@ class MeasuredRows:
                 f"{self.table.file}: no row has a stretch from {low:g} to {high:g}; they are from "
                 f"{self.stretch.min():.6g} to {self.stretch.max():.6g}."
             )
-        kept = self.kept(np.flatnonzero(is_within), f"stretch not from {low:g} to {high:g}")
-        return kept.with_step(f"only rows at stretches from {low:g} to {high:g}")
+        remaining = self.kept(np.flatnonzero(is_within), f"stretch not from {low:g} to {high:g}")
+        return remaining.with_step(f"only rows at stretches from {low:g} to {high:g}")
 
     def loaded(self, slacks: Sequence[Slack | None], reference: float) -> MeasuredRows:
         """Return the rows from where load begins on every axis, with stretches counted from there.

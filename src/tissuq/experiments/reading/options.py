@@ -10,10 +10,10 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.pint_units import is_quantity, unit_of
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
-from tissuq.experiments.units import is_quantity, unit_of
 
 __all__ = ["READING_OPTIONS", "TURNS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]
 
@@ -100,16 +100,18 @@ PARTS |= dict.fromkeys(ROLES_OF_TUBE, "columns") | dict.fromkeys(DIMENSION_NAMES
 """Options that are entries of another one."""
 
 
-def spelled_out(options: Mapping[str, Any], known: Collection[str], others: Collection[str] = ()) -> dict[str, Any]:
+def spelled_out(
+    options: Mapping[str, Any], known_names: Collection[str], more_names: Collection[str] = ()
+) -> dict[str, Any]:
     """Return options of reading without those that are entries of others, and with quantities as texts.
 
     Parameters
     ----------
     options : mapping
         By name.
-    known : collection of str
+    known_names : collection of str
         Names of the options of reading.
-    others : collection of str
+    more_names : collection of str
         Names of other options of the same function.
 
     Raises
@@ -124,21 +126,21 @@ def spelled_out(options: Mapping[str, Any], known: Collection[str], others: Coll
     """
     result: dict[str, Any] = {}
     for name, value in options.items():
-        whole = PARTS.get(name) or ("stress_unit" if name == "unit" else name)
-        if whole not in known:
-            names = [*known, *PARTS, "unit", *others]
+        option = PARTS.get(name) or ("stress_unit" if name == "unit" else name)
+        if option not in known_names:
+            names = [*known_names, *PARTS, "unit", *more_names]
             close = get_close_matches(name, names, n=1)
             hint = f" Did you mean '{close[0]}'?" if close else f" There are: {', '.join(names)}."
             raise InputError(f"there is no option '{name}'.{hint}")
         if name in PARTS and value is not None:
-            entries = dict(options.get(whole) or {}) | dict(result.get(whole) or {})
+            entries = dict(options.get(option) or {}) | dict(result.get(option) or {})
             if entries.get(name) is not None:
-                raise InputError(f"{name} is given by itself and in {whole}: give it once.")
-            result[whole] = entries | {name: _plain(name, value)}
+                raise InputError(f"{name} is given by itself and in {option}: give it once.")
+            result[option] = entries | {name: _plain(name, value)}
         elif name == "unit" and value is not None:
-            if options.get(whole) is not None:
+            if options.get(option) is not None:
                 raise InputError("unit and stress_unit are the same: give one of them.")
-            result[whole] = value
+            result[option] = value
         elif name not in PARTS and name != "unit":
             result.setdefault(name, _as_texts(value))
     return result
@@ -163,7 +165,7 @@ def _as_texts(value: Any) -> Any:
 def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMode:
     """Return a loading mode, once the options have been looked at that need no file."""
     mode = loading_mode(name)
-    axis, every = options.get("axis"), options.get("every", 1)
+    axis, step = options.get("axis"), options.get("every", 1)
     if len(mode.stresses) > 2 or len(mode.controls) > len(mode.stresses):
         raise InputError(
             f"a file is read in loading modes with one stress or two, and '{mode.name}' has "
@@ -191,7 +193,9 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
         measure = options.get(option)
         if measure is not None and measure not in measures:
             raise InputError(f"{option} must be one of {', '.join(measures)}, not '{measure}'.")
-    if (stretch_range := options.get("stretch_range")) is not None and not _is_range(stretch_range):
+    stretch_range = options.get("stretch_range")
+    ends = np.asarray([0.0, 1.0] if stretch_range is None else stretch_range)
+    if ends.shape != (2,) or not np.isfinite(ends).all() or ends[0] >= ends[1]:
         raise InputError(
             f"stretch_range (--stretch) must be a lowest and a highest stretch such as 1:1.2, not {stretch_range!r}."
         )
@@ -200,10 +204,6 @@ def checked_mode(name: str | LoadingMode, options: ReadingOptions) -> LoadingMod
     mean_of = options.get("mean_of")
     if mean_of is not None and (not isinstance(mean_of, int) or mean_of < 2):
         raise InputError(f"mean_of (--mean-of) must be a number of specimens, 2 or more, not {mean_of!r}.")
-    if not isinstance(every, int) or every < 1:
-        raise InputError(f"every must be a number of rows, 1 or more, not {every!r}.")
+    if not isinstance(step, int) or step < 1:
+        raise InputError(f"every must be a number of rows, 1 or more, not {step!r}.")
     return mode
-
-
-def _is_range(pair: Sequence[float]) -> bool:
-    return len(pair) == 2 and bool(np.isfinite(pair).all()) and pair[0] < pair[1]

@@ -1,22 +1,24 @@
-"""Checks that numbers are what their columns are read as: stretches and strains, and loads of their signs."""
+"""Checks that numbers are what their columns are read as: stretches, strains, displacements, positions or lengths."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.measured_rows import MeasuredRows
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 
 __all__ = [
     "DOUBTFUL_STRAIN",
+    "FIRST_ROW",
+    "LITTLE_LOAD",
     "RATIO_ASSUMED",
-    "check_signs",
+    "ZERO_ASSUMED",
+    "check_lengths",
+    "check_positions",
     "check_strain",
     "check_stretches",
 ]
@@ -28,14 +30,19 @@ DOUBTFUL_STRAIN = 1.0
 RATIO_ASSUMED = "(a plain ratio assumed: the file states no unit)"
 COMPRESSED_LIMIT = 0.5
 """Stretches that all lie below this are taken for strains: a test starts near stretch 1."""
-TURN_ALL = (
-    "If the machine counts so, give turn='load' (--turn load); if the deformations have the wrong sign, "
-    "turn='deformation' (--turn deformation). Or check which columns are read."
-)
-TURN_ONE = "The other axis has the right sign: change that of this column in the file, or check which columns are read."
-"""What to do about wrong signs on both axes, and on one."""
-NOTABLE_SHARE = 0.1
-"""Share of the largest stretch change and stress that rows must reach for their sign to matter."""
+FIRST_ROW = "first"
+"""What is given for a zero at the first row."""
+ZERO_ASSUMED = "(its first row, assumed: there is little load)"
+OFFSET, NEGLIGIBLE_OFFSET = 0.05, 0.01
+"""Shares of their range by which displacements may begin away from 0, and by which that changes little."""
+TOE_ROWS, TOE = 8, 0.1
+"""Rows, and share of the range of displacements, over which the load begins on a line at least."""
+STANDARD_ERRORS = 2.0
+"""How clearly the load at the first row is nearer to 0 than to where that line would have come from 0."""
+LITTLE_LOAD = 0.1
+"""Share of the largest load up to which a specimen may be undeformed."""
+LEAST_CHANGE = 1e-3
+"""Relative change of the length of a specimen in a test of tension or compression."""
 
 
 def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> None:
@@ -43,42 +50,6 @@ def check_stretches(measured: MeasuredRows, choices: Sequence[ColumnChoice]) -> 
     for choice, stretch in zip(choices, measured.stretch, strict=True):
         if choice.measure not in SHEARS:
             _check_stretch(measured.table, choice, stretch)
-
-
-def check_signs(
-    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, turn: str | None = None
-) -> None:
-    """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for.
-
-    Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
-    """
-    try:
-        _check_work(measured, choices, compression_positive)
-    except InputError as error:
-        if turn is None:
-            raise
-        raise InputError(
-            f"{error} (Signs are turned as asked, --turn {turn}: turn others, or leave it out.)"
-        ) from error
-
-
-def _check_work(measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool) -> None:
-    if choices[0].measure in SHEARS:
-        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0])
-        return
-    if choices[0].load == "pressure":
-        _check_inflation(measured.table, choices[0], measured.stretch[0], measured.stress[0])
-        return
-    change = measured.stretch - 1
-    alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
-    if not len(alike):
-        return
-    clear = measured.taken(alike)
-    axes = list(zip(choices, clear.stretch, clear.stress, strict=True))
-    are_wrong = [_wrong_sign(stretch, stress, stretch != 1) is not None for _, stretch, stress in axes]
-    advice = "" if len(axes) == 1 else TURN_ALL if all(are_wrong) else TURN_ONE
-    for axis in axes:
-        _check_signs(clear.table, *axis, compression_positive, advice)
 
 
 def check_strain(table: Table, choice: ColumnChoice, strain: Column, stress: Column, has_unit: bool) -> None:
@@ -122,75 +93,65 @@ def _check_stretch(table: Table, choice: ColumnChoice, stretch: Column) -> None:
     raise InputError(f"{table.place(choice.deformation, row)}: stretch {stretch[row]:g} is not positive. {advice}")
 
 
-def _check_signs(
-    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool, advice: str
-) -> None:
-    row = _wrong_sign(stretch, stress, stretch < 1)
-    if row is not None:
-        cell = f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g}"
-        if compression_positive:
-            raise InputError(
-                f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
-                "(--compression-positive)."
-            )
-        if advice:
-            raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {advice}")
-        other = "; if the column of stretches holds strain, give it as strain"
-        if choice.measure in ("strain", "displacement"):
-            other = (
-                f"; if this is tension, in which the {choice.measure} falls, give compression_positive=False "
-                "(--tension-positive)"
-            )
-        raise InputError(
-            f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
-            "counts compression as positive, give compression_positive=True (--compression-positive)"
-            f"{other}."
-        )
-    row = _wrong_sign(stretch, stress, stretch > 1)
-    if row is not None:
-        if not advice and choice.measure in ("strain", "displacement"):
-            advice = (
-                f"If this is compression, whose {choice.measure} the machine counts as positive, give "
-                "compression_positive=True (--compression-positive); if it is tension, turn the sign of "
-                f"the {choice.load}: turn='load' (--turn load)."
-            )
-        advice = advice or "If the machine counts so, give turn='load' (--turn load), or check which columns are read."
-        raise InputError(
-            f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
-            f"is negative ({stress[row]:g} MPa); tension must be positive. {advice}"
-        )
-
-
-def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
-    row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
-    if row is not None:
-        raise InputError(
-            f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
-            f"{stress[row]:g} MPa; it must have the sign of the shear. Turn one of them, turn='load' (--turn load), "
-            "or check which columns are read."
-        )
-
-
-def _check_inflation(table: Table, choice: ColumnChoice, stretch: Column, stress: Column) -> None:
-    row = _wrong_sign(stretch, stress, stretch < 1)
-    if row is not None:
-        raise InputError(
-            f"{table.place(choice.deformation, row)}: the tube is under pressure and narrower than undeformed (stretch "
-            f"{stretch[row]:g} in the middle of the wall). Give the outer diameter that it has without pressure "
-            "(--diameter), or check which columns are read."
-        )
-
-
-def _wrong_sign(stretch: Column, stress: Column, rows: NDArray[np.bool_]) -> int | None:
-    """Return the row with the most negative work if the rows as a whole, beyond noise, do negative work."""
-    change = stretch - 1
-    work = np.where(rows, stress * change, 0.0)
-    notable = (
-        np.abs(change[rows]).max(initial=0.0) >= NOTABLE_SHARE * np.abs(change).max()
-        and np.abs(stress[rows]).max(initial=0.0) >= NOTABLE_SHARE * np.abs(stress).max()
-    )
-    return int(np.argmin(work)) if notable and work.sum() < -0.5 * np.abs(work).sum() else None
-
-
 def _quoted(name: str) -> str:
     return f"'{name}'" if " " in name else name
+
+
+def check_positions(table: Table, choice: ColumnChoice, displacement: Column, load: Column, length: float) -> bool:
+    """Return whether displacements (mm) are positions, to be counted from their first row.
+
+    They are where the first row is far from 0 and carries little load, or is near 0 and the load begins there all the
+    same. Displacements carry little load at 0.
+
+    Raises
+    ------
+    InputError
+        When neither does, so that nothing shows where to count from.
+    """
+    span = float(np.ptp(displacement))
+    if abs(displacement[0]) <= OFFSET * span or not span:
+        return abs(displacement[0]) > NEGLIGIBLE_OFFSET * span and _begins_unloaded(displacement, load)
+    size = np.abs(load) / max(float(np.abs(load).max()), np.finfo(float).tiny)
+    if size[0] <= LITTLE_LOAD:
+        return True
+    nearest = int(np.argmin(np.abs(displacement)))
+    if abs(displacement[nearest]) <= OFFSET * span and size[nearest] <= LITTLE_LOAD:
+        return False
+    start, ends = float(displacement[0]), np.array([displacement.min(), displacement.max()]) / length
+    from_first, from_zero, of_length = (
+        f"(stretch {low:.4g} to {high:.4g})" for low, high in (ends + 1 - start / length, ends + 1, ends)
+    )
+    raise InputError(
+        f"{table.place(choice.deformation, 0)}: begins at {start:g} mm with {size[0]:.0%} of the largest load, so that "
+        f"nothing shows where the specimen is undeformed. If it is there, give --zero first {from_first}; if at 0, "
+        f"--zero '0 mm' {from_zero}; if it is undeformed at first, and the load cell reads that without load, "
+        "--load-zero first; if the column holds the length or height of the specimen, --column "
+        f"'length={table.key(choice.deformation)}' {of_length}."
+    )
+
+
+def _begins_unloaded(displacement: Column, load: Column) -> bool:
+    """Tell whether the load at the first row is clearly nearer to 0 than to what it has grown to on the way from 0."""
+    is_beyond = np.abs(displacement - displacement[0]) > TOE * np.ptp(displacement)
+    count = max(TOE_ROWS, int(np.argmax(is_beyond)))
+    way, first_loads = displacement[:count] - displacement[0], load[:count]
+    if len(way) < TOE_ROWS or not np.ptp(way):
+        return False
+    (slope, start), covariance = np.polyfit(way, first_loads, 1, cov=True)
+    slope_error, start_error = STANDARD_ERRORS * np.sqrt(np.diag(covariance))
+    return bool(abs(start) + start_error < 0.5 * (abs(slope) - slope_error) * abs(displacement[0]))
+
+
+def check_lengths(table: Table, choice: ColumnChoice, length: Column, unit: str = "mm") -> None:
+    """Refuse current lengths that are not positive, or do not change."""
+    row = int(np.argmin(length))
+    if length[row] <= 0:
+        raise InputError(
+            f"{table.place(choice.deformation, row)}: a specimen cannot be {length[row]:g} {unit} long. If these are "
+            "displacements, give the column so: --column displacement=NAME."
+        )
+    if np.ptp(length) < LEAST_CHANGE * length.max():
+        raise InputError(
+            f"{table.place(choice.deformation)}: the specimen stays {length[0]:g} {unit} long, so this is no test of "
+            "tension or compression. Give the columns of the deformation and of its load, and --mode."
+        )

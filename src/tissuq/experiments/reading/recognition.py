@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, heading, role_names
+from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, role_names
 from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
@@ -23,6 +23,7 @@ __all__ = [
     "LOADS",
     "OTHER_MEASURE",
     "SHEARS",
+    "ColumnChoice",
     "Contents",
     "ambiguous",
     "columns_there_are",
@@ -50,6 +51,34 @@ NEITHER_LOAD_NOR_DEFORMATION = re.compile(
     + IS_PRESSURE.pattern
 )
 """Names of columns that are no rivals, whatever their unit."""
+
+
+@dataclass(frozen=True)
+class ColumnChoice:
+    """The columns (counted from 0) of the deformation and of the stress or force, and what they hold.
+
+    Parameters
+    ----------
+    deformation, stress : int
+        The columns.
+    measure : str
+        What the deformation is: stretch, strain, displacement, (current) length, (amount of) shear, its rate, twist, or
+        outer or inner diameter.
+    load : str
+        What the other column holds: stress, torque, force or pressure.
+    strain_type, stress_type : str
+        Which measure of strain, or of shear, and of stress.
+    by_unit : frozenset of int
+        Which of the columns were told by their units alone, under names that are not known.
+    """
+
+    deformation: int
+    stress: int
+    measure: str = "stretch"
+    load: str = "stress"
+    strain_type: str = "engineering"
+    stress_type: str = "engineering"
+    by_unit: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -140,9 +169,11 @@ def recognise(
         by_role = _stress_hint(table, contents) if "stress" in roles else _deformation_hint(table, contents, roles)
         hint = by_role or _of_other_quantities(table, roles)
         what = " or ".join(filter(None, (", ".join(roles[:-1]), roles[-1])))
-        quantities = [heading(name).quantity for name in table.names]
         of_units = DEFORMATIONS_OF_UNITS | ({"strain": "shear", "length": "sliding"} if "sliding" in roles else {})
-        of_roles = ((of_units.get(kind, kind), of) for kind, of in _by_unit(table, quantities).items())
+        of_roles = (
+            (of_units.get(kind, kind), columns_of_role)
+            for kind, columns_of_role in _by_unit(table, table.quantities).items()
+        )
         by_unit = {role: columns for role, columns in of_roles if role in roles}
         likely = [table.label(column) for columns in by_unit.values() for column in columns]
         several = f" By their units these may be: {', '.join(likely)}." if len(likely) > 1 and not hint else ""
@@ -158,9 +189,9 @@ def _of_other_quantities(table: Table, roles: Sequence[str]) -> str:
     """Return which columns have a unit of one of the roles, but the name of another quantity, and how to read them."""
     role_of_kind = {kind: DEFORMATIONS_OF_UNITS.get(kind, kind) for kind in (*LOADS, *DEFORMATIONS_OF_UNITS)}
     texts = []
-    for column, name in enumerate(table.names):
+    for column, (name, quantity) in enumerate(zip(table.names, table.quantities, strict=True)):
         role = role_of_kind.get(measured_in(table.unit(column)), "")
-        if role in roles and (what := other_quantity(heading(name).quantity, table.unit(column))):
+        if role in roles and (what := other_quantity(quantity, table.unit(column))):
             texts.append(
                 f" Column {table.label(column)} is {what}, by its name. If it is the {role} all the same, "
                 f'give --column {role}="{name}".'
@@ -220,5 +251,5 @@ def _how_to_say(table: Table, roles: Sequence[str]) -> str:
         return (
             'Say by number which is which: columns={"stretch": 1, "stress": 2} or --column stretch=1 --column stress=2.'
         )
-    others = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
-    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{others}.'
+    more = f" (or {', '.join(f'{role}=' for role in roles[1:])})" if len(roles) > 1 else ""
+    return f'Say which it is by name or number: columns={{"{roles[0]}": "NAME"}} or --column {roles[0]}=NAME{more}.'

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from tissuq.experiments.modes.mode import STRETCH, Control, LoadingMode
 from tissuq.experiments.reading.cycles import Cycle, find_cycles
 from tissuq.experiments.reading.events import Event, find_holds, find_rupture, find_slips
-from tissuq.experiments.reading.load_cell import find_drift, find_saturation, staircase_of, step_of
+from tissuq.experiments.reading.load_cell import find_drift, find_outliers, find_saturation, staircase_of, step_of
 from tissuq.experiments.reading.measured_rows import COUNTED_FROM, MeasuredRows
-from tissuq.experiments.reading.outliers import find_outliers
 from tissuq.experiments.reading.slack import Slack, find_slack
 from tissuq.experiments.reading.table import Column
 from tissuq.experiments.units import StressUnit
@@ -97,21 +96,21 @@ class TestedStress:
     def slips(self) -> list[Event]:
         """Where the stress falls by a few per cent while the test goes on, before any rupture or hold."""
         end = min(event.start for event in (self.rupture, *self.holds, Event(len(self.stress), 0, 0.0)) if event)
-        found = []
+        events = []
         saturated = find_saturation(self.stress)  # equal loads hide the scatter of the others
         for rows in self._away_from_reference(end):
             rows = np.setdiff1d(rows, saturated)
             slips = find_slips(self.course[rows], self.stress[rows], self.load_step or 0.0)
-            found += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
-        return found
+            events += [Event(int(rows[slip.start]), int(rows[slip.stop - 1]) + 1, slip.fall) for slip in slips]
+        return events
 
     def _away_from_reference(self, end: int) -> Iterator[NDArray[np.intp]]:
         """Iterate over the rows before one in which a branch goes away from the undeformed specimen, to either side."""
         away = self.course - self.control.reference
         for rows in (branch[branch < end] for branch in self.branches):
-            for part in (rows[away[rows] >= 0], rows[away[rows] < 0]):
-                if len(part) and abs(away[part[-1]]) > abs(away[part[0]]):
-                    yield part
+            for rows_of_side in (rows[away[rows] >= 0], rows[away[rows] < 0]):
+                if len(rows_of_side) and abs(away[rows_of_side[-1]]) > abs(away[rows_of_side[0]]):
+                    yield rows_of_side
 
     @cached_property
     def slack(self) -> Slack | None:

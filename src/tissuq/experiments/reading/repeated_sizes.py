@@ -53,14 +53,14 @@ class SizesInLine(NamedTuple):
     """Values of one size in a line, in their order, under its name, with its unit."""
 
     name: str
-    places: list[Place]
+    values: list[Place]
 
     def over(self, test: TestBeside) -> str | None:
         """Return the value over the columns of a test; None where not every test has one, and every value a test."""
-        owners = [sum(place.column <= load for place in self.places) - 1 for load in test.loads]
-        if sorted(owners) != list(range(len(self.places))):
+        owners = [sum(value.column <= load for value in self.values) - 1 for load in test.loads]
+        if sorted(owners) != list(range(len(self.values))):
             return None
-        return self.places[owners[test.loads.index(test.load)]].text
+        return self.values[owners[test.loads.index(test.load)]].text
 
 
 def test_beside(table: Table, load: int, stress_type: str | None, *, is_shear: bool) -> TestBeside | None:
@@ -89,7 +89,7 @@ def numbered(name: str) -> tuple[str, str]:
 
 def are_named(sizes: SizesInLine, table: Table) -> bool:
     """Tell whether another line above a table names what stands in the columns of values, as those of specimens."""
-    columns = [place.column for place in sizes.places]
+    columns = [value.column for value in sizes.values]
     for _, text in table.head:
         cells = split(text, table.separator)
         if set(table.names) & {*cells} - {""}:
@@ -111,14 +111,14 @@ def sizes_in_line(text: str, separator: str) -> list[SizesInLine]:
     label, of_label = "", -1
     values, labels = dict[str, list[tuple[str, int, int]]](), list[str]()
     cells = enumerate(split(text, separator))
-    parts = ((column, part.strip()) for column, cell in cells for part in re.split("[:=]", cell))
-    for column, part in parts:
-        is_value = number_and_unit(part)[0] is not None
+    words = ((column, word.strip()) for column, cell in cells for word in re.split("[:=]", cell))
+    for column, word in words:
+        is_value = number_and_unit(word)[0] is not None
         if is_value and label:
-            values.setdefault(label, []).append((part, column, of_label))
+            values.setdefault(label, []).append((word, column, of_label))
             of_label = column + 1
-        elif part and not is_value and not looks_like_unit(part):
-            label = part if dimensions_named(heading(part).quantity, is_cylinder=True) else ""
+        elif word and not is_value and not looks_like_unit(word):
+            label = word if dimensions_named(heading(word).quantity, is_cylinder=True) else ""
             of_label = column
             labels.append(label)
     several = {name: cells for name, cells in values.items() if len(cells) > 1}

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import accumulate, pairwise
+from itertools import pairwise
 
 import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.numbers import NUMBER
-from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import dimensions_named, heading, is_of_specimens, plain
-from tissuq.experiments.reading.table import Column, Table
+from tissuq.experiments.reading.columns import find_column
+from tissuq.experiments.reading.headings import dimensions_named, is_of_specimens, plain
+from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.table import Column, Table, filled_on
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 
 __all__ = [
     "SeveralSpecimens",
     "advice_on_numbered_tests",
     "check_one_specimen",
-    "filled_on",
     "only_rows",
     "row_names",
     "specimen_of",
@@ -82,11 +82,6 @@ def row_names(table: Table, column: int) -> list[str]:
     return filled_on(cells)
 
 
-def filled_on(cells: Sequence[str]) -> list[str]:
-    """Return cells, of which each goes for the empty ones after it."""
-    return list(accumulate(cells, _cell_or_last))
-
-
 def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Column) -> None:
     """Refuse a table of several specimens, which would be fitted as one.
 
@@ -99,10 +94,10 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
         When there are several, with what reads one of them, or all.
     """
     parting = _parting_columns(table, choices, course)
-    for column, labels in sorted(parting, key=lambda pair: len(dimensions_named(_quantity(table, pair[0])))):
-        quantity = _quantity(table, column)
+    for column, labels in sorted(parting, key=lambda pair: len(dimensions_named(table.quantities[pair[0]]))):
+        quantity = table.quantities[column]
         is_numbered = not NOT_OF_TESTS.search(quantity) and _jump(labels, course)
-        if not (is_of_specimens(quantity) or _are_words(labels) or is_numbered):
+        if not (is_of_specimens(quantity) or not any(map(NUMBER.fullmatch, labels)) or is_numbered):
             continue
         name, distinct = table.key(column), list(dict.fromkeys(labels))
         fit_all = (
@@ -119,7 +114,7 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
 
 def specimen_of(table: Table) -> str:
     """Return the specimen that columns name, of which all rows are; an empty text where they name none, or several."""
-    columns = [column for column in range(len(table.names)) if is_of_specimens(_quantity(table, column))]
+    columns = [column for column in range(len(table.names)) if is_of_specimens(table.quantities[column])]
     labels = [set(row_names(table, column)) for column in columns]
     return " ".join(names.pop() for names in labels) if all(len(names) == 1 for names in labels) else ""
 
@@ -134,9 +129,9 @@ def advice_on_numbered_tests(table: Table, choices: Sequence[ColumnChoice], cour
 def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Column) -> Iterator[tuple[int, list[str]]]:
     """Yield the columns, with their cells, that part the rows into tests: by their names, or as each begins anew."""
     used = {column for choice in choices for column in (choice.deformation, choice.stress)}
-    samples = table.some_rows(SAMPLED_ROWS).texts_of_all()
+    samples = list(zip(*table.some_rows(SAMPLED_ROWS).cells(), strict=True))
     for column in sorted(set(range(len(table.names))) - used):
-        quantity = _quantity(table, column)
+        quantity = table.quantities[column]
         if quantity in CYCLE_NAMES | SET_NAMES or (table.block is not None and not is_of_specimens(quantity)):
             continue
         sample = samples[column]
@@ -146,7 +141,8 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
         distinct = list(dict.fromkeys(labels))
         if len(distinct) < 2 or len(labels) < ROWS_OF_TEST * len(distinct):
             continue
-        is_of_tests = _begin_anew(labels, distinct, course) and not all(map(_is_cycle, distinct))
+        are_cycles = all(plain(label).rstrip("0123456789 .#") in CYCLE_NAMES for label in distinct)
+        is_of_tests = _begin_anew(labels, distinct, course) and not are_cycles
         if is_of_specimens(quantity) or is_of_tests:
             yield column, labels
 
@@ -166,24 +162,8 @@ def _begin_anew(labels: Sequence[str], distinct: Sequence[str], course: Column) 
 
 def _jump(labels: Sequence[str], course: Column) -> bool:
     """Tell whether the way back between labels was not measured, as it is between cycles of one specimen."""
-    last = np.flatnonzero([label != after for label, after in pairwise(labels)])
+    last = np.flatnonzero([label != next_label for label, next_label in pairwise(labels)])
     return bool((np.abs(course[last] - course[last + 1]) >= RETURN * np.ptp(course)).all())
-
-
-def _cell_or_last(last: str, cell: str) -> str:
-    return cell or last
-
-
-def _is_cycle(label: str) -> bool:
-    return plain(label).rstrip("0123456789 .#") in CYCLE_NAMES
-
-
-def _quantity(table: Table, column: int) -> str:
-    return heading(table.names[column]).quantity
-
-
-def _are_words(labels: Sequence[str]) -> bool:
-    return not any(NUMBER.fullmatch(label) for label in labels)
 
 
 def _listed(texts: Sequence[str]) -> str:

@@ -6,28 +6,23 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.headings import (
     AXES,
-    dimensions_named,
-    heading,
     is_of_mean,
     is_of_specimens,
     measure_in,
     of_spread,
     on_lettered_axis,
-    plain,
     role_names,
     without_mean,
 )
-from tissuq.experiments.reading.layout import split
+from tissuq.experiments.reading.lines_above import names_above
 from tissuq.experiments.reading.other_quantities import other_quantity
 from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
-from tissuq.experiments.reading.several_specimens import filled_on
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import measured_in
 
-__all__ = ["ColumnsOfTest", "columns_side_by_side", "names_above"]
+__all__ = ["ColumnsOfTest", "columns_side_by_side"]
 
 PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
 """Words and capacities that tell one load cell from another, and not tests."""
@@ -59,7 +54,7 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
     loads that are known by their units alone are of specimens, or means of groups, beside one deformation of all.
     """
     deformations = ("shear",) if is_shear else LENGTHENINGS
-    roles = [_role(name, (*deformations, *LOADS), stress_type) for name in table.names]
+    roles = [_role(quantity, (*deformations, *LOADS), stress_type) for quantity in table.quantities]
     measure, measures = _columns_of_first(deformations, roles)
     is_by_unit = len(measures) == 1 and not any(role.role in LOADS for role in roles)
     if is_by_unit:
@@ -67,7 +62,7 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
     load, loads = _columns_of_first(LOADS, roles)
     labels = [roles[column].test for column in loads]
     numbers_of_tests = {label.lstrip(LETTERS_OF_STRESS) if is_by_unit else label for label in labels}
-    is_of_axes = numbers_of_tests <= AXES.keys() and not any(is_of_mean(heading(name).quantity) for name in table.names)
+    is_of_axes = numbers_of_tests <= AXES.keys() and not any(map(is_of_mean, table.quantities))
     if len(loads) < 2 or not measures or numbers_of_tests <= TENSOR or is_of_axes:
         return []
     is_named = len(set(labels)) == len(labels) and all(labels)
@@ -95,9 +90,8 @@ def _columns_of_first(candidates: Sequence[str], roles: Sequence[_Role]) -> tupl
     return "", []
 
 
-def _role(name: str, roles: Sequence[str], stress_type: str | None) -> _Role:
+def _role(quantity: str, roles: Sequence[str], stress_type: str | None) -> _Role:
     """Return which of some roles a column has by its name, and the test that the name tells."""
-    quantity = heading(name).quantity
     if on_lettered_axis(quantity)[0]:
         return _Role("", "")
     for words, test in _parts(quantity):
@@ -111,7 +105,7 @@ def _role(name: str, roles: Sequence[str], stress_type: str | None) -> _Role:
 
 def _told_by_unit(table: Table, column: int) -> _Role:
     """Return the load that a column has by its unit, and the test or the group that its whole name tells."""
-    quantity = heading(table.names[column]).quantity
+    quantity = table.quantities[column]
     load, test = measured_in(table.unit(column)), without_mean(quantity)
     is_of_test = bool(test) and (_is_test(quantity) or is_of_mean(quantity)) and not of_spread(quantity)[0]
     is_of_test = is_of_test and not other_quantity(quantity, table.unit(column))
@@ -123,8 +117,8 @@ def _parts(quantity: str) -> Iterator[tuple[str, str]]:
     yield quantity, ""
     words = [word.strip(".:,()#") for word in quantity.split()]
     for count in range(1, len(words)):
-        first, last = " ".join(words[:count]), " ".join(words[count:])
-        for name, test in ((first, last), (last, first)):
+        head, tail = " ".join(words[:count]), " ".join(words[count:])
+        for name, test in ((head, tail), (tail, head)):
             if _is_test(test):
                 yield name, test
 
@@ -137,29 +131,3 @@ def _is_test(text: str) -> bool:
         and not PART_OF_MACHINE.search(text)
         and (len(words[-1]) == 1 or any(map(str.isdigit, text)) or is_of_specimens(words[0]))
     )
-
-
-def _states_size(cell: str) -> bool:
-    """Tell whether a cell names a size, or holds one with its unit."""
-    name, unit = re.split("[:=]", cell)[0], number_and_unit(cell)[1].removesuffix("2").removesuffix("²")
-    is_length = measured_in(unit) == "length" and len(unit) > 1  # one letter may be of months or minutes
-    return bool(dimensions_named(heading(name).quantity, is_cylinder=True)) or is_length
-
-
-def names_above(table: Table, columns: Sequence[int]) -> list[str]:
-    """Return what the last line above the names of columns says over each of some; nothing where it says no names.
-
-    What stands over the first of neighbouring columns goes for them all. A line of sizes says no names.
-    """
-    names = [heading(name).quantity for name in table.names]
-    for _, text in reversed(table.head):
-        cells = split(text, table.separator)[: len(names)]
-        if [heading(cell).quantity for cell in cells] == names[: len(cells)] or not any(cells):
-            continue
-        if any(map(_states_size, cells)):
-            continue
-        above = filled_on(cells + [""] * (len(names) - len(cells)))
-        over = [above[column] for column in columns]
-        if all(over) and len({plain(name) for name in over}) == len(over):
-            return over
-    return []

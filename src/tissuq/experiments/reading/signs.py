@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.measured_rows import MeasuredRows
 from tissuq.experiments.reading.options import TURNS
-from tissuq.experiments.reading.recognition import SHEARS
+from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
 from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
-from tissuq.experiments.reading.table import Column
+from tissuq.experiments.reading.table import Column, Table
 
-__all__ = ["with_signs"]
+__all__ = ["check_signs", "with_signs"]
 
 SIGNED = ("strain", "displacement", *SHEARS)
 """Deformations that may be counted the other way round."""
@@ -24,6 +23,14 @@ COMPRESSION_WORDS = ("compressive", "compression", "stauchung", "druck", "сжи
 """How names of columns begin whose numbers may be positive in compression."""
 NEGLIGIBLE_STRAIN = 0.1
 """Share of the largest strain up to which strains of the other sign are noise or slack."""
+TURN_ALL = (
+    "If the machine counts so, give turn='load' (--turn load); if the deformations have the wrong sign, "
+    "turn='deformation' (--turn deformation). Or check which columns are read."
+)
+TURN_ONE = "The other axis has the right sign: change that of this column in the file, or check which columns are read."
+"""What to do about wrong signs on both axes, and on one."""
+NOTABLE_SHARE = 0.1
+"""Share of the largest stretch change and stress that rows must reach for their sign to matter."""
 
 
 def with_signs(
@@ -132,7 +139,7 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
     for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         furthest = int(np.argmax(np.abs(stretch - 1)))
         for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
-            if heading(measured.table.names[column]).quantity.startswith(COMPRESSION_WORDS) and value > 0:
+            if measured.table.quantities[column].startswith(COMPRESSION_WORDS) and value > 0:
                 raise InputError(
                     f"{measured.table.place(column, furthest)}: the name says compression and the value is positive. "
                     "If the machine counts compression as positive, give compression_positive=True "
@@ -154,3 +161,109 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
             "negative. If the machine counts tension as negative, give turn='both' (--turn both); if it is "
             "compression, compression_positive=False (--tension-positive)."
         )
+
+
+def check_signs(
+    measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool, turn: str | None = None
+) -> None:
+    """Refuse stresses that do negative work clearly beyond noise: the sign convention must be asked for.
+
+    Of several stresses the rows are looked at where the stretches are all above 1 or all below; of shear the first.
+    """
+    try:
+        _check_work(measured, choices, compression_positive)
+    except InputError as error:
+        if turn is None:
+            raise
+        raise InputError(
+            f"{error} (Signs are turned as asked, --turn {turn}: turn others, or leave it out.)"
+        ) from error
+
+
+def _check_work(measured: MeasuredRows, choices: Sequence[ColumnChoice], compression_positive: bool) -> None:
+    if choices[0].measure in SHEARS:
+        _check_shear_signs(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+        return
+    if choices[0].load == "pressure":
+        _check_inflation(measured.table, choices[0], measured.stretch[0], measured.stress[0])
+        return
+    change = measured.stretch - 1
+    alike = np.flatnonzero((change >= 0).all(axis=0) | (change <= 0).all(axis=0))
+    if not len(alike):
+        return
+    clear = measured.taken(alike)
+    axes = list(zip(choices, clear.stretch, clear.stress, strict=True))
+    are_wrong = [_wrong_sign(stretch, stress, stretch != 1) is not None for _, stretch, stress in axes]
+    advice = "" if len(axes) == 1 else TURN_ALL if all(are_wrong) else TURN_ONE
+    for axis in axes:
+        _check_signs(clear.table, *axis, compression_positive, advice)
+
+
+def _check_signs(
+    table: Table, choice: ColumnChoice, stretch: Column, stress: Column, compression_positive: bool, advice: str
+) -> None:
+    row = _wrong_sign(stretch, stress, stretch < 1)
+    if row is not None:
+        cell = f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g}"
+        if compression_positive:
+            raise InputError(
+                f"{cell} the stress is already negative in the file. Leave out compression_positive=True "
+                "(--compression-positive)."
+            )
+        if advice:
+            raise InputError(f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). {advice}")
+        alternative = "; if the column of stretches holds strain, give it as strain"
+        if choice.measure in ("strain", "displacement"):
+            alternative = (
+                f"; if this is tension, in which the {choice.measure} falls, give compression_positive=False "
+                "(--tension-positive)"
+            )
+        raise InputError(
+            f"{cell} (compression) the stress is positive ({stress[row]:g} MPa). If the machine "
+            "counts compression as positive, give compression_positive=True (--compression-positive)"
+            f"{alternative}."
+        )
+    row = _wrong_sign(stretch, stress, stretch > 1)
+    if row is not None:
+        if not advice and choice.measure in ("strain", "displacement"):
+            advice = (
+                f"If this is compression, whose {choice.measure} the machine counts as positive, give "
+                "compression_positive=True (--compression-positive); if it is tension, turn the sign of "
+                f"the {choice.load}: turn='load' (--turn load)."
+            )
+        advice = advice or "If the machine counts so, give turn='load' (--turn load), or check which columns are read."
+        raise InputError(
+            f"{table.place(choice.stress, row)}: at stretch {stretch[row]:g} (tension) the stress "
+            f"is negative ({stress[row]:g} MPa); tension must be positive. {advice}"
+        )
+
+
+def _check_shear_signs(table: Table, choice: ColumnChoice, shear: Column, stress: Column) -> None:
+    row = _wrong_sign(1 + shear, stress, np.ones(len(shear), dtype=bool))
+    if row is not None:
+        raise InputError(
+            f"{table.place(choice.stress, row)}: at an amount of shear of {shear[row]:g} the shear stress is "
+            f"{stress[row]:g} MPa; it must have the sign of the shear. Turn one of them, turn='load' (--turn load), "
+            "or check which columns are read."
+        )
+
+
+def _check_inflation(table: Table, choice: ColumnChoice, stretch: Column, stress: Column) -> None:
+    row = _wrong_sign(stretch, stress, stretch < 1)
+    if row is not None:
+        raise InputError(
+            f"{table.place(choice.deformation, row)}: the tube is under pressure and narrower than undeformed (stretch "
+            f"{stretch[row]:g} in the middle of the wall). Give the outer diameter that it has without pressure "
+            "(--diameter), or check which columns are read."
+        )
+
+
+def _wrong_sign(stretch: Column, stress: Column, rows: NDArray[np.bool_]) -> int | None:
+    """Return the row with the most negative work if the rows as a whole, beyond noise, do negative work."""
+    change = stretch - 1
+    work = np.where(rows, stress * change, 0.0)
+    notable = (
+        np.abs(change[rows]).max(initial=0.0) >= NOTABLE_SHARE * np.abs(change).max()
+        and np.abs(stress[rows]).max(initial=0.0) >= NOTABLE_SHARE * np.abs(stress).max()
+    )
+    return int(np.argmin(work)) if notable and work.sum() < -0.5 * np.abs(work).sum() else None

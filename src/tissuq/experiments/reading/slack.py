@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tissuq.experiments.reading.averages import averaged
+from tissuq.experiments.reading.load_cell import averaged
 from tissuq.experiments.reading.table import Column
 
 __all__ = ["Slack", "find_slack"]

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.special import ndtri, stdtrit
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.columns import ColumnChoice, find_column
-from tissuq.experiments.reading.headings import heading, is_of_count, is_of_mean, of_spread, role_names, without_mean
+from tissuq.experiments.reading.columns import find_column
+from tissuq.experiments.reading.headings import is_of_count, is_of_mean, of_spread, role_names, without_mean
 from tissuq.experiments.reading.loads import Load
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.vocabulary import SPREADS
 from tissuq.experiments.units import FORCE, measured_in, stress_unit
@@ -66,20 +67,20 @@ def spread_of(
     InputError
         When a column that is given cannot be used.
     """
-    given = next((kind for kind in SPREADS if kind in mapping), None)
+    wanted = next((kind for kind in SPREADS if kind in mapping), None)
     if choice.stress_type == "torsion" or choice.load == "pressure":
         of_load = "the pressure in a tube" if choice.load == "pressure" else "the torque of a disc"
-        if given or mean_of is not None:
-            option = f"--column {given}={mapping[given]}" if given else f"mean_of={mean_of} (--mean-of)"
+        if wanted or mean_of is not None:
+            option = f"--column {wanted}={mapping[wanted]}" if wanted else f"mean_of={mean_of} (--mean-of)"
             raise InputError(f"{table.file}: {option} is for stresses or forces, not for {of_load}. Leave it out.")
         spread = _recognised(table, choice)
         if spread.column is None:
             return spread
         unused = f"column {table.label(spread.column)} is not used: standard deviations and standard errors"
         return replace(spread, problem=f"{unused} are taken of stresses or forces, not of {of_load}.")
-    if given:
-        column = find_column(table, given, mapping[given])
-        return _with_errors(table, choice, Spread(column, given), mapping, load, mean_of)
+    if wanted:
+        column = find_column(table, wanted, mapping[wanted])
+        return _with_errors(table, choice, Spread(column, wanted), mapping, load, mean_of)
     spread = _recognised(table, choice)
     if spread.column is None and mean_of is not None:
         raise InputError(
@@ -99,11 +100,11 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
 
     Where some columns are of means, those of others have none.
     """
-    quantities = [heading(name).quantity for name in table.names]
+    quantities = table.quantities
     of_stress = quantities[choice.stress]
     if any(map(is_of_mean, quantities)) and not is_of_mean(of_stress):
         return Spread()
-    found: dict[str, list[int]] = {}
+    by_kind: dict[str, list[int]] = {}
     for column in range(len(table.names)):
         kind, of_what = of_spread(quantities[column])
         is_of_load = measured_in(table.unit(column)) in ("", choice.load) and of_what in (
@@ -112,9 +113,9 @@ def _recognised(table: Table, choice: ColumnChoice) -> Spread:
             *role_names(choice.load),
         )
         if kind and is_of_load and not table.is_constant(column):
-            found.setdefault(kind, []).append(column)
+            by_kind.setdefault(kind, []).append(column)
     for kind in (*SPREADS, ""):
-        columns = found.get(kind or "open", [])
+        columns = by_kind.get(kind or "open", [])
         following = [column for column in columns if column > choice.stress]
         if columns:
             column = min(following or columns)
@@ -164,7 +165,7 @@ def _count(table: Table, mapping: Mapping[str, str | int], mean_of: int | None) 
     """Return the number of specimens in every row, or of all, and where it comes from; None where nobody says it."""
     if mean_of is not None:
         return np.array(float(mean_of)), f"{mean_of} (as given)"
-    columns = [column for column, name in enumerate(table.names) if is_of_count(heading(name).quantity)]
+    columns = [column for column, quantity in enumerate(table.quantities) if is_of_count(quantity)]
     if "n" in mapping:
         columns = [find_column(table, "n", mapping["n"])]
     if len(columns) != 1:

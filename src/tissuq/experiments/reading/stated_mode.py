@@ -104,8 +104,8 @@ def mode_of(
     (str or LoadingMode, str)
         The mode, and where it comes from.
     """
-    if (chosen := options.get("mode")) is not None:
-        return chosen, GIVEN
+    if (wanted := options.get("mode")) is not None:
+        return wanted, GIVEN
     mode, source = find_mode(file, [table.sheet, table.title, *words])
     columns = options.get("columns") or {}
     if not mode and columns.keys() & {*SHEARS, "torque"}:
@@ -158,7 +158,7 @@ def about_mode(mode: str, source: str) -> Iterator[None]:
 
 def _mode_of_columns(table: Table) -> tuple[str, str]:
     """Return the mode that the columns of a table leave no choice about, and why; empty texts where they do."""
-    quantities = [measure_in(heading(name).quantity)[0] for name in table.names]
+    quantities = [measure_in(quantity)[0] for quantity in table.quantities]
     deformations = role_names("stretch") | role_names("strain") | role_names("displacement")
     on_axes = [on_lettered_axis(quantity) for quantity in quantities]
     loads = role_names("stress") | STRESS_NOUNS | role_names("force")

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from math import prod
 
 from tissuq.experiments.numbers import NUMBER, PRODUCT, number_and_unit, number_in, sides_and_unit
-from tissuq.experiments.reading.columns import ColumnChoice
 from tissuq.experiments.reading.headings import Heading, dimensions_named, heading, is_of_specimens, plain
 from tissuq.experiments.reading.layout import MISSING, WHITESPACE, split
+from tissuq.experiments.reading.lines_above import names_above
+from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.repeated_sizes import SizesInLine, TestBeside, are_named, numbered, sizes_in_line
-from tissuq.experiments.reading.side_by_side import names_above
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 from tissuq.experiments.units import AREA, LENGTH, Quantity
@@ -99,10 +99,12 @@ def _of_test(size: StatedSize, sizes: Sequence[StatedSize], test: TestBeside) ->
     """
     if not dimensions_named(size.name, is_cylinder=True):
         for name in test.names:
-            alone = plain(re.sub(rf"(?<!\w){re.escape(plain(name))}(?!\w)", " ", size.name))
-            if alone != size.name and dimensions_named(alone, is_cylinder=True):
-                return replace(size, name=alone) if name == test.name else None
-    numbers = {other.measurement for other in sizes if (other.name, other.kind) == (size.name, size.kind)}
+            name_of_size = plain(re.sub(rf"(?<!\w){re.escape(plain(name))}(?!\w)", " ", size.name))
+            if name_of_size != size.name and dimensions_named(name_of_size, is_cylinder=True):
+                return replace(size, name=name_of_size) if name == test.name else None
+    numbers = {
+        same_size.measurement for same_size in sizes if (same_size.name, same_size.kind) == (size.name, size.kind)
+    }
     if not size.measurement or len(numbers) < len(test.loads):
         return size
     if numbers == set(test.numbers) and size.measurement != test.number:
@@ -114,19 +116,24 @@ def names_of_specimen(
     table: Table, choices: Sequence[ColumnChoice], only: Mapping[str, str | int] | None
 ) -> frozenset[str]:
     """Return what a file calls the specimen in a table: its sheet, title, name above the columns, and cells."""
-    columns = [k for k, name in enumerate(table.names) if is_of_specimens(heading(name).quantity)]
+    columns = [k for k, quantity in enumerate(table.quantities) if is_of_specimens(quantity)]
     cells = [set(table.texts(column)) - {""} for column in columns]
-    asked = [str(value) for name, value in (only or {}).items() if plain(name) not in CYCLE_NAMES | SET_NAMES]
-    names = [table.sheet, table.title, *asked, *(cell for values in cells if len(values) == 1 for cell in values)]
+    wanted = [str(value) for name, value in (only or {}).items() if plain(name) not in CYCLE_NAMES | SET_NAMES]
+    names = [
+        table.sheet,
+        table.title,
+        *wanted,
+        *(cell for values in cells if len(values) == 1 for cell in values),
+    ]
     loads = [k for k, name in enumerate(table.names) if name == table.names[choices[0].stress]]
-    if len(loads) > 1 and (above := names_above(table, loads)):
-        names.append(above[loads.index(choices[0].stress)])
+    if len(loads) > 1 and (names_over := names_above(table, loads)):
+        names.append(names_over[loads.index(choices[0].stress)])
     return frozenset(filter(None, map(plain, names)))
 
 
 def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
     """Yield what lines above the table state: ``Width : 5 mm``, ``"Probendicke";1,55;"mm"``, or less clear ones."""
-    is_of_one = not table.number and not any(is_of_specimens(heading(name).quantity) for name in table.names)
+    is_of_one = not table.number and not any(map(is_of_specimens, table.quantities))
     for line, text in table.head:
         text, source = text.lstrip("# "), f"in line {line}"
         if several := sizes_in_line(text, table.separator):
@@ -148,14 +155,14 @@ def _in_lines(table: Table, test: TestBeside | None) -> Iterator[StatedSize]:
 
 def _words(statements: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield names and values in statements; names of sizes without the number of their measurement, and that number."""
-    parts = [part.strip(' "') for statement in statements for part in re.split(ASSIGNMENT, statement)]
-    parts = [part for part in parts if part]
-    for part, after in zip(parts, [*parts[1:], ""], strict=True):
-        name, measurement = numbered(part)
-        if measurement and NUMBER.match(after):
+    words = [word_or_value.strip(' "') for statement in statements for word_or_value in re.split(ASSIGNMENT, statement)]
+    words = [word_or_value for word_or_value in words if word_or_value]
+    for word_or_value, next_word in zip(words, [*words[1:], ""], strict=True):
+        name, measurement = numbered(word_or_value)
+        if measurement and NUMBER.match(next_word):
             yield name, measurement
         else:
-            yield from ((word.strip(' "'), "") for word in BETWEEN_WORDS.split(part) if word.strip(' "'))
+            yield from ((word.strip(' "'), "") for word in BETWEEN_WORDS.split(word_or_value) if word.strip(' "'))
 
 
 def _of_several(
@@ -165,8 +172,8 @@ def _of_several(
     if test and (text := sizes.over(test)) is not None:
         yield from _sizes(heading(sizes.name), text, f"{source}, over its columns", f"{sizes.name}: {text}")
         return
-    for number, place in enumerate(sizes.places, 1):
-        for size in _sizes(heading(sizes.name), place.text, source, f"{sizes.name}: {place.text}"):
+    for number, value in enumerate(sizes.values, 1):
+        for size in _sizes(heading(sizes.name), value.text, source, f"{sizes.name}: {value.text}"):
             yield replace(size, measurement=str(number) if is_measured_again and not test else "")
 
 
@@ -191,7 +198,7 @@ def _among_words(text: str, source: str) -> Iterator[StatedSize]:
 def _in_columns(table: Table) -> Iterator[StatedSize]:
     """Yield the sizes in columns of them that hold one number all along."""
     for column, name in enumerate(table.names):
-        quantity, measurement = numbered(heading(name).quantity)
+        quantity, measurement = numbered(table.quantities[column])
         if not dimensions_named(quantity, is_cylinder=True):
             continue
         cells = {cell for cell in table.texts(column) if cell.lower() not in MISSING}
@@ -228,21 +235,21 @@ def _of_specimens(
         cells = split(text.lstrip("# "), table.separator)
         if not any(map(NUMBER.fullmatch, cells)):
             named = {k: heading(cell) for k, cell in enumerate(cells) if k}
-            found = {k: name for k, name in named.items() if dimensions_named(numbered(name.quantity)[0])}
+            headings = {k: name for k, name in named.items() if dimensions_named(numbered(name.quantity)[0])}
             units = {k: cells[k].strip("[]()") for k in names if k < len(cells)}
-            if not found and any(kind.factor_or_none(unit) for unit in units.values() for kind in (LENGTH, AREA)):
+            if not headings and any(kind.factor_or_none(unit) for unit in units.values() for kind in (LENGTH, AREA)):
                 names = {k: Heading(name.quantity, units.get(k) or name.unit) for k, name in names.items()}
             else:
-                names = found
+                names = headings
         elif plain(cells[0]) in specimens:
-            place = f"in sheet '{sheet}', line {line}" if sheet else f"in line {line}"
+            stated_in = f"in sheet '{sheet}', line {line}" if sheet else f"in line {line}"
             for column in [column for column in names if column < len(cells)]:
-                name, where = names[column], place
+                name, source = names[column], stated_in
                 if not name.unit and len(in_table) == 1:
                     name = Heading(name.quantity, *in_table)
-                    where = f"{place} ({name.unit} {UNIT_ASSUMED}"
+                    source = f"{stated_in} ({name.unit} {UNIT_ASSUMED}"
                 quantity, measurement = numbered(name.quantity)
-                sizes = _sizes(Heading(quantity, name.unit), cells[column], where, f"{name.quantity}: {cells[column]}")
+                sizes = _sizes(Heading(quantity, name.unit), cells[column], source, f"{name.quantity}: {cells[column]}")
                 yield from (replace(size, measurement=measurement) for size in sizes)
 
 

@@ -61,10 +61,10 @@ class StrainMeasure:
         convert, formula = (self.shear, self.shear_formula) if is_shear else (self.stretch, self.formula)
         if convert is None:
             what = "an amount of shear" if is_shear else "a stretch"
-            others = (name for name, measure in STRAIN_MEASURES.items() if measure.tells(is_shear))
+            alternatives = (name for name, measure in STRAIN_MEASURES.items() if measure.tells(is_shear))
             raise InputError(
                 f"strain of type '{self.name}' does not tell {what}. Say which it is: --strain-type "
-                f"{' or '.join(others)}; or add a column with {what} to the file."
+                f"{' or '.join(alternatives)}; or add a column with {what} to the file."
             )
         low, high = self.limits
         outside = values[(values <= low) | (values >= high)]

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
-from tissuq.experiments.reading.inflation import Tube
-from tissuq.experiments.reading.torsion import rim_stress
+from tissuq.experiments.reading.uneven_stress import Tube, rim_stress
 
 __all__ = ["STRESS_MEASURES", "StressMeasure", "measure_of_tube"]
 

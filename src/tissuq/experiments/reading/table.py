@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,12 @@ from tissuq.experiments.reading.layout import (
     MISSING,
     SPREADSHEET_ERRORS,
     WHITESPACE,
+    joined,
     split,
 )
 from tissuq.experiments.units import BRACKETS
 
-__all__ = ["Column", "Lines", "Table", "padded", "rows_in"]
+__all__ = ["Column", "Lines", "Table", "filled_on", "padded", "rows_in"]
 
 Column = NDArray[np.float64]
 Lines = list[tuple[int, str]]
@@ -89,6 +91,11 @@ class Table:
     counted: str = "line"
     other_lines: Mapping[str, Lines] = field(default_factory=dict)
 
+    @cached_property
+    def quantities(self) -> list[str]:
+        """What the names of the columns say they hold, without units."""
+        return [heading(name).quantity for name in self.names]
+
     @property
     def span(self) -> str:
         """Return the lines of its rows, in words."""
@@ -146,9 +153,17 @@ class Table:
         cells = (split(row, self.separator) for row in self.rows)
         return [row[column] if column < len(row) else "" for row in cells]
 
-    def texts_of_all(self) -> list[tuple[str, ...]]:
-        """Return the cells of every column as text, as `texts` does of one."""
-        return list(zip(*(padded(split(row, self.separator), len(self.names)) for row in self.rows), strict=True))
+    def cells(self) -> list[tuple[str, ...]]:
+        """Return the cells of every row as text, one for each column: empty ones where a row ends before it."""
+        return [padded(split(row, self.separator), len(self.names)) for row in self.rows]
+
+    def with_cells(self, cells: Iterable[Sequence[str]]) -> Table:
+        """Return the table with other cells in its rows."""
+        return replace(self, rows=[joined(row, self.separator) for row in cells])
+
+    def noted(self, *notes: str) -> Table:
+        """Return the table with more to know of how it was found."""
+        return replace(self, notes=(*self.notes, *notes))
 
     def numbers(self, columns: Sequence[int]) -> list[Column]:
         """Return columns (counted from 0) as finite numbers, written with decimal points or decimal commas.
@@ -206,8 +221,8 @@ class Table:
             [
                 len(row) < len(columns)
                 and all(map(NUMBER.fullmatch, row))
-                and OVERFLOW.isdisjoint(map(str.lower, every))
-                for row, every in zip(filled, cells, strict=True)
+                and OVERFLOW.isdisjoint(map(str.lower, cells_of_row))
+                for row, cells_of_row in zip(filled, cells, strict=True)
             ]
         )
         table = self._without(is_missing, f"without values of {' and '.join(map(self.label, columns))} left out,")
@@ -220,10 +235,10 @@ class Table:
         """Return the table without some rows, unless these are none or all, with a note of why."""
         if not is_left_out.any() or is_left_out.all():
             return self
-        count, first = np.count_nonzero(is_left_out), self.lines[int(np.argmax(is_left_out))]
-        what, where = ("1 row", "") if count == 1 else (f"{count} rows", "the first ")
-        note = f"{what} {text} {where}in {self.counted} {first}."
-        return replace(self.taken(np.flatnonzero(~is_left_out)), notes=(*self.notes, note))
+        count, first_line = np.count_nonzero(is_left_out), self.lines[int(np.argmax(is_left_out))]
+        what, article = ("1 row", "") if count == 1 else (f"{count} rows", "the first ")
+        note = f"{what} {text} {article}in {self.counted} {first_line}."
+        return self.taken(np.flatnonzero(~is_left_out)).noted(note)
 
     def _how_to_leave_out(self, columns: Sequence[int]) -> str:
         """Return how to leave out the rows with a faulty cell in columns; nothing where these are most rows."""
@@ -291,6 +306,14 @@ def padded(cells: list[str], width: int) -> tuple[str, ...]:
     return tuple([*cells, *[""] * width][:width])
 
 
+def filled_on(cells: Sequence[str]) -> list[str]:
+    """Return cells, of which each goes for the empty ones after it."""
+    filled = list(cells[:1])
+    for cell in cells[1:]:
+        filled.append(cell or filled[-1])
+    return filled
+
+
 def rows_in(lines: str, numbers: Sequence[int], file: str) -> NDArray[np.bool_]:
     """Tell which rows, of which the lines are numbers, stand in lines such as ``31,45:50``.
 
@@ -301,15 +324,15 @@ def rows_in(lines: str, numbers: Sequence[int], file: str) -> NDArray[np.bool_]:
     """
     of_rows = np.array(numbers)
     is_in = np.zeros(len(of_rows), dtype=bool)
-    for part in str(lines).split(","):
-        ends = part.split(":")
+    for span in str(lines).split(","):
+        ends = span.split(":")
         if len(ends) > 2 or not all(end.strip().isdecimal() for end in ends):
             raise InputError(f"leave_out (--leave-out) must be lines of the file such as 31,45:50, not '{lines}'.")
-        found = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
-        if not found.any():
+        is_in_span = (of_rows >= int(ends[0])) & (of_rows <= int(ends[-1]))
+        if not is_in_span.any():
             raise InputError(
-                f"{file}: there is no row to leave out in line {part.strip()}; rows are in lines {of_rows.min()} to "
+                f"{file}: there is no row to leave out in line {span.strip()}; rows are in lines {of_rows.min()} to "
                 f"{of_rows.max()}."
             )
-        is_in |= found
+        is_in |= is_in_span
     return is_in

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from io import StringIO
 from itertools import pairwise
 from typing import Any
@@ -15,11 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.reading.beside import without_statements_beside
-from tissuq.experiments.reading.blocks import blocks_of
+from tissuq.experiments.reading.blocks import blocks_of, joined_in_time
 from tissuq.experiments.reading.data_frame import DataColumn, columns_of, is_data_frame, kind_of, lines_of
 from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format, sheets_with_tables
-from tissuq.experiments.reading.headings import heading
 from tissuq.experiments.reading.layout import (
     WHITESPACE,
     column_names,
@@ -29,15 +26,12 @@ from tissuq.experiments.reading.layout import (
     later_tables,
     split,
 )
-from tissuq.experiments.reading.means_with_spreads import with_spreads_apart
-from tissuq.experiments.reading.percentages import without_percent_signs
-from tissuq.experiments.reading.spanning import with_names_above
-from tissuq.experiments.reading.summary import find_summary
+from tissuq.experiments.reading.lines_above import number_before, title_of, with_names_above
+from tissuq.experiments.reading.no_measurements import without_statements_beside, without_summary
 from tissuq.experiments.reading.table import Lines, Table, padded
 from tissuq.experiments.reading.text_file import read_lines
-from tissuq.experiments.reading.thousands import without_thousands
-from tissuq.experiments.reading.titles import number_before, title_of
 from tissuq.experiments.reading.transposed import transposed_table
+from tissuq.experiments.reading.written_numbers import with_plain_numbers
 
 __all__ = ["read_table", "read_tables"]
 
@@ -53,8 +47,6 @@ MOST_COLUMNS = 1000
 """Columns of a table that is read in seconds."""
 CACHED_FILES = 2
 """Files whose tables are remembered: tests of one file are read one after another."""
-TIME = re.compile(r"\b(time|zeit|temps|tiempo|tempo|время)|(zeit|time)$|时间|時間|시간")
-"""Names of a column of times."""
 
 
 def read_table(path: Any, skip_rows: int = 0, sheet: str | int | None = None, number: int | None = None) -> Table:
@@ -129,7 +121,7 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
         every_sheet = workbook.sheets(path)
         short = {name: list(enumerate(lines, 1)) for name, lines in every_sheet.items() if len(lines) <= SHORT}
         sheets = sheets_with_tables(path, every_sheet, sheet)
-        parts = [
+        tables_of_sheets = [
             _read_every_line(f"{path}, sheet '{name}'", lines, skip_rows, SEPARATOR_OF_CELLS, name)
             for name, lines in sheets.items()
         ]
@@ -137,7 +129,7 @@ def _tables_in(path: str, stamp: tuple[int, int], skip_rows: int, sheet: str | i
             replace(
                 table, other_lines={**table.other_lines, **{name: short[name] for name in short if name != table.sheet}}
             )
-            for tables in parts
+            for tables in tables_of_sheets
             for table in tables
         )
     if sheet is not None:
@@ -160,11 +152,11 @@ def _of_data_frame(data: Any) -> Table:
         lines=range(len(rows)),
         counted="row",
     )
-    if is_units_row(first := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
-        table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first))
+    if is_units_row(first_row := split(rows[0], SEPARATOR_OF_CELLS)) and not any(table.units):
+        table = replace(table.taken(np.arange(1, len(rows))), units=tuple(first_row))
     if len(rows) >= LONG_FILE and (block := _block(columns)) is not None:
         return replace(table, block=block)
-    return _without_summary(table)
+    return without_summary(table)
 
 
 def _block(columns: Sequence[DataColumn]) -> NDArray[np.float64] | None:
@@ -184,10 +176,10 @@ def _read_long(file: str, lines: list[str], skip_rows: int) -> Table | None:
     if len(lines) < LONG_FILE:
         return None
     try:
-        head, *others = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
+        head, *later_tables = _read_every_line(file, lines[:HEAD_LINES], skip_rows)
     except InputError:
         return None
-    if others:
+    if later_tables:
         return None
     rows = lines[head.lines[0] - 1 :]
     while rows and not rows[-1].strip():
@@ -225,8 +217,8 @@ def _read_every_line(
         raise _no_table(file, content)
     starts = [content[position][0] for position in later_tables(content, layout)]
     bounds = pairwise([0, *starts, len(lines) + 1])
-    parts = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
-    tables = _joined([_table_of(file, part, layout.separator, sheet) for part in parts])
+    spans = [[(line, text) for line, text in filled if start <= line < stop] for start, stop in bounds]
+    tables = joined_in_time([_table_of(file, span, layout.separator, sheet) for span in spans])
     lines_with_text = {line for line, _ in filled}
     tables = [block for table in tables for block in blocks_of(table, lines_with_text)]
     if len(tables) == 1:
@@ -244,8 +236,8 @@ def _without_comments(lines: Lines) -> Lines:
 
 def _lines_of(tables: Sequence[Table], but: Table) -> Lines:
     """Return the lines above and in tables, but for one of them."""
-    others = [table for table in tables if table is not but]
-    return [line for table in others for line in (*table.head, *zip(table.lines, table.rows, strict=True))]
+    remaining = [table for table in tables if table is not but]
+    return [line for table in remaining for line in (*table.head, *zip(table.lines, table.rows, strict=True))]
 
 
 def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
@@ -283,51 +275,7 @@ def _table_of(file: str, filled: Lines, separator: str, sheet: str) -> Table:
     _check_shape(table, f"line {header_line} with the column names" if names else "the table")
     if layout.names:
         table = with_names_above(table, texts[layout.names - 1])
-    table = with_spreads_apart(without_percent_signs(without_thousands(table)))
-    return _without_summary(table)
-
-
-def _joined(tables: Sequence[Table]) -> list[Table]:
-    """Return tables, those that go on from the one before as one with it."""
-    joined = list(tables[:1])
-    for table in tables[1:]:
-        if _goes_on(joined[-1], table):
-            note = f"{joined[-1].span} and {table.span}, in which time goes on, read as one table."
-            rows, lines = [*joined[-1].rows, *table.rows], [*joined[-1].lines, *table.lines]
-            joined[-1] = replace(joined[-1], rows=rows, lines=lines, notes=(*joined[-1].notes, note))
-        else:
-            joined.append(table)
-    return joined
-
-
-def _goes_on(table: Table, later: Table) -> bool:
-    """Tell whether a table has the names of the one before, and times that go on from there."""
-    if (table.names, table.units) != (later.names, later.units):
-        return False
-    times = [column for column, name in enumerate(table.names) if TIME.search(heading(name).quantity)]
-    ends = table.taken(np.array([0, len(table.rows) - 1]))
-    return bool(times) and all(
-        before[0] < before[-1] <= after[0]
-        for before, after in zip(ends.numbers(times), later.taken(np.array([0])).numbers(times), strict=True)
-    )
-
-
-def _without_summary(table: Table) -> Table:
-    """Return the table without the rows of a summary at its end."""
-    summary = find_summary(table.rows, table.lines, partial(split, separator=table.separator))
-    if summary is None:
-        return table
-    first, last = table.lines[summary.start], table.lines[-1]
-    counted = table.counted
-    where = f"{counted} {first}" if first == last else f"{counted}s {first} to {last}"
-    if summary.statistics is None:
-        raise InputError(
-            f"{table.file}, {where}: set apart at the end of the table, and not going on from {counted} "
-            f"{table.lines[summary.start - 1]}. Delete a summary; put measurements into a file of their own."
-        )
-    what = f" with its {', '.join(summary.statistics)}" if summary.statistics else ""
-    note = f"{where} at the end of the table, a summary{what}, left out: no measurements."
-    return replace(table.taken(np.arange(summary.start)), notes=(*table.notes, note))
+    return without_summary(with_plain_numbers(table))
 
 
 def _no_table(file: str, content: Lines) -> InputError:

@@ -90,13 +90,13 @@ def read_tests(path: Any, **options: Unpack[PythonOptions]) -> list[Experiment]:
     return [test.reading.experiment for test in tests]
 
 
-def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
+def measurements(data: Any, more_names: Sequence[str] = (), **options: Unpack[PythonOptions]) -> Experiment:
     """Return what people have as an experiment: one as it is, all tests in a file or a table, or several together.
 
     Parameters
     ----------
     data : Experiment, str, path or table, or sequence of these
-    others : sequence of str
+    more_names : sequence of str
         Names of further options, which messages may propose.
     options
         As of `read_tests`; of several files those of each.
@@ -111,7 +111,7 @@ def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[Python
     >>> measurements({"stretch": [1.0, 1.1], "stress": [0.0, 0.2]}, unit="MPa").stress.tolist()
     [0.0, 0.2]
     """
-    spelled_out(options, READING_OPTIONS, others)
+    spelled_out(options, READING_OPTIONS, more_names)
     if isinstance(data, str | os.PathLike) or is_data_frame(data):
         return Experiment.of(read_tests(data, **options))
     if isinstance(data, Experiment):
@@ -122,7 +122,7 @@ def measurements(data: Any, others: Sequence[str] = (), **options: Unpack[Python
             )
         return data
     if isinstance(data, Sequence):
-        return Experiment.of([measurements(test, others, **options) for test in data])
+        return Experiment.of([measurements(test, more_names, **options) for test in data])
     raise InputError(
         "measurements are needed: a file ('test.csv'), a table (a DataFrame, a Dataset of xarray), or an Experiment, "
         f"which tissuq.Experiment(mode, stretch, stress) makes of arrays; or a list of these. Not {data!r:.80}."
@@ -187,16 +187,16 @@ def _of_labels(tests: list[TestInFile], only: Mapping[str, str | int] | None) ->
     InputError
         When there is none: why the first is not.
     """
-    refusals, chosen = list[InputError](), list[TestInFile]()
+    refusals, matching = list[InputError](), list[TestInFile]()
     for test in tests:
         try:
             check_labels(test.reading.table, test.reading.experiment, only)
-            chosen.append(test)
+            matching.append(test)
         except InputError as refusal:
             refusals.append(refusal)
-    if refusals and not chosen:
+    if refusals and not matching:
         raise refusals[0]
-    return chosen
+    return matching
 
 
 def _are_few(rows: int, longest: int) -> bool:
@@ -207,8 +207,8 @@ def _are_few(rows: int, longest: int) -> bool:
 def _may_be_test(refusal: InputError, tests: Sequence[TestInFile]) -> InputError:
     """Return why a table was refused, with how to read the tests in the others."""
     options = tests[0].options
-    place = f"--sheet '{options['sheet']}'" if options.get("sheet") else f"--table {options.get('table')}"
-    return InputError(f"{refusal} To leave that table out and read '{tests[0].name}': {place}.")
+    option = f"--sheet '{options['sheet']}'" if options.get("sheet") else f"--table {options.get('table')}"
+    return InputError(f"{refusal} To leave that table out and read '{tests[0].name}': {option}.")
 
 
 def _side_by_side(

@@ -118,5 +118,5 @@ def _share_of_words(content: bytes, encoding: str) -> float:
     words, first_bytes = LANGUAGES[encoding]
     text = content.decode(encoding, errors="replace")
     characters = "".join(words.findall(text))
-    usual = sum(letter.encode(encoding)[0] in first_bytes for letter in characters)
-    return usual / max(1, sum(not letter.isascii() for letter in text))
+    count = sum(letter.encode(encoding)[0] in first_bytes for letter in characters)
+    return count / max(1, sum(not letter.isascii() for letter in text))

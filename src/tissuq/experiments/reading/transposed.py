@@ -28,9 +28,9 @@ def transposed_table(file: str, content: Lines, separator: str | None, sheet: st
         return None
     separator = separator or likely_separator([text for _, text in content])
     rows = [(line, _column(split(text, separator))) for line, text in content]
-    first = next((k for k, (_, column) in enumerate(rows) if column), len(rows))
-    columns = [column for _, column in rows[first:] if column]
-    is_whole = len(columns) == len(rows) - first and len({len(values) for _, _, values in columns}) == 1
+    first_column = next((k for k, (_, column) in enumerate(rows) if column), len(rows))
+    columns = [column for _, column in rows[first_column:] if column]
+    is_whole = len(columns) == len(rows) - first_column and len({len(values) for _, _, values in columns}) == 1
     if not is_whole or sum(is_of_role(name) for name, _, _ in columns) < 2:
         return None
     names, units, values = zip(*columns, strict=True)
@@ -43,7 +43,7 @@ def transposed_table(file: str, content: Lines, separator: str | None, sheet: st
         separator=separator,
         rows=[joined(row, separator) for row in cells],
         lines=range(start + 1, start + 1 + len(cells)),
-        head=content[:first],
+        head=content[:first_column],
         sheet=sheet,
         counted="column",
         notes=("its columns are lines of the file, each with its name first; it was read turned upright.",),

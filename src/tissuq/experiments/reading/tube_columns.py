@@ -9,7 +9,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, Planar
-from tissuq.experiments.reading.headings import heading, role_names
+from tissuq.experiments.reading.headings import role_names
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.vocabulary import ROLES_OF_TUBE
 from tissuq.experiments.units import measured_in
@@ -47,33 +47,35 @@ def with_columns_of_tube(
     InputError
         When one of both columns is missing, or the loading mode is none of a tube.
     """
-    given, others = ([role for role in mapping if (role in ROLES_OF_TUBE) is is_given] for is_given in (True, False))
-    if not given and (others or len(mode.stresses) > 1):
+    tube_roles, other_roles = (
+        [role for role in mapping if (role in ROLES_OF_TUBE) is is_given] for is_given in (True, False)
+    )
+    if not tube_roles and (other_roles or len(mode.stresses) > 1):
         return dict(mapping)
-    found = {role: columns for role in ROLES_OF_TUBE if (columns := list(_columns(table, quantities, role)))}
-    has_both = PRESSURE in found and not found.keys().isdisjoint(DIAMETERS)
-    if not given and (not has_both or not role_names("stress").isdisjoint(quantities)):
+    by_role = {role: columns for role in ROLES_OF_TUBE if (columns := list(_columns(table, quantities, role)))}
+    has_both = PRESSURE in by_role and not by_role.keys().isdisjoint(DIAMETERS)
+    if not tube_roles and (not has_both or not role_names("stress").isdisjoint(quantities)):
         return dict(mapping)
-    if others:
+    if other_roles:
         raise InputError(
-            f"{table.file}: columns are given as {given[0]} and as {others[0]}, which do not go together: of a tube "
-            "give a pressure and a diameter (--column pressure=NAME --column outer_diameter=NAME)."
+            f"{table.file}: columns are given as {tube_roles[0]} and as {other_roles[0]}, which do not go together: of "
+            "a tube give a pressure and a diameter (--column pressure=NAME --column outer_diameter=NAME)."
         )
-    diameter = next((role for roles in (mapping, found) for role in DIAMETERS if role in roles), DIAMETERS[0])
+    diameter = next((role for roles in (mapping, by_role) for role in DIAMETERS if role in roles), DIAMETERS[0])
     for role in (PRESSURE, diameter):
-        columns = found.get(role, [])
+        columns = by_role.get(role, [])
         if role not in mapping and len(columns) != 1:
             labels = " and ".join(map(table.label, columns))
-            which = f"columns {labels} may each be" if labels else "no column is recognised as"
+            fault = f"columns {labels} may each be" if labels else "no column is recognised as"
             raise InputError(
-                f"{table.file}: {which} the {role.replace('_', ' ')} of a tube. Say which it is: --column {role}=NAME."
+                f"{table.file}: {fault} the {role.replace('_', ' ')} of a tube. Say which it is: --column {role}=NAME."
             )
     if not isinstance(mode, Planar):
-        names = " and ".join(table.label(found[role][0]) for role in (PRESSURE, diameter) if role in found)
-        other = "" if given else " To read other columns, say which: --column stretch=NAME --column force=NAME."
-        raise InputError(f"{table.file} is of a tube under pressure ({names}). {HOW}{other}")
+        names = " and ".join(table.label(by_role[role][0]) for role in (PRESSURE, diameter) if role in by_role)
+        advice = "" if tube_roles else " To read other columns, say which: --column stretch=NAME --column force=NAME."
+        raise InputError(f"{table.file} is of a tube under pressure ({names}). {HOW}{advice}")
     _check_length(table)
-    return {role: mapping.get(role, found.get(role, [0])[0] + 1) for role in (PRESSURE, diameter)}
+    return {role: mapping.get(role, by_role.get(role, [0])[0] + 1) for role in (PRESSURE, diameter)}
 
 
 def _columns(table: Table, quantities: Sequence[str], role: str) -> Iterator[int]:
@@ -88,8 +90,8 @@ def _columns(table: Table, quantities: Sequence[str], role: str) -> Iterator[int
 
 def _check_length(table: Table) -> None:
     """Refuse a tube whose axial stretch the table says, and that is not one."""
-    for column, name in enumerate(table.names):
-        if not AXIAL_STRETCH.fullmatch(heading(name).quantity):
+    for column, quantity in enumerate(table.quantities):
+        if not AXIAL_STRETCH.fullmatch(quantity):
             continue
         (stretch,) = table.numbers([column])
         row = int(np.argmax(np.abs(stretch - 1)))

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ModelError
-from tissuq.experiments.experiment import Curve, Experiment
+from tissuq.experiments.curve import Curve
+from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import Path
 from tissuq.mechanics.material import Material
 from tissuq.mechanics.stress import stress_basis

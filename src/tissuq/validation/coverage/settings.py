@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from importlib.resources import files
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from tissuq.experiments.modes import loading_mode
 from tissuq.mechanics.invariants import largest_invariants
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.parameters.priors import Prior, prior_from
-from tissuq.parameters.seeds import MAX_SEED
+from tissuq.studies.campaign_settings import CoverageOptions
 from tissuq.studies.settings import looked_up
 from tissuq.validation.coverage.fitted import model_of, parameters_of, parts_of
 from tissuq.validation.coverage.truths import FAMILIES, FIXED, MIN_LOCKING_LIMIT, TRUTHS
@@ -74,7 +74,7 @@ class Design(BaseModel):
         return np.linspace(self.low, self.high, self.points)
 
 
-class CoverageSettings(BaseModel):
+class CoverageSettings(CoverageOptions):
     """Truths x designs x noise x formulations x replicates; each replicate is another member of its family, and noise.
 
     ``families`` names families and fixed materials; ``strengths`` multiply how far they are from neo-Hookean ones.
@@ -83,20 +83,15 @@ class CoverageSettings(BaseModel):
     measurements inside predictive bands, ``unseen`` for the true stress in loading modes that were not measured.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     families: tuple[str, ...] = Field(tuple(FAMILIES), min_length=1)
     designs: tuple[Design, ...] = Field(min_length=1)
     formulations: tuple[str, ...] = Field(("none", "yeoh", "gp", "auto"), min_length=1)
     strengths: tuple[Annotated[float, Field(ge=0, le=1)], ...] = Field((1.0,), min_length=1)
-    noise: tuple[Literal["known", "unknown"], ...] = Field(("known",), min_length=1)
     scale: tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...] = Field((), max_length=2)
     priors: dict[str, dict[str, Any]] = Field(default_factory=dict)
     predictive: bool = False
     unseen: tuple[str, ...] = ()
-    replicates: int = Field(50, ge=1, le=100_000)
     prob: float = Field(0.95, gt=0, lt=1)
-    seed: int = Field(0, ge=0, le=MAX_SEED)
     most_fits: int = Field(1_000_000, ge=1)
 
     @field_validator("noise", mode="before")

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
@@ -17,11 +17,11 @@ from tissuq.mechanics import NeoHookean, Yeoh, simulate
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.tolerances import AS_TESTED
 from tissuq.parameters.priors import Prior, Uniform, prior_from
-from tissuq.parameters.seeds import MAX_SEED
 from tissuq.posterior.fitting import fit, fit_many
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, merged
+from tissuq.studies.campaign_settings import PaperOptions
 from tissuq.validation.paper.claims import Finding, Findings, Verdict, find, judge
 
 __all__ = [
@@ -52,24 +52,16 @@ PRIORS: dict[str, Prior] = {
 }
 
 
-class PaperSettings(BaseModel):
+class PaperSettings(PaperOptions):
     """Everything that a run of the study depends on; stresses in MPa.
 
     The paper prints the true parameters, the noise and that priors are wide and uniform. It prints neither the
     number of points, the stretch range nor the bounds of the priors: those defaults are ours.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    points: int = Field(30, ge=6, le=10_000, description="number of measurements")
     stretch_low: float = Field(0.5, gt=0, allow_inf_nan=False, description="smallest stretch")
     stretch_high: float = Field(4.25, gt=0, allow_inf_nan=False, description="largest stretch")
-    noise_sd: float = Field(0.5, gt=0, allow_inf_nan=False, description="standard deviation of the noise, MPa")
-    seed: int = Field(2021, ge=0, le=MAX_SEED, description="seed of noise and draws")
-    replicates: int = Field(1, ge=1, le=10_000, description="data sets over which the claims are checked")
-    sampler: Literal["exact", "nuts", "both"] = "exact"
     truth: dict[str, float] = Field(default_factory=lambda: dict(TRUTH))
-    priors: dict[str, dict[str, Any]] = Field(default_factory=lambda: {s: p.as_dict() for s, p in PRIORS.items()})
 
     @field_validator("priors")
     @classmethod

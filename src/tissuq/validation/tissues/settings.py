@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
 from tissuq.model.tolerances import Tolerances
+from tissuq.studies.campaign_settings import TissueOptions
 from tissuq.studies.settings import looked_up
 from tissuq.validation.tissues.protocols import PROTOCOLS
 
 __all__ = ["TissueSettings"]
 
 
-class TissueSettings(BaseModel):
+class TissueSettings(TissueOptions):
     """Everything that a benchmark on real tissue depends on, but for the data themselves.
 
     Attributes
@@ -37,16 +38,7 @@ class TissueSettings(BaseModel):
         Number of predictions at most for each set and protocol, evenly among all.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    folder: str | None = None
-    sets: tuple[str, ...] = ()
-    protocols: tuple[str, ...] = ("tests", "specimens", "ends")
-    formulations: tuple[str, ...] = ("auto", "none")
-    material: str = "neo-hookean"
-    tolerances: dict[str, float] | None = None
     points: int = Field(30, ge=4, le=10_000)
-    predictions: int = Field(12, ge=1)
 
     @field_validator("protocols")
     @classmethod

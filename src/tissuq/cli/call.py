@@ -1,0 +1,190 @@
+"""A command as it was typed, and how it is carried out: settings, run, folder."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Self, TextIO, TypeVar
+
+import typer
+
+from tissuq.cli.progress import Monitor
+from tissuq.cli.running import Configured, LawOfRun, Running, Written
+from tissuq.errors import InputError
+from tissuq.studies.option import Settings
+from tissuq.studies.settings import load_settings
+
+if TYPE_CHECKING:
+    from tissuq.mechanics import Material
+    from tissuq.report.result import Result
+
+__all__ = ["Call", "not_converged"]
+
+Kind = TypeVar("Kind", bound=Settings)
+How = TypeVar("How", bound=Running)
+Study = TypeVar("Study")
+Whole = TypeVar("Whole", bound=Settings)
+NOT_CONVERGED = 3
+"""The exit status where sampling has not converged."""
+
+
+@dataclass(frozen=True)
+class Call(Generic[Kind, How]):
+    """A command as it was typed.
+
+    Attributes
+    ----------
+    kind : type of Settings
+    stated : dict
+        The settings that were typed.
+    typed : mapping of str to str
+        The option of each, as it was typed.
+    how : Running
+        The other options.
+    monitor : Monitor
+        Is told how the command gets on.
+    out : file
+        Where the answer goes, also with --quiet.
+    """
+
+    kind: type[Kind]
+    stated: dict[str, Any]
+    typed: Mapping[str, str]
+    how: How
+    monitor: Monitor = field(default_factory=Monitor)
+    out: TextIO = field(default_factory=lambda: sys.stdout)
+
+    @property
+    def config(self) -> Path | None:
+        """The file of settings, if one was named."""
+        return self.how.config if isinstance(self.how, Configured) else None
+
+    @property
+    def beside(self) -> Path:
+        """The folder from which relative names count: that of the file of settings, or the current one."""
+        return self.config.parent if self.config else Path()
+
+    @cached_property
+    def settings(self) -> Kind:
+        """The settings, those that were typed before those in a file."""
+        return self.loaded()
+
+    def loaded(self, rivals: tuple[str, ...] = (), **changes: Any) -> Kind:
+        """Return the settings with changes to what was typed; of rivals only one can be set."""
+        return self.loaded_as(self.kind, rivals, **changes)
+
+    def loaded_as(self, kind: type[Whole], rivals: tuple[str, ...] = (), **changes: Any) -> Whole:
+        """Return `loaded` settings of another class, which may add what only a file can say."""
+        return load_settings(kind, self.config, self.stated | changes, rivals, self.typed)
+
+    def with_config(self, file: Path) -> Self:
+        """Return the call as if the file of settings had been named."""
+        return replace(self, how=self.how.model_copy(update={"config": file}))
+
+    def campaign_in(self, folder: Path) -> Callable[[int], AbstractContextManager[Callable[[str, bool], None]]]:
+        """Return what shows the tasks of a campaign, which are kept in a folder as they are done."""
+        self.monitor.folder = folder
+        return self.monitor.campaign
+
+    def check_source(self, setting: str, what: str, earlier: str) -> None:
+        """Refuse a call with neither or both of a source of data, which is a setting, and a file of settings."""
+        if bool(self.stated.get(setting)) == bool(self.config):
+            raise InputError(f"give {what}, or --config run.toml of an earlier {earlier}.")
+
+    @cached_property
+    def law(self) -> Material | None:
+        """The user's own law that a run is of."""
+        from tissuq.mechanics import material_named
+
+        name = self.how.user_law if isinstance(self.how, LawOfRun) else None
+        if name is not None and ".py:" not in name:
+            raise InputError(
+                f"'{name}' is not of the form law.py:Name. --user-law is only needed for a run whose material is a law "
+                "in your own file."
+            )
+        return material_named(name, laws=True) if name else None
+
+    def target(self, default: Path, *, apart_from: Path | None = None) -> Path:
+        """Return the folder that is to be written, once it may be; ``default`` unless another is named."""
+        from tissuq.report.run_folder import check_apart, check_target
+
+        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        folder = self.how.out or default
+        if apart_from is not None:
+            check_apart(folder, apart_from)
+        check_target(folder, force=self.how.force)
+        return folder
+
+    def carried_out(
+        self,
+        target: Path,
+        run: Callable[[Callable[[str], None]], Study],
+        result_of: Callable[[Study], Result],
+        steps: int | None = None,
+    ) -> Study:
+        """Return what a run gives, once its result is written into the target folder, and printed.
+
+        Parameters
+        ----------
+        target : Path
+        run : callable
+            Gets what is to be told of each step.
+        result_of : callable
+            Makes the result of the study.
+        steps : int, optional
+            Their number, where it is known.
+        """
+        from tissuq.report.terminal import print_result
+        from tissuq.report.writer import write_result
+
+        records: list[dict[str, Any]] = []
+
+        def write(study: Study, *, folder: Path, figures: bool) -> None:
+            result = result_of(study)
+            write_result(result, folder, figures=figures)
+            records.append(result.record())
+
+        study = self.written(target, run, write, steps)
+        print_result(records[0], target)
+        self.answer(records[0]["numbers"])
+        return study
+
+    def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:
+        """Print the numbers of a result, with --quiet alone, which leaves all else out."""
+        for number in numbers if self.monitor.is_quiet else ():
+            remark = f", {number['remark']}" if number["remark"] else ""
+            print(f"{number['name']}: {number['text']}{remark}", file=self.out)
+
+    def written(
+        self,
+        target: Path,
+        run: Callable[[Callable[[str], None]], Study],
+        write: Callable[..., None],
+        steps: int | None = None,
+    ) -> Study:
+        """Return what a run gives, once ``write`` has put it into a ``folder``, with ``figures`` or without."""
+        from tissuq.report.run_folder import run_folder
+
+        assert isinstance(self.how, Written)  # noqa: S101 (only such commands have a folder)
+        with self.monitor.steps(steps) as step:
+            study = run(step)
+            step("writing")
+            with run_folder(target, force=self.how.force) as folder:
+                write(study, folder=folder, figures=self.how.figures)
+                self.monitor.write_log(folder, getattr(study, "warnings", ()))
+        return study
+
+
+def not_converged(names: list[str]) -> None:
+    """End with status 3 when sampling has not converged anywhere."""
+    if names:
+        typer.echo(
+            f"tissuq: sampling has NOT converged for {', '.join(names)}; do not use these results. "
+            "Try another method, narrower priors or another seed.",
+            err=True,
+        )
+        raise typer.Exit(NOT_CONVERGED)

@@ -1,0 +1,64 @@
+"""Folders of campaigns, which grow and are gone on with: only that of the same campaign, with its recipe first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tissuq.errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+__all__ = ["check_folder", "write_campaign_recipe"]
+
+
+def check_folder(folder: Path, settings: BaseModel, free: frozenset[str] = frozenset()) -> None:
+    """Refuse a folder that is not empty, unless it is that of the same campaign.
+
+    Settings that are ``free`` may be others than before.
+
+    Raises
+    ------
+    InputError
+        When it is neither.
+    """
+    from tissuq.report.run_folder import RECIPE
+
+    recipe = folder / RECIPE
+    if not folder.exists() or (folder.is_dir() and {path.name for path in folder.iterdir()} <= {_unfinished(recipe)}):
+        return
+    if not recipe.exists():
+        raise InputError(f"'{folder}' is not the folder of a campaign; choose another with --out.")
+    if _without(recipe.read_text(encoding="utf-8"), free) != _without(_recipe(settings), free):
+        raise InputError(f"'{folder}' holds a campaign with other settings; choose another folder with --out.")
+
+
+def write_campaign_recipe(folder: Path, settings: BaseModel) -> None:
+    """Write the recipe atomically, so that a killed campaign can be resumed."""
+    from tissuq.report.run_folder import RECIPE
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scratch = folder / _unfinished(folder / RECIPE)
+    scratch.write_text(_recipe(settings), encoding="utf-8")
+    scratch.replace(folder / RECIPE)
+
+
+def _unfinished(recipe: Path) -> str:
+    return f"{recipe.name}.new"
+
+
+def _without(recipe: str, names: frozenset[str]) -> dict[str, Any] | None:
+    """Return the settings of a recipe without some of them, None where it is damaged."""
+    import tomllib
+
+    try:
+        return {name: value for name, value in tomllib.loads(recipe).items() if name not in names}
+    except tomllib.TOMLDecodeError:
+        return None
+
+
+def _recipe(settings: BaseModel) -> str:
+    import tomli_w
+
+    return tomli_w.dumps(settings.model_dump(mode="json", exclude_none=True))

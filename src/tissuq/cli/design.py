@@ -1,0 +1,41 @@
+"""``tissuq design``: which test to make next."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+
+from tissuq.cli.call import Call
+from tissuq.cli.command import command
+from tissuq.cli.running import OfRun
+from tissuq.errors import InputError
+from tissuq.studies.design_settings import DesignSettings
+from tissuq.studies.option import option
+
+__all__ = ["design"]
+
+
+class DesignOptions(OfRun):
+    """How a ranking is written."""
+
+    out: Path | None = option(None, "Folder for the ranking [runs/RUN-design].")
+
+
+@command(DesignSettings, DesignOptions)
+def design(call: Call[DesignSettings, DesignOptions]) -> None:
+    """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
+    from tissuq.report.design import design_result
+    from tissuq.studies.design import run_design
+
+    if not (call.config or call.stated):
+        raise InputError("give the RUN folder of a fit, or --config run.toml.")
+    run = (call.beside / call.settings.run).resolve()
+    target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
+    recipe = call.settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
+
+    call.carried_out(
+        target,
+        lambda step: run_design(call.settings, call.beside, step, call.law),
+        partial(design_result, recipe=recipe),
+    )

@@ -1,0 +1,52 @@
+"""``tissuq export``: material cards of draws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from tissuq.cli.call import Call
+from tissuq.cli.command import command
+from tissuq.cli.running import LawOfRun
+from tissuq.studies.card_settings import ExportSettings
+from tissuq.studies.option import option
+
+if TYPE_CHECKING:
+    from tissuq.posterior.ensemble import Sampling
+
+__all__ = ["export"]
+
+
+class ExportOptions(LawOfRun):
+    """Where cards are written."""
+
+    out: Path | None = option(None, "Folder for the cards [cards/RUN-FORMAT].")
+    force: bool = option(False, "Replace an existing folder of the same kind.")
+
+
+@command(ExportSettings, ExportOptions)
+def export(call: Call[ExportSettings, ExportOptions]) -> None:
+    """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
+    from tissuq.cli.tables import print_explanations
+    from tissuq.export import CardSettings, card_format
+    from tissuq.report.cards import INDEX, write_cards
+    from tissuq.report.run_folder import check_apart, check_target
+    from tissuq.studies.earlier_run import load
+
+    settings, force = call.settings, call.how.force
+    run = Path(settings.run)
+    target = call.how.out or Path("cards") / f"{run.resolve().name}-{settings.format}"
+    check_apart(target, run)
+    card_format(settings.format)
+    check_target(target, force=force)
+    of_cards = settings.model_dump(include={"law", "order", "unit", "bulk_modulus", "poisson", "name", "number"})
+    CardSettings(**of_cards)
+    posterior = load(run, settings.discrepancy, call.law)
+    sampling = cast("Sampling", settings.sampling)
+    ensemble = posterior.ensemble(settings.draws, settings.seed, sampling, admissible=not settings.all_draws)
+    source = f"run {run.resolve().name} of tissuq, {sampling} draws from seed {settings.seed}"
+    cards = write_cards(ensemble, target, settings.format, force=force, source=source, **of_cards)
+    print_explanations(cards.warnings)
+    files, distances = list(cards.files), [row["from_median"] for row in cards.index]
+    print(f"Cards: {target / files[0]}" + (f" to {files[-1]}" if len(files) > 1 else "") + f", {INDEX}")
+    print(f"The most typical draw, nearest to the median stresses: {files[distances.index(min(distances))]}")

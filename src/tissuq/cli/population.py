@@ -1,0 +1,44 @@
+"""``tissuq population``: what specimens have in common, and how far they differ."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from tissuq.cli.call import Call, not_converged
+from tissuq.cli.command import command
+from tissuq.cli.running import Written
+from tissuq.studies.option import option
+from tissuq.studies.population_settings import PopulationSettings
+
+__all__ = ["population"]
+
+
+class PopulationOptions(Written):
+    """How a population is written."""
+
+    out: Path | None = option(None, "Folder for the run [runs/population].")
+
+
+@command(PopulationSettings, PopulationOptions)
+def population(call: Call[PopulationSettings, PopulationOptions]) -> None:
+    """Identify a population from its specimens, every specimen within it, and what to expect for a new patient."""
+    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.mechanics import material_named
+    from tissuq.report.population import HEADERS, readable_population, write_population_run
+    from tissuq.studies.population import run_population
+
+    call.check_source("files", "the FILES of several specimens, folders of them", "run")
+    settings, material = call.loaded(rivals=("noise", "noise_sd")), call.stated.get("material")
+    law = material_named(material, laws=True) if material else None
+    target = call.target(Path("runs") / "population")
+    study = call.written(
+        target,
+        lambda step: run_population(settings, call.beside, step, law),
+        partial(write_population_run, beside=call.beside),
+    )
+    print_rows(f"A population of {len(study.tests)} specimens", HEADERS, readable_population(study))
+    print("Complete pooling treats all specimens as one: its interval does not describe the range of patients.")
+    print_warnings(study.warnings)
+    print(f"Report: {target / 'report.html'}")
+    not_converged([] if study.population.converged else ["the population"])

@@ -1,0 +1,61 @@
+"""``tissuq predict``: the stress in any loading mode, from a fit."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from tissuq.cli.call import Call, not_converged
+from tissuq.cli.command import command
+from tissuq.cli.reading import resolve
+from tissuq.cli.running import OfRun
+from tissuq.errors import InputError
+from tissuq.studies.option import option
+from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
+
+__all__ = ["predict"]
+
+
+class PredictOptions(OfRun):
+    """How a prediction is written."""
+
+    out: Path | None = option(None, "Folder for the prediction [RUN-MODE, beside the run].")
+
+
+@command(PredictionSettings, PredictOptions)
+def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
+    """Predict the stress in any loading mode from a fit, and compare it with measurements."""
+    from tissuq.cli.tables import print_rows, print_warnings
+    from tissuq.report.prediction import (
+        band_headers,
+        readable_bands,
+        readable_scores,
+        score_headers,
+        write_prediction_run,
+    )
+
+    call.check_source("run", "the RUN folder of a fit", "prediction")
+    data = call.stated.get("data", {})
+    if data and not ("file" in data or call.config):
+        raise InputError(f"{', '.join(data)} can only be used with --data FILE.")
+    if "file" in data:
+        data["file"] = str(resolve(data["file"]))
+    settings, beside, law = call.settings, call.beside, call.law
+    source = beside / settings.run
+    named = source if source.name.strip(".") else source.resolve()  # "." and ".." have no name of their own
+    target = call.target(named.parent / f"{named.name}-{settings.mode_in(beside)}", apart_from=source)
+    prediction = call.written(
+        target,
+        lambda step: run_prediction(settings, beside, step, law),
+        partial(write_prediction_run, settings=settings, target=target, beside=beside, law=call.how.user_law),
+    )
+    print_rows(
+        f"Stress in mode {prediction.mode.name}, {prediction.unit.name}",
+        band_headers(prediction),
+        readable_bands(prediction),
+    )
+    if prediction.scores is not None and prediction.data is not None:
+        print_rows(f"Measurements of {prediction.data.name}", score_headers(prediction), readable_scores(prediction))
+    print_warnings(prediction.warnings)
+    print(f"Report: {target / 'report.html'}")
+    not_converged(["the fit"] if prediction.posterior.solution.is_approximate else [])

@@ -1,0 +1,50 @@
+"""Options on which no number depends: what to repeat, where to write, how much to say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tissuq.studies.option import Settings, option
+
+__all__ = ["Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Written"]
+
+
+class Running(Settings):
+    """Options of a command on which its numbers do not depend."""
+
+
+class Configured(Running):
+    """A command that an earlier recipe repeats."""
+
+    quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.")
+    verbose: bool = option(False, "Tell how long every stage took.")
+    config: Path | None = option(None, "run.toml of an earlier run to repeat.")
+
+
+class Written(Configured):
+    """A command that writes a folder, whole or not at all."""
+
+    out: Path | None = option(None, "Folder for the run [runs/NAME].")
+    figures: bool = option(True, "Draw the figures.")
+    force: bool = option(False, "Replace an existing folder of the same kind.")
+
+
+class LawOfRun(Running):
+    """A command that begins from a run of ``tissuq fit``."""
+
+    user_law: str | None = option(
+        None, "law.py:Name of the run, if its material is your own law; its code runs only if named here."
+    )
+
+
+class OfRun(LawOfRun, Written):
+    """A command that begins from such a run, and writes a folder."""
+
+
+class Campaign(Configured):
+    """A command whose folder grows, and which goes on where it was stopped."""
+
+    config: Path | None = option(None, "TOML file of the campaign.")
+    out: Path | None = option(None, "Folder of the campaign [runs/NAME].")
+    workers: int = option(1, "Processes on this machine.", ge=1)
+    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")

@@ -1,0 +1,46 @@
+"""``tissuq show``: what an earlier run says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tissuq.cli.call import Call
+from tissuq.cli.command import command
+from tissuq.cli.running import Running
+from tissuq.studies.option import Settings, argument, option
+
+__all__ = ["show"]
+
+
+class ShownRun(Settings):
+    """What is shown."""
+
+    run_folder: Path = argument(..., "Folder of a run.")
+
+
+class ShowOptions(Running):
+    """How it is shown."""
+
+    details: bool = option(False, "Also stability, what the discrepancy does, and all warnings.")
+    as_json: bool = option(False, "Everything as one JSON object, for programs.", name="json")
+    pdf: Path | None = option(None, "Print the report into this file instead, with Chromium.")
+
+
+@command(ShownRun, ShowOptions)
+def show(call: Call[ShownRun, ShowOptions]) -> None:
+    """Print the answer of a run and where its report lies."""
+    from tissuq.cli.pdf import write_pdf
+    from tissuq.cli.tables import print_json, print_summary
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import read_record
+
+    folder = call.settings.run_folder
+    if call.how.pdf is not None:
+        write_pdf(folder / "report.html", call.how.pdf)
+        print(call.how.pdf)
+    elif call.how.as_json:
+        print_json(folder)
+    elif record := read_record(folder):
+        print_result(record, folder, details=call.how.details)
+    else:
+        print_summary(folder, details=call.how.details)

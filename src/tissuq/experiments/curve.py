@@ -1,0 +1,105 @@
+"""A measured curve: one stress that a test measured, and its picture before any fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.drawing.panels import Panels, shortened, small_panels
+from tissuq.drawing.pieces import points
+from tissuq.drawing.style import BASE, inline_svg, relative_size
+from tissuq.experiments.modes import LoadingMode, Path
+from tissuq.experiments.units import stress_unit
+
+__all__ = ["Curve", "draw_curves", "small_svg"]
+
+FloatArray = NDArray[np.float64]
+
+MOST_SMALL = 2
+"""Curves of a notebook's figure at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One stress that a test measured, and where.
+
+    Parameters
+    ----------
+    mode : LoadingMode
+        How the specimen was loaded.
+    channel : int
+        The number of the stress among those of the mode.
+    points : (n,) or (n, c) array, dimensionless
+        What the mode controls.
+    stress : (n,) array, MPa
+        Engineering stress.
+    standard_error : (n,) array, MPa
+        Of a stress that is the mean of several specimens; zero of one that is not.
+    name, source, stress_unit, specimen : str
+        Those of the test.
+    least_errors : mapping of str to float
+    direction, condition : str
+        Those of the test.
+    """
+
+    mode: LoadingMode
+    channel: int
+    points: FloatArray
+    stress: FloatArray
+    standard_error: FloatArray
+    name: str
+    source: str
+    stress_unit: str
+    specimen: str
+    least_errors: Mapping[str, float] = field(default_factory=dict)
+    direction: str = ""
+    condition: str = ""
+
+    def __len__(self) -> int:
+        return len(self.stress)
+
+    @property
+    def path(self) -> Path:
+        """What the stress does work along."""
+        return self.mode.paths[self.channel]
+
+    @property
+    def abscissa(self) -> FloatArray:
+        """What the stress is drawn against, (n,)."""
+        return np.asarray(self.path.abscissa(self.points))
+
+    @property
+    def abscissa_name(self) -> str:
+        """What `abscissa` is called on an axis."""
+        controls = self.mode.controls
+        return controls[0].name if len(controls) == 1 else "stretch"
+
+    @property
+    def quantity(self) -> str:
+        """What the mode calls the stress."""
+        return self.mode.stresses[self.channel]
+
+
+def draw_curves(drawn: Panels, curves: Sequence[Curve], unit_name: str) -> None:
+    """Draw every curve on a panel of its own, with its standard errors where there are any."""
+    unit, size = stress_unit(unit_name), relative_size()
+    for number, (axis, curve) in enumerate(zip(drawn.axes, curves, strict=True)):
+        axis.axhline(0, color=BASE, lw=0.6 * size, zorder=0.5)
+        axis.axvline(float(curve.path.abscissa(curve.mode.reference)), color=BASE, lw=0.6 * size, zorder=0.5)
+        error = curve.standard_error / unit.to_mpa
+        points(axis, curve.abscissa, curve.stress / unit.to_mpa, error=error, label="measured")
+        axis.set_xlabel(curve.abscissa_name)
+        if number % drawn.columns == 0 or len(curve.mode.stresses) > 1:
+            axis.set_ylabel(f"{curve.quantity} [{unit.name}]")
+        if drawn.is_new:
+            axis.set_title(shortened(curve.name, drawn.letters))
+
+
+def small_svg(curves: Sequence[Curve], unit_name: str) -> str:
+    """Return the first curves as a small SVG for a notebook."""
+    with small_panels(min(len(curves), MOST_SMALL)) as (figure, drawn):
+        draw_curves(drawn, curves[:MOST_SMALL], unit_name)
+    return inline_svg(figure, "Measured stresses")

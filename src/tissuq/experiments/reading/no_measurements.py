@@ -1,0 +1,211 @@
+"""What in a table is no measurement: statements beside its columns, and a summary beneath its last row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from operator import methodcaller
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.numbers import NUMBER, number_in
+from tissuq.experiments.reading.layout import MISSING, WHITESPACE, joined, split
+from tissuq.experiments.reading.table import Table
+
+__all__ = ["without_statements_beside", "without_summary"]
+
+LARGEST_SHARE = 0.5
+"""Share of the rows of a table beside which statements stand; a column of measurements goes on to its end."""
+ROWS_OF_STATEMENT = 2
+"""Rows from the first of the table to the last statement, over the number of statements, at most."""
+MOST_ROWS, FEWEST_MEASUREMENTS = 8, 5
+"""Rows that a summary has at most, and a table above it at least."""
+JUMP, JUMP_OF_RANGE = 3.0, 0.02
+"""Times the largest step in a column, and share of its range beyond that, by which a row does not go on from above."""
+STATISTICS: dict[str, Callable[[NDArray[np.float64]], Any]] = {
+    "maximum": np.max,
+    "minimum": np.min,
+    "mean": np.mean,
+    "median": np.median,
+    "standard deviation": lambda values: np.std(values, ddof=1),
+    "standard deviation of all": np.std,
+    "standard error": lambda values: np.std(values, ddof=1) / np.sqrt(len(values)),
+    "range": np.ptp,
+    "sum": np.sum,
+    "number of rows": len,
+    "coefficient of variation": lambda values: np.std(values, ddof=1) / np.mean(values) if np.mean(values) else np.nan,
+}
+"""What a summary tells of the columns above it."""
+ROUNDED = 1.01
+"""Units of its last digit by which a statistic may differ: it and the measurements were rounded, half a unit each."""
+FLOATING = 1e-9
+"""Share of a statistic by which it may differ where all digits of a computer are written."""
+OF_ONE_ROW = {"maximum", "minimum"}
+"""Statistics that the last measurement, too, may be."""
+
+
+def without_statements_beside(table: Table) -> Table:
+    """Return the table without statements such as ``Width (mm) | 5`` to its right, which are added to the lines above.
+
+    They stand behind a column without name and cells, from the first rows on, and each begins with a word. A name may
+    stand over them, or none.
+    """
+    gaps = [gap for gap in range(1, len(table.names) - 1) if not table.names[gap] and any(table.names[gap + 1 :])]
+    longest = max(map(methodcaller("count", table.separator), table.rows))
+    if table.separator != WHITESPACE and longest > len(table.names):
+        gaps.append(len(table.names))
+    for gap in gaps:
+        cells = [split(row, table.separator) for row in table.rows]
+        if any(row[gap] for row in cells if len(row) > gap):
+            continue
+        beside = [[cell for cell in row[gap + 1 :] if cell] for row in cells]
+        if _are_statements(beside):
+            statements = zip(table.lines, beside, strict=True)
+            head = [(line, joined(statement, table.separator)) for line, statement in statements if statement]
+            return replace(
+                table,
+                names=table.names[:gap],
+                units=table.units[:gap],
+                rows=[joined(row[:gap], table.separator) for row in cells],
+                head=[*table.head, *head],
+            )
+    return table
+
+
+def _are_statements(rows: Sequence[Sequence[str]]) -> bool:
+    """Tell whether what stands beside the rows of a table are some words with what they state, numbers among them."""
+    filled = [position for position, row in enumerate(rows) if row]
+    if not filled or len(filled) > LARGEST_SHARE * len(rows) or filled[-1] >= ROWS_OF_STATEMENT * (len(filled) + 1):
+        return False
+    stated = [rows[position] for position in filled]
+    begin_with_words = all(len(row) > 1 and not NUMBER.fullmatch(row[0]) for row in stated)
+    return begin_with_words and any(NUMBER.fullmatch(row[1]) for row in stated)
+
+
+def without_summary(table: Table) -> Table:
+    """Return the table without the rows at its end that are no measurements, and that are noted.
+
+    They stand beneath a blank line, or have a word where the rows above have numbers. They are a summary where each
+    is a statistic of the columns above, or has such a word beneath a blank line. Rows right beneath the measurements
+    are a summary where all are statistics.
+
+    Raises
+    ------
+    InputError
+        When rows stand apart that do not go on from the ones above, and are no summary that is known.
+    """
+    start = _start_beneath_gap(table.lines)
+    is_apart = start is not None
+    if start is None:
+        start = _start_of_labels(table)
+    if start is None:
+        return _without_statistics(table)
+    if start < max(FEWEST_MEASUREMENTS, len(table.rows) - start):
+        return table
+    numbers, beneath, of_numbers = _parted(table, start)
+    names = [_statistic(row, numbers, of_numbers) for row in beneath]
+    has_word = [_has_word(row, of_numbers) for row in beneath]
+    if all(name or (is_apart and word) for name, word in zip(names, has_word, strict=True)):
+        return _without_rows(table, start, names)
+    if not _jumps(numbers, beneath, of_numbers):
+        return table
+    raise InputError(
+        f"{table.file}, {_place(table, start)}: set apart at the end of the table, and not going on from "
+        f"{table.counted} {table.lines[start - 1]}. Delete a summary; put measurements into a file of their own."
+    )
+
+
+def _without_statistics(table: Table) -> Table:
+    """Return the table without last rows that are statistics of those above, unless a last measurement may be one."""
+    earliest = max(FEWEST_MEASUREMENTS, len(table.rows) - MOST_ROWS)
+    end = table.taken(np.arange(max(0, len(table.rows) - 3 * MOST_ROWS), len(table.rows)))
+    if earliest >= len(table.rows) or not _jumps(*_parted(end, len(end.rows) - (len(table.rows) - earliest))):
+        return table
+    for start in range(earliest, len(table.rows)):
+        numbers, beneath, of_numbers = _parted(table, start)
+        names = [_statistic(row, numbers, of_numbers) for row in beneath]
+        if all(names) and not OF_ONE_ROW.issuperset(names):
+            return _without_rows(table, start, names)
+    return table
+
+
+def _without_rows(table: Table, start: int, statistics: Sequence[str]) -> Table:
+    """Return the table up to a row, with a note of the statistics that are left out."""
+    names = ", ".join(dict.fromkeys(filter(None, statistics)))
+    what = f" with its {names}" if names else ""
+    note = f"{_place(table, start)} at the end of the table, a summary{what}, left out: no measurements."
+    return table.taken(np.arange(start)).noted(note)
+
+
+def _place(table: Table, start: int) -> str:
+    """Return the lines from a row to the last, in words."""
+    top, bottom = table.lines[start], table.lines[-1]
+    return f"{table.counted} {top}" if top == bottom else f"{table.counted}s {top} to {bottom}"
+
+
+def _parted(table: Table, start: int) -> tuple[NDArray[np.float64], list[tuple[str, ...]], NDArray[np.bool_]]:
+    """Return the numbers above a row, the cells from there on, and which columns above hold only numbers."""
+    cells = table.cells()
+    numbers = np.array([[number_in(cell) for cell in row] for row in cells[:start]])
+    return numbers, cells[start:], np.isfinite(numbers).all(axis=0)
+
+
+def _start_beneath_gap(lines: Sequence[int]) -> int | None:
+    """Return the row beneath the only place where lines are blank, within the last rows of a table."""
+    if lines[-1] - lines[0] == len(lines) - 1:
+        return None
+    row = int(np.flatnonzero(np.diff(lines) > 1)[0]) + 1
+    return row if len(lines) - row <= MOST_ROWS else None
+
+
+def _start_of_labels(table: Table) -> int | None:
+    """Return the first of the last rows that have a word in a cell where the row before them has a number."""
+    last = table.taken(np.arange(max(0, len(table.rows) - MOST_ROWS - 1), len(table.rows))).cells()
+    for count, (row, row_above) in enumerate(pairwise(reversed(last)), start=1):
+        words = [_is_word(cell) for cell in row]
+        if not any(words):
+            break
+        if any(word and NUMBER.fullmatch(cell) for word, cell in zip(words, row_above, strict=False)):
+            return len(table.rows) - count
+    return None
+
+
+def _statistic(row: Sequence[str], numbers: NDArray[np.float64], of_numbers: NDArray[np.bool_]) -> str:
+    """Return which statistic all numbers of a row are, to their last digit; an empty text if none."""
+    columns = [column for column in np.flatnonzero(of_numbers).tolist() if NUMBER.fullmatch(row[column])]
+    if len(columns) < 2 and not (columns and _has_word(row, of_numbers)):
+        return ""
+    for name, statistic in STATISTICS.items():
+        if all(abs(number_in(row[k]) - statistic(numbers[:, k])) <= _rounding(row[k]) for k in columns):
+            return name
+    return ""
+
+
+def _jumps(numbers: NDArray[np.float64], beneath: Sequence[Sequence[str]], of_numbers: NDArray[np.bool_]) -> bool:
+    """Tell whether rows do not go on from the ones above as those do among themselves."""
+    values = np.array([[number_in(cell) for cell in row] for row in beneath])
+    numbers, steps = (
+        numbers[:, of_numbers],
+        np.abs(np.diff(np.vstack([numbers[-1:], values])[:, of_numbers], axis=0)),
+    )
+    allowed = JUMP * np.abs(np.diff(numbers, axis=0)).max(axis=0) + JUMP_OF_RANGE * np.ptp(numbers, axis=0)
+    return bool((np.nan_to_num(steps) > allowed).any())
+
+
+def _has_word(row: Sequence[str], of_numbers: NDArray[np.bool_]) -> bool:
+    return any(_is_word(row[column]) for column in np.flatnonzero(of_numbers).tolist())
+
+
+def _is_word(cell: str) -> bool:
+    return cell.lower() not in MISSING and not NUMBER.fullmatch(cell)
+
+
+def _rounding(cell: str) -> float:
+    """Return by how much a number may differ from the statistic that it was rounded from."""
+    mantissa, _, exponent = cell.lower().replace(",", ".").partition("e")
+    decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+    return float(ROUNDED * float(f"1e{-decimals}") + FLOATING * abs(number_in(cell)))

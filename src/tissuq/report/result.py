@@ -1,0 +1,280 @@
+"""`Result`: what a command has to say, from which `write_result` makes the run folder and `print_result` the terminal.
+
+A study becomes a result by one function, such as `design_result`, and is then written, printed and shown the same way::
+
+    result = design_result(study, recipe)
+    with run_folder(target) as folder:
+        write_result(result, folder, figures=figures)    # tables, figures, run.toml, result.json, report.html
+    print_result(result.record(), target)                # what `tissuq show target` prints, too
+
+The answer comes first: `Number`s with their intervals, a finding in a sentence or two, uses with their verdicts, one
+next step, one `Picture`. Then warnings, the tables, and sections that a page folds. Prose knows ``**strong**`` and
+`` `code` ``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from tissuq.assessment.answer import Use
+from tissuq.report.tables import interval, known_number, significant
+from tissuq.result_warning import Severity, most_severe_first
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pydantic import BaseModel
+
+__all__ = ["RESULT", "Block", "Number", "Picture", "Preformatted", "Result", "Section", "Table", "few_and_others"]
+
+RESULT = "result.json"
+"""The file with the record of a result."""
+MAX_SHOWN = 3
+"""Warnings that are shown at once; notes and the others are counted and folded."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number to take home, in the user's unit.
+
+    Parameters
+    ----------
+    name : str
+        What it is of.
+    value : float or str
+        Where it is no number, what stands in its place, such as the name of a test.
+    low, high : float, optional
+        Ends of its interval, in the same unit.
+    unit : str
+    interval_is : str
+        What the interval is.
+    remark : str
+        Stands beside a value without an interval.
+
+    Examples
+    --------
+    >>> number = Number("initial shear modulus", 81.34, 79.02, 83.71, "kPa")
+    >>> number.text, number.range
+    ('81.3 kPa', '79.0 to 83.7')
+    """
+
+    name: str
+    value: float | str
+    low: float | None = None
+    high: float | None = None
+    unit: str = ""
+    interval_is: str = "95 % interval"
+    remark: str = ""
+
+    @property
+    def text(self) -> str:
+        """The value with its unit, rounded by the width of the interval."""
+        if isinstance(self.value, str):
+            return self.value
+        spread = self._spread
+        rounded = interval(self.value, self.value, spread)[0] if spread else significant(self.value)
+        return f"{rounded} {self.unit}".strip()
+
+    @property
+    def range(self) -> str:
+        """The ends of the interval, or nothing."""
+        if self.low is None or self.high is None:
+            return ""
+        spread = self._spread
+        ends = interval(self.low, self.high, spread) if spread else (significant(self.low), significant(self.high))
+        return " to ".join(ends)
+
+    @property
+    def _spread(self) -> float:
+        """The width that says how many digits count; zero where there is none."""
+        return 0.0 if self.low is None or self.high is None else (self.high - self.low) / 4
+
+    def record(self) -> dict[str, Any]:
+        """Return it as a row of a file."""
+        value = self.value if isinstance(self.value, str) else known_number(self.value)
+        beside = f"{self.interval_is} {self.range}" if self.range else self.remark
+        numbers = {"value": value, "low": self.low, "high": self.high, "unit": self.unit}
+        return {"name": self.name, **numbers, "text": self.text, "remark": beside}
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table for people: cells are text.
+
+    Parameters
+    ----------
+    headers : sequence of str
+    rows : sequence of sequence of str
+    title : str
+    text_columns : tuple of int
+        Columns that are read, not compared; the first is one in any case.
+    note : str
+        Stands beneath.
+    """
+
+    headers: list[str]
+    rows: list[list[str]]
+    title: str = ""
+    text_columns: tuple[int, ...] = ()
+    note: str = ""
+
+    kind = "table"
+
+    def record(self) -> dict[str, Any]:
+        """Return it as it goes into a file."""
+        rows = [list(map(str, row)) for row in self.rows]
+        return {"title": self.title, "headers": list(self.headers), "rows": rows, "note": self.note}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with its name in the run folder, words for those who cannot see it, and what it shows.
+
+    Parameters
+    ----------
+    name : str
+    figure : Figure, or function without arguments
+        A function draws it only where it is wanted.
+    alt, caption : str
+    is_slim : bool
+        Whether a page shows it narrower than its text.
+    """
+
+    name: str
+    figure: Figure | Callable[[], Figure]
+    alt: str
+    caption: str
+    is_slim: bool = False
+
+    kind = "picture"
+
+    def drawn(self) -> Figure:
+        """Return the figure."""
+        return self.figure() if callable(self.figure) else self.figure
+
+
+@dataclass(frozen=True)
+class Preformatted:
+    """Text of a program, such as a difference of files."""
+
+    text: str
+
+    kind = "preformatted"
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a page folds under a title: paragraphs, lists (tuples of sentences), tables, pictures, further sections."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+    kind = "section"
+
+    def record(self) -> dict[str, Any]:
+        """Return title, sentences and tables, those of sections within it among them."""
+        record: dict[str, Any] = {"title": self.title, "text": [], "tables": []}
+        for block in self.blocks:
+            if isinstance(block, str):
+                record["text"].append(block)
+            elif isinstance(block, tuple):
+                record["text"] += block
+            elif isinstance(block, Table):
+                record["tables"].append(block.record())
+            elif isinstance(block, Section):
+                inner = block.record()
+                record["text"] += [block.title, *inner["text"]]
+                record["tables"] += inner["tables"]
+        return record
+
+
+Block: TypeAlias = "str | tuple[str, ...] | Table | Picture | Preformatted | Section"
+"""What stands in a section; a tuple is a list of sentences."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What a command has to say, whole: for page, terminal, files and programs.
+
+    Parameters
+    ----------
+    command : str
+        What repeats it, without ``tissuq`` and ``--config``.
+    title : str
+    subject : str
+        What it is about, in a line: data, material, sizes.
+    numbers : tuple of Number
+        To take home; the first is the headline.
+    finding : str
+        What they say, in a sentence or two.
+    uses : tuple of Use
+        For what it can be used, and why.
+    next_step : str
+        The one thing to do next, as typed in a shell; ``{run}`` stands for the folder.
+    picture : Picture, optional
+        Stands beside the answer, and is to be read on a screen of 400 px.
+    tables : tuple of Table
+        Printed in the terminal, and unfolded on the page.
+    sections : tuple of Section
+    warnings : tuple of str
+        `ResultWarning`s, or plain sentences, which are cautions.
+    files : mapping of str to object
+        By name in the run folder: rows (``.csv``, ``.json``), text, bytes, a file to copy, or a function of the path.
+    recipe : BaseModel, optional
+        The settings for run.toml, where it is not written yet; ``without`` those of no meaning.
+    how_to_repeat : str
+        Instead of the recipe's command, where there is none.
+    """
+
+    command: str
+    title: str
+    subject: str
+    numbers: tuple[Number, ...] = ()
+    finding: str = ""
+    uses: tuple[Use, ...] = ()
+    next_step: str = ""
+    picture: Picture | None = None
+    tables: tuple[Table, ...] = ()
+    sections: tuple[Section, ...] = ()
+    warnings: tuple[str, ...] = ()
+    files: Mapping[str, Any] = field(default_factory=dict)
+    recipe: BaseModel | None = None
+    without: frozenset[str] = frozenset()
+    how_to_repeat: str = ""
+
+    @property
+    def pictures(self) -> Iterator[Picture]:
+        """All figures, that beside the answer first."""
+        if self.picture is not None:
+            yield self.picture
+        yield from _pictures_of(self.sections)
+
+    def record(self) -> dict[str, Any]:
+        """Return everything but figures and files as it stands in result.json, with warnings in the form of a shell."""
+        known = most_severe_first(self.warnings)
+        return {
+            "title": self.title,
+            "subject": self.subject,
+            "numbers": [number.record() for number in self.numbers],
+            "finding": self.finding,
+            "uses": [use._asdict() for use in self.uses],
+            "next": self.next_step,
+            "warnings": [{"code": w.code, "severity": str(w.severity), "text": w.shell} for w in known],
+            "tables": [table.record() for table in self.tables],
+            "sections": [section.record() for section in self.sections],
+        }
+
+
+def few_and_others(warnings: list[dict[str, str]]) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
+    """Return the warnings of a record to show at once, and the others; they are in the order of their severity."""
+    count = min(MAX_SHOWN, sum(warning["severity"] != Severity.NOTE for warning in warnings))
+    return warnings[:count], warnings[count:]
+
+
+def _pictures_of(blocks: tuple[Block, ...]) -> Iterator[Picture]:
+    for block in blocks:
+        if isinstance(block, Picture):
+            yield block
+        elif isinstance(block, Section):
+            yield from _pictures_of(block.blocks)

@@ -1,0 +1,121 @@
+"""Prints a result in the terminal: the answer first, tables, at most three warnings, and where the report lies."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+from tissuq.report.result import few_and_others
+from tissuq.result_warning import Severity, in_shell
+
+__all__ = ["print_explanations", "print_result", "print_rows", "print_warnings"]
+
+TEXT_WIDTH = 96
+"""Letters in a line of prose."""
+
+
+def print_rows(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table whose first column is text and whose others are numbers."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    for index, header in enumerate(headers):
+        table.add_column(header, justify="right" if index else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*map(str, row))
+    console = Console(markup=False, emoji=False)  # names may hold brackets and colons
+    needed = console.measure(table, options=console.options.update(max_width=1000)).maximum
+    console.width = max(console.width, needed)  # truncated numbers would mislead
+    console.print(table)
+
+
+def print_warnings(warnings: Sequence[str]) -> None:
+    """Print warnings about a result."""
+    for text in map(in_shell, warnings):
+        print(fill(text, TEXT_WIDTH, initial_indent="Warning: ", subsequent_indent="  ", break_on_hyphens=False))
+
+
+def print_explanations(explanations: Sequence[str]) -> None:
+    """Print how to read a table."""
+    for text in explanations:
+        print(fill(text, TEXT_WIDTH, initial_indent="- ", subsequent_indent="  "))
+
+
+def print_result(record: dict[str, Any], folder: Path | None = None, *, details: bool = False) -> None:
+    """Print the record of a result.
+
+    Parameters
+    ----------
+    record : dict
+        Of `Result.record`, or of `read_record`.
+    folder : Path, optional
+        The run folder, where there is one.
+    details : bool
+        All warnings, and the sections that a page folds.
+    """
+    shown, others = few_and_others(record["warnings"])
+    shown, others = (shown + others, []) if details else (shown, others)
+    print_warnings([warning["text"] for warning in shown if warning["severity"] == Severity.PROBLEM])
+    print(f"\n{record['title']}")
+    _print_numbers(record["numbers"])
+    if record["finding"]:
+        print(fill(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
+    _print_uses(record["uses"])
+    if record["next"]:
+        step = _plain(record["next"]).replace("{run}", shlex.quote(str(folder)))
+        print("\n" + fill(step, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
+    for table in record["tables"]:
+        _print_table(table)
+    print_warnings([warning["text"] for warning in shown if warning["severity"] != Severity.PROBLEM])
+    for section in record["sections"] if details else ():
+        print(f"\n{section['title']}")
+        print_explanations(list(map(_plain, section["text"])))
+        for table in section["tables"]:
+            _print_table(table)
+    if folder is None:
+        return
+    if not details and (others or record["sections"]):
+        titles = ", ".join(section["title"] for section in record["sections"])
+        count = f"{titles and '; '}further warnings and notes ({len(others)})" if others else ""
+        words = f"{titles}{count}: tissuq show {shlex.quote(str(folder))} --details"
+        print(fill(words, TEXT_WIDTH, subsequent_indent="  ", break_on_hyphens=False))
+    print(f"Report: {folder / 'report.html'}")
+
+
+def _print_numbers(numbers: Sequence[dict[str, Any]]) -> None:
+    width = max((len(number["name"]) for number in numbers), default=0)
+    for number in numbers:
+        remark = f", {number['remark']}" if number["remark"] else ""
+        print(f"  {number['name']:<{width}}  {number['text']}{remark}")
+
+
+def _print_uses(uses: Sequence[dict[str, Any]]) -> None:
+    width = max((len(use["verdict"]) for use in uses), default=0)
+    for use in uses:
+        start = f"  {use['verdict'].upper():<{width}}  "
+        print(fill(f"{use['purpose']}: {use['reason']}", TEXT_WIDTH, initial_indent=start,
+                   subsequent_indent=" " * len(start)))  # fmt: skip
+
+
+def _print_table(table: dict[str, Any]) -> None:
+    print_rows(table["title"], table["headers"], table["rows"])
+    if table["note"]:
+        print(fill(_plain(table["note"]), TEXT_WIDTH))
+
+
+def _plain(text: str) -> str:
+    """Return prose without its marks."""
+    return re.sub(r"\*\*(.+?)\*\*|`(.+?)`", lambda match: match[1] or match[2], text)

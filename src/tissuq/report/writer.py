@@ -1,0 +1,116 @@
+"""Writes a `Result` into a run folder: its files, figures, recipe, record and page; and reads the record again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tissuq.errors import InputError
+from tissuq.report.answer import ANSWER
+from tissuq.report.result import RESULT, Result, few_and_others
+from tissuq.report.run_folder import RECIPE, write_data, write_figures, write_page, write_recipe
+from tissuq.report.tables import write_csv, write_json
+from tissuq.studies.settings import damage_reported
+
+if TYPE_CHECKING:
+    from tissuq.experiments.experiment import Experiment
+    from tissuq.experiments.units import StressUnit
+    from tissuq.posterior.posterior import Posterior
+
+__all__ = ["contents_for_programs", "data_file", "posterior_files", "read_record", "write_result"]
+
+
+def write_result(result: Result, folder: Path, *, figures: bool = True) -> None:
+    """Write a result into a folder, whose earlier figures go.
+
+    Parameters
+    ----------
+    result : Result
+    folder : Path
+        Empty, or that of a campaign with its recipe.
+    figures : bool
+        Draw them, too.
+    """
+    verb, _, options = result.command.partition(" ")
+    command = " ".join(filter(None, [verb, "" if figures else "--no-figures", options]))
+    if result.recipe is not None:
+        write_recipe(folder, command, result.recipe, result.without)
+    for name, content in result.files.items():
+        _write(folder / name, content)
+    shutil.rmtree(folder / "figures", ignore_errors=True)
+    pictures = {picture.name: picture.drawn() for picture in result.pictures} if figures else {}
+    if pictures:
+        write_figures(folder, pictures)
+    record = result.record()
+    write_json(folder / RESULT, record)
+    shown, others = few_and_others(record["warnings"])
+    write_page(folder, "result.html", result=result, record=record, shown=shown, others=others, command=command)
+
+
+def _write(path: Path, content: Any) -> None:
+    """Write what stands in a file: rows, text, bytes, a copy of a file, or what a function writes there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if callable(content):
+        content(path)
+    elif isinstance(content, Path):
+        shutil.copyfile(content, path)
+    elif isinstance(content, bytes):
+        path.write_bytes(content)
+    elif isinstance(content, str):
+        path.write_text(content, encoding="utf-8", errors="surrogateescape")
+    elif path.suffix == ".csv":
+        write_csv(path, content)
+    else:
+        write_json(path, content)
+
+
+def read_record(folder: Path) -> dict[str, Any] | None:
+    """Return the record of a result in a run folder; None where it has none.
+
+    Raises
+    ------
+    InputError
+        When it is damaged.
+    """
+    path = folder / RESULT
+    if not path.exists():
+        return None
+    with damage_reported(path):
+        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if missing := {"title", "numbers", "warnings", "tables", "sections"} - set(record):
+            raise ValueError(f"{', '.join(sorted(missing))} is missing")
+    return record
+
+
+def contents_for_programs(folder: Path) -> dict[str, Any]:
+    """Return all JSON files in a run folder, by the stems of their names, with the folder named in what to do next.
+
+    Raises
+    ------
+    InputError
+        When the folder holds no run, or a file of it is damaged.
+    """
+    contents = {}
+    for path in sorted(folder.glob("*.json")) if (folder / RECIPE).exists() or (folder / RESULT).exists() else ():
+        with damage_reported(path):
+            contents[path.stem] = json.loads(path.read_text(encoding="utf-8"))
+            if path.name in (ANSWER, RESULT):
+                step = str(contents[path.stem]["next"])
+                contents[path.stem]["next"] = step.replace("{run}", shlex.quote(str(folder)))
+    if not contents:
+        raise InputError(f"'{folder}' is not the folder of a complete run: {RESULT} is missing.")
+    return contents
+
+
+def data_file(experiment: Experiment, unit: StressUnit | None = None) -> dict[str, Any]:
+    """Return data.csv with the measurements of an experiment, as a file of a result."""
+    return {"data.csv": lambda path: write_data(path.parent, experiment, unit)}
+
+
+def posterior_files(posteriors: Mapping[str, Posterior], suffix: str = "") -> dict[str, Callable[[Path], object]]:
+    """Return posteriors as files of a result."""
+    return {f"posterior/{name}{suffix}.nc": posterior.save for name, posterior in posteriors.items()}

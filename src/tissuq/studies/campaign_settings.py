@@ -1,0 +1,97 @@
+"""What campaigns say on the command line of all that they depend on; `tissuq.validation` adds the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from tissuq.parameters.seeds import MAX_SEED
+from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.option_texts import priors, tolerances
+from tissuq.studies.shared_options import seed
+
+__all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "TissueOptions"]
+
+NoiseKnown = tuple[Literal["known", "unknown"], ...]
+NOISE = "known or unknown to the fits."
+
+
+def _discrepancies() -> tuple[str, ...]:
+    from tissuq.model.discrepancy import discrepancies
+
+    return tuple(discrepancies())
+
+
+class PaperOptions(Settings):
+    """The study of the paper; stresses in MPa."""
+
+    points: int = option(30, "Number of measurements.", name="measurements", ge=6, le=10_000)
+    noise_sd: float = option(
+        0.5,
+        "Standard deviation of the noise, MPa [0.5]; 0.7071 if 0.5 is a variance.",
+        unit="MPa",
+        gt=0,
+        allow_inf_nan=False,
+    )
+    priors: dict[str, dict[str, Any]] = option(
+        help="A prior in MPa, such as c=uniform(0,10); repeat for more.",
+        default_factory=dict,
+        name="prior",
+        parse=priors,
+        validate_default=True,
+    )
+    seed: int = option(2021, "Seed of noise and draws.", ge=0, le=MAX_SEED)
+    sampler: Literal["exact", "nuts", "both"] = option("exact", "exact, nuts or both.", name="method")
+    replicates: int = option(1, "Data sets over which every claim is checked.", ge=1, le=10_000)
+
+
+class CoverageOptions(Settings):
+    """A campaign that counts how often intervals hold."""
+
+    replicates: int = option(50, "Data sets of every family [50, or as the preset says].", ge=1, le=100_000)
+    noise: NoiseKnown = option(("known",), NOISE, name="noise-sd", takes=str, min_length=1)
+    seed: int = seed()
+
+
+class SbcOptions(Settings):
+    """A campaign of calibration by simulation."""
+
+    replicates: int = option(300, "Data sets of every formulation.", ge=20, le=100_000)
+    noise: NoiseKnown = option(("known", "unknown"), NOISE, name="noise-sd", takes=str, min_length=1)
+    seed: int = seed()
+    material: str = option("neo-hookean", "The material that is calibrated.")
+    formulations: tuple[str, ...] = option(
+        help="Discrepancy; repeat for more [all of them].",
+        default_factory=_discrepancies,
+        name="discrepancy",
+        min_length=1,
+    )
+
+
+class TissueOptions(Settings):
+    """A benchmark on measured tests."""
+
+    folder: str | None = argument(
+        None,
+        "Folder with a CSV file for each set of tests [the sets of tissuq].",
+        takes=Path,
+        parse=lambda folder: str(folder.resolve()),
+    )
+    sets: tuple[str, ...] = option((), "A set to take; repeat for more [all of them].", name="dataset")
+    protocols: tuple[str, ...] = option(
+        ("tests", "specimens", "ends"),
+        "What is predicted: tests, modes, specimens, ends, halves; repeat for more [tests, specimens, ends].",
+        name="protocol",
+    )
+    formulations: tuple[str, ...] = option(
+        ("auto", "none"), "Discrepancy; repeat for more [auto, none].", name="discrepancy"
+    )
+    material: str = option("neo-hookean", "The material that is fitted.")
+    tolerances: dict[str, float] | None = option(
+        None,
+        "Error of a test, as of tissuq fit (stresses in MPa): stress=10%, smooth=2% ...; or none.",
+        name="tolerance",
+        takes=list[str],
+        parse=tolerances,
+    )
+    predictions: int = option(12, "Predictions at most of a set and protocol.", ge=1)

@@ -1,0 +1,161 @@
+"""Settings that say how they are given on the command line: name, help, unit and how a text is understood, once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import NoneType
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
+
+__all__ = ["Option", "Settings", "argument", "option", "options_of"]
+
+
+class Settings(BaseModel):
+    """Settings whose fields are declared by `option` and `argument`, or are for files alone."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    @field_validator("*")
+    @classmethod
+    def _one_of_choices(cls, value: Any, info: ValidationInfo) -> Any:
+        declared = cls.model_fields[str(info.field_name)].json_schema_extra
+        if value is not None and isinstance(declared, Option) and declared.choices:
+            module, _, name = declared.choices.partition(":")
+            choices = get_args(getattr(import_module(module), name))
+            if value not in choices:
+                first = ", ".join(map(repr, choices[:-1]))
+                raise ValueError(f"must be {first} or {choices[-1]!r}, not {value!r}")
+        return value
+
+
+@dataclass(frozen=True)
+class Option:
+    """How a setting is given on the command line.
+
+    Attributes
+    ----------
+    help : str
+        What it means. Its default is added in brackets, unless the text has brackets.
+    name : str
+        As it is typed, without the dashes, where that is not the name of the setting.
+    negative : str
+        What a flag is called that says no.
+    unit : str
+        Of its number.
+    takes : type, optional
+        What the command line reads, where that does not follow from the type of the setting.
+    parse : callable, optional
+        Turns what was read into the value of the setting.
+    choices : str
+        The literal type of its values, as MODULE:NAME, which is imported when a value is checked.
+    entry : str
+        The entry of the setting, a dictionary, that the option is.
+    entries : mapping of str to str
+        Options that are entries of the setting, which is a dictionary, and their helps.
+    of : type of BaseModel, optional
+        Further settings that the setting, a dictionary, holds: their options are options of the command.
+    renamed : mapping of str to str
+        Their names, where the command has another use for them; an empty one for an option that it has not.
+    group : str
+        The heading under which help lists it.
+    is_argument : bool
+        Whether it is typed without its name.
+    """
+
+    help: str
+    name: str = ""
+    negative: str = ""
+    unit: str = ""
+    takes: Any = None
+    parse: Callable[[Any], Any] | None = None
+    choices: str = ""
+    entry: str = ""
+    entries: Mapping[str, str] = field(default_factory=dict)
+    of: type[BaseModel] | None = None
+    renamed: Mapping[str, str] = field(default_factory=dict)
+    group: str = ""
+    is_argument: bool = False
+
+    def __call__(self, schema: dict[str, Any]) -> None:
+        """Add to the JSON schema of the setting what pydantic does not know."""
+        if self.unit:
+            schema["unit"] = self.unit
+
+    def read_as(self, info: FieldInfo) -> Any:
+        """Return the type that the command line reads."""
+        if self.takes is not None:
+            return self.takes
+        kinds = [kind for kind in get_args(info.annotation) if kind is not NoneType] or [info.annotation]
+        kind = kinds[0] if len(kinds) == 1 and type(None) in get_args(info.annotation) else info.annotation
+        if get_origin(kind) in (tuple, list):
+            return list[int] if get_args(kind)[0] is int else list[str]
+        if get_origin(kind) is dict or kind is dict:
+            return list[str]
+        return kind if kind in (int, float, bool, str) or _is_path(kind) else str
+
+    def explained(self, info: FieldInfo) -> str:
+        """Return the help with the default."""
+        default = info.get_default(call_default_factory=False)
+        is_shown = isinstance(default, int | float | str) and not isinstance(default, bool) and default != ""
+        if not is_shown or not self.help or "[" in self.help:
+            return self.help
+        return f"{self.help.removesuffix('.')} [{default:g}]." if isinstance(default, float) else (
+            f"{self.help.removesuffix('.')} [{default}]."
+        )  # fmt: skip
+
+
+def _is_path(kind: Any) -> bool:
+    from pathlib import Path
+
+    return kind is Path
+
+
+def option(
+    default: Any = None,
+    help: str = "",
+    *,
+    name: str = "",
+    negative: str = "",
+    unit: str = "",
+    takes: Any = None,
+    parse: Callable[[Any], Any] | None = None,
+    choices: str = "",
+    entry: str = "",
+    entries: Mapping[str, str] | None = None,
+    of: type[BaseModel] | None = None,
+    renamed: Mapping[str, str] | None = None,
+    group: str = "",
+    default_factory: Callable[[], Any] | None = None,
+    is_argument: bool = False,
+    **limits: Any,
+) -> Any:
+    """Declare a setting that is an option of the command line; ``limits`` are those of pydantic's ``Field``.
+
+    Examples
+    --------
+    >>> class Throw(Settings):
+    ...     draws: int = option(64, "Number of draws.", ge=2)
+    >>> Throw().draws, [option.explained(info) for _, option, info in options_of(Throw)]
+    (64, ['Number of draws [64].'])
+    """
+    declared = Option(
+        help, name, negative, unit, takes, parse, choices, entry, entries or {}, of, renamed or {}, group, is_argument
+    )
+    start = {"default": default} if default_factory is None else {"default_factory": default_factory}
+    return Field(**start, description=help or None, json_schema_extra=declared, **limits)
+
+
+def argument(default: Any, help: str, **more: Any) -> Any:
+    """Declare a setting that is typed without its name; the arguments are those of `option`."""
+    return option(default, help, is_argument=True, **more)
+
+
+def options_of(kind: type[BaseModel]) -> Iterator[tuple[str, Option, FieldInfo]]:
+    """Give the settings that are options: the name of each, how it is given, and its type and default."""
+    for name, info in kind.model_fields.items():
+        if isinstance(info.json_schema_extra, Option):
+            yield name, info.json_schema_extra, info

@@ -1,0 +1,153 @@
+"""What is typed as the value of an option: pairs, priors, ranges, numbers, columns and tolerances."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import MISSING, fields
+from typing import Any
+
+from tissuq.errors import InputError
+
+__all__ = [
+    "column", "noises", "number_or_text", "once_each", "one_noise", "pairs_of", "priors", "range_of", "sd_or_unknown",
+    "tolerances",
+]  # fmt: skip
+
+
+def once_each(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the pairs of a repeatable option as a dictionary, each name given once."""
+    values_by_name: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in values_by_name:
+            raise InputError(f"{option} is given twice for '{name}'; give it once.")
+        values_by_name[name] = value
+    return values_by_name
+
+
+def pairs_of(
+    option: str, what: str, form: str, value: Callable[[str], Any] = str, *, divided_last: bool = False
+) -> Callable[[Sequence[str]], dict[str, Any]]:
+    """Return what makes a dictionary of texts like NAME=VALUE.
+
+    ``what`` and ``form`` say in a message what a text is not, and what to write. With ``divided_last`` names may hold
+    an equals sign.
+    """
+
+    def parse(texts: Sequence[str]) -> dict[str, Any]:
+        pairs = []
+        for text in texts:
+            name, _, of_name = (
+                part.strip() for part in (text.rpartition("=") if divided_last else text.partition("="))
+            )
+            if not (name and of_name):
+                raise InputError(f"'{text}' is not {what} ({option}); write {form}.")
+            pairs.append((name, value(of_name)))
+        return once_each(option, pairs)
+
+    return parse
+
+
+def column(text: str) -> str | int:
+    """Return the name of a column or sheet, or its number."""
+    return int(text) if text.isdecimal() else text
+
+
+def number_or_text(text: str) -> float | str:
+    """Return a number, or what is none as it is."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def sd_or_unknown(text: str) -> float | str:
+    """Return a standard deviation, or 'unknown'."""
+    value = number_or_text(text)
+    if isinstance(value, str) and value != "unknown":
+        raise InputError(f"--noise-sd must be a number or unknown, not '{text}'.")
+    return value
+
+
+def noises(text: str) -> list[float | str]:
+    """Return the standard deviations of the noise of every file, with commas, or 'unknown'."""
+    if text == "unknown":
+        return [text]
+    try:
+        return [float(number) for number in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--noise-sd needs a number in the file's stress unit, or 'unknown', not '{text}'. For several files, one "
+            "for each with commas."
+        ) from error
+
+
+def one_noise(text: str) -> float | str:
+    """Return the standard deviation of the noise of all files: a number, or 'unknown'."""
+    values = noises(text)
+    if len(values) > 1:
+        raise InputError(f"--noise-sd is given {len(values)} times for a population; give it once for all specimens.")
+    return values[0]
+
+
+def range_of(option: str, example: str) -> Callable[[str], tuple[float, float]]:
+    """Return what makes two numbers of a text like 1:1.2."""
+
+    def parse(text: str) -> tuple[float, float]:
+        try:
+            low, high = (float(end) for end in text.split(":"))
+        except ValueError as error:
+            raise InputError(f"{option} needs LOW:HIGH, such as {example}, not '{text}'.") from error
+        return low, high
+
+    return parse
+
+
+def priors(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return priors by parameter, of texts like ``C10=uniform(0, 5)``."""
+    return once_each("--prior", map(_prior, texts))
+
+
+def _prior(text: str) -> tuple[str, dict[str, Any]]:
+    from tissuq.parameters.priors import Prior
+    from tissuq.registry import find
+
+    match = re.fullmatch(r"\s*(\w+)\s*=\s*([\w-]+)\s*\(([^()]*)\)\s*", text)
+    if match is None:
+        raise InputError(f"'{text}' is not a prior; write PARAMETER=DISTRIBUTION(NUMBERS), as in C10=uniform(0, 5).")
+    symbol, distribution, numbers = match.groups()
+    arguments = fields(find(Prior, "prior distribution", distribution, InputError))
+    try:
+        values = [float(number) for number in numbers.split(",")] if numbers.strip() else []
+    except ValueError as error:
+        raise InputError(f"prior '{text}': the arguments must be numbers, with a decimal point.") from error
+    names, needed = [field.name for field in arguments], sum(field.default is MISSING for field in arguments)
+    if not needed <= len(values) <= len(names):
+        optional = f" (and may have {', '.join(names[needed:])})" if names[needed:] else ""
+        raise InputError(f"prior '{text}': {distribution} needs {', '.join(names[:needed])}{optional}.")
+    return symbol, {"distribution": distribution, **dict(zip(names, values, strict=False))}
+
+
+def tolerances(texts: Sequence[str]) -> dict[str, float]:
+    """Return tolerances from texts such as ``stress=10%``; an empty one from ``none``."""
+    return {} if list(texts) == ["none"] else once_each("--tolerance", map(_tolerance, texts))
+
+
+def _tolerance(text: str) -> tuple[str, float]:
+    from tissuq.model.measurement_errors import measurement_errors
+
+    name, _, number = text.partition("=")
+    scale = 0.01 if number.strip().endswith("%") else 1.0
+    try:
+        value = float(number.strip().removesuffix("%")) * scale
+    except ValueError:
+        value = -1.0
+    name, errors = name.strip(), measurement_errors()
+    is_share = name not in errors or not errors[name].is_stress
+    if name not in errors or value < 0 or (is_share and value > 1) or (not is_share and scale != 1.0):
+        names = ", ".join(errors)
+        raise InputError(
+            f"'{text}' is not a tolerance; write stress=10%, length=2%, slack=0.01, smooth=2%, zero=0.1 or "
+            f"stretch=0.001 (the errors are {names}; zero is in the unit of stress of the file)."
+        )
+    return name, value

@@ -1,0 +1,180 @@
+"""What a fit depends on: of one material with several discrepancies, or of several laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import repeat
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
+from tissuq.studies.option import argument, option
+from tissuq.studies.option_texts import noises, priors, tolerances
+from tissuq.studies.settings import looked_up
+
+if TYPE_CHECKING:
+    from tissuq.experiments.experiment import Experiment
+    from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.units import StressUnit
+    from tissuq.model.noise import Noise
+    from tissuq.model.tolerances import Tolerances
+
+__all__ = ["ALL", "LawSettings", "SpecimenSettings"]
+
+ALL = "all"
+"""In place of discrepancies: the paper's and the average of energies, where they apply; in place of laws: all."""
+
+
+class SpecimenSettings(FittedSettings, MeasuredFile):
+    """Everything that a fit depends on; stresses (noise, priors) in the unit of stress of the file, or the first one.
+
+    It is of one ``file``, or of several ``tests`` together.
+    """
+
+    file: str = argument(
+        "",
+        "CSV, Excel or other file, or the name of a built-in data set (tissuq datasets); several files, a folder of "
+        "them, or several tests in a file are fitted together; FILE#NAME is one of these. Or STUDY.toml, as tissuq "
+        "inspect --write makes it.",
+        takes=list[Path],
+    )
+    tests: tuple[MeasuredTest, ...] = ()
+    material: str = option(
+        "neo-hookean",
+        "Material, a sum (gent+mooney-rivlin), or your own law.py:Name [neo-hookean]; see tissuq materials. Repeat for "
+        "more, or 'all', to compare laws.",
+        takes=list[str],
+    )
+    discrepancies: tuple[str, ...] = option(
+        ("auto",),
+        "Discrepancy; repeat for more; 'all' fits the paper's seven and auto [auto].",
+        name="discrepancy",
+        min_length=1,
+    )
+    noise_sd: float | Literal["unknown"] = option(
+        "unknown",
+        "Sd of the noise of the engineering stress, in the file's stress unit, or unknown [unknown]; for several files "
+        "also one for each, with commas.",
+        takes=str,
+        parse=noises,
+    )
+    noise: Literal["unknown", "independent", "proportional", "repeats", "autoregressive"] | None = option(
+        None,
+        "Instead: unknown (errors of consecutive measurements correlated where the data say so), independent, "
+        "autoregressive (correlated), proportional (grows with the stress) or repeats (same stretch again).",
+    )
+    priors: dict[str, dict[str, float | str]] = option(
+        help="A prior in the file's stress unit, such as C10=uniform(0,5); repeat for more.",
+        default_factory=dict,
+        name="prior",
+        parse=priors,
+    )
+    estimand: str | None = option(
+        None,
+        "What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a careful "
+        "laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens].",
+    )
+    tolerances: dict[str, float] | None = option(
+        None,
+        "Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, length=2%, "
+        "slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single "
+        "stretch=0.001 or stress, resolution=0.2% (of the largest); or none; repeat.",
+        name="tolerance",
+        takes=list[str],
+        parse=tolerances,
+    )
+    mode: str | None = option(
+        None, "Loading mode [uniaxial]; once for each of several files [as they or their names say].", takes=list[str]
+    )
+    method: str = option("auto", "auto, exact, nuts, smc or joint.", choices="tissuq.posterior.solver:Method")
+    stable_in: tuple[str, ...] = option((), "Require stability in this loading mode, or in all; repeat for more.")
+    held_out: bool = option(False, "Also predict each of several tests from the others.")
+
+    @field_validator("discrepancies")
+    @classmethod
+    def _all_or_named(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if ALL in names and names != (ALL,):
+            raise ValueError(f"'{ALL}' cannot be combined with other names; give '{ALL}', or names")
+        return names
+
+    @field_validator("tolerances")
+    @classmethod
+    def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
+        from tissuq.model.tolerances import Tolerances
+
+        looked_up(lambda given: Tolerances(**given), sizes or {})
+        return sizes
+
+    @field_validator("estimand")
+    @classmethod
+    def _estimand_there_is(cls, name: str | None) -> str | None:
+        from tissuq.model.tolerances import Tolerances
+
+        if name is not None:
+            looked_up(Tolerances, name)
+        return name
+
+    @model_validator(mode="after")
+    def _measured(self) -> Self:
+        if bool(self.file) == bool(self.tests):
+            raise ValueError("give one file, or several tests with a file each")
+        reading = {"name", *ReadingSettings.model_fields}
+        if self.tests and self.model_fields_set & reading:
+            misplaced = ", ".join(sorted(self.model_fields_set & reading))
+            raise ValueError(f"reading options belong in each of the tests, not beside them ({misplaced})")
+        has_noise_sd = [test.noise_sd is not None for test in self.tests]
+        if any(has_noise_sd) and (not all(has_noise_sd) or self.noise or self.noise_sd != "unknown"):
+            raise ValueError("give noise_sd for each of the tests, or once for all of them")
+        if self.held_out and (len(self.tests) < 2 or any(has_noise_sd)):
+            raise ValueError("held_out needs two or more tests, and one noise_sd for all of them or an unknown one")
+        return self
+
+    def readings(self, folder: Path = Path(), found: Sequence[Reading | None] = ()) -> list[Reading]:
+        """Return what is read from the file, or those of all tests, unless that is found."""
+        tests = self.tests or (self,)
+        of_tests = found or repeat(None, len(tests))
+        return [test.reading(folder, of_test) for test, of_test in zip(tests, of_tests, strict=True)]
+
+    def experiment(self, folder: Path = Path()) -> Experiment:
+        """Read the measurements, of all tests together."""
+        from tissuq.experiments.experiment import Experiment
+
+        return Experiment.of([reading.experiment for reading in self.readings(folder)])
+
+    def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
+        """Return the tolerances, those of stresses converted from a unit to MPa; None for those of `tissuq.fit`."""
+        from tissuq.model.tolerances import Tolerances
+
+        if self.tolerances is None and self.estimand is None:
+            return None
+        sizes = self.tolerances or {}
+        is_stress = {error.name for error, _ in Tolerances(**sizes) if error.is_stress}
+        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in sizes}
+        return Tolerances(self.estimand or "", **{name: size * scale[name] for name, size in sizes.items()})
+
+    def noise_in(self, unit: StressUnit) -> Noise:
+        """Return the noise, known standard deviations converted from a unit to MPa."""
+        from tissuq.model.noise import noise_named
+
+        values = [test.noise_sd for test in self.tests if test.noise_sd is not None]
+        if values:
+            return noise_named([value * unit.to_mpa for value in values])
+        return super().noise_in(unit)
+
+
+class LawSettings(SpecimenSettings):
+    """Everything that a comparison of laws depends on: as of a fit, but for the material."""
+
+    laws: tuple[str, ...] = Field((ALL,), min_length=1)
+
+    @model_validator(mode="after")
+    def _one_discrepancy(self) -> Self:
+        if len(self.discrepancies) > 1 or self.discrepancies == (ALL,):
+            raise ValueError("laws are compared with one discrepancy: give one, or one material")
+        if self.held_out:
+            raise ValueError("held_out is for one material: give one")
+        if ALL in self.laws and self.laws != (ALL,):
+            raise ValueError(f"'{ALL}' cannot be combined with other materials; give '{ALL}', or names")
+        return self

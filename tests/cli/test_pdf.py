@@ -1,0 +1,49 @@
+"""`tissuq show RUN --pdf FILE`."""
+
+import shutil
+
+import pytest
+
+ALONE = ("--noise-sd", 1, "--discrepancy", "none", "--no-figures")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+@pytest.fixture
+def run(cli, here, specimen):
+    assert cli("fit", specimen, *ALONE, "--out", "run").status == 0
+    return here / "run"
+
+
+@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="needs Chromium")
+def test_a_report_is_printed_as_a_pdf(cli, here, run):
+    said = cli("show", "run", "--pdf", "report.pdf")
+    assert (said.status, said.out, said.err) == (0, "report.pdf\n", "")
+    content = (here / "report.pdf").read_bytes()
+    assert content.startswith(b"%PDF-")
+    assert b"/Page" in content
+
+
+def test_without_a_browser_a_message_says_what_to_do(cli, here, run, monkeypatch):
+    monkeypatch.setenv("PATH", str(here))
+    said = cli("show", "run", "--pdf", "report.pdf")
+    assert said.status == 2
+    assert "tissuq doctor" in said.err
+    assert "run/report.html" in said.err
+    assert not (here / "report.pdf").exists()
+
+
+def test_a_browser_that_fails_is_told_with_its_last_words(cli, here, run, monkeypatch):
+    program = here / "chromium"
+    program.write_text("#!/bin/sh\necho first >&2\necho no display >&2\nexit 3\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(here))
+    said = cli("show", "run", "--pdf", "report.pdf")
+    assert said.status == 2
+    assert "no display" in said.err
+    assert not (here / "report.pdf").exists()
+
+
+def test_a_folder_without_a_page_is_refused(cli, here):
+    said = cli("show", "nowhere", "--pdf", "report.pdf")
+    assert said.status == 2
+    assert "nowhere/report.html" in said.err

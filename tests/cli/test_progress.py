@@ -1,0 +1,151 @@
+"""How a command gets on: lines where there is no terminal, the log of a run, what is said when it is stopped."""
+
+from __future__ import annotations
+
+import re
+import socket
+import sys
+from pathlib import Path
+
+import pytest
+
+from tissuq.cli import progress
+from tissuq.cli.progress import LOG, Monitor
+
+
+@pytest.fixture(autouse=True)
+def lines(monkeypatch):
+    """Have lines told, which other tests leave out because they depend on how fast the machine is."""
+    monkeypatch.delenv(progress.SWITCH)
+
+
+ALONE = ("--noise-sd", 1, "--discrepancy", "none", "--no-figures")
+
+
+class Impatient:
+    """A timer that is over as soon as it starts."""
+
+    def __init__(self, seconds, function, arguments):
+        self.function, self.arguments = function, arguments
+
+    def start(self):
+        self.function(*self.arguments)
+
+    def cancel(self):
+        pass
+
+
+class Endless(Impatient):
+    """A timer that is never over."""
+
+    def start(self):
+        pass
+
+
+def carry_out(monitor):
+    with monitor.steps(3) as step:
+        for name in ("reading", "fitting", "writing"):
+            step(name)
+
+
+def test_a_long_step_is_told_in_a_line_where_there_is_no_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "Timer", Impatient)
+    carry_out(Monitor())
+    said = capsys.readouterr()
+    assert said.out == ""
+    lines = [re.sub(r"\d+:\d\d left, ", "TIME left, ", line) for line in said.err.splitlines()]
+    assert lines == [
+        "tissuq: 1 of 3: reading",
+        "tissuq: 2 of 3: TIME left, fitting",
+        "tissuq: 3 of 3: TIME left, writing",
+    ]
+
+
+def test_nothing_is_said_of_short_steps_or_in_quiet(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "Timer", Endless)
+    carry_out(Monitor())
+    monkeypatch.setattr(progress, "Timer", Impatient)
+    carry_out(Monitor(is_quiet=True, is_verbose=True))
+    monkeypatch.setenv(progress.SWITCH, "off")
+    carry_out(Monitor())
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_step_that_ends_in_time_takes_its_line_along(monkeypatch):
+    cancelled = []
+    monkeypatch.setattr(progress, "Timer", Endless)
+    monkeypatch.setattr(Endless, "cancel", lambda timer: cancelled.append(timer.arguments[0]))
+    carry_out(Monitor())
+    assert [text.rpartition(" ")[2] for text in cancelled] == ["reading", "fitting", "writing"]
+
+
+def test_the_time_left_is_that_of_the_tasks_so_far(monkeypatch, capsys):
+    clock = iter([0.0, *range(0, 1000, 20)])
+    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(Monitor, "_begin", lambda self, name: None)
+    with Monitor(started=0.0).campaign(4) as step:  # begins at 0 and 20; then the clock is asked twice or more a task
+        for number in range(4):
+            step(f"task {number}", True)
+    lines = capsys.readouterr().err.splitlines()
+    assert [re.match(r"tissuq: (\d) of 4, ", line)[1] for line in lines] == ["1", "2", "3", "4"]
+    assert lines[-1].startswith("tissuq: 4 of 4, 0:00 left, ")
+
+
+def test_verbose_tells_how_long_every_stage_took(cli, specimen, monkeypatch):
+    monkeypatch.setattr(progress, "Timer", Endless)
+    said = cli("fit", specimen, *ALONE, "--verbose")
+    assert said.status == 0
+    stages = re.findall(r"^tissuq: (.+): \d+\.\d s$", said.err, flags=re.MULTILINE)
+    assert stages == ["none", "assessing", "writing"]
+
+
+def test_the_log_of_a_run_says_version_command_and_stages_and_nothing_of_the_machine(cli, here, specimen):
+    assert cli("fit", specimen.name, *ALONE).status == 0
+    text = (here / "runs" / "specimen" / LOG).read_text()
+    assert re.search(r"UTC  tissuq \S+, Python \d", text)
+    assert "command: tissuq fit specimen.csv --noise-sd 1 --discrepancy none --no-figures\n" in text
+    assert re.findall(r"^ *\d+\.\d s  (\w+)$", text, flags=re.MULTILINE) == ["none", "assessing", "writing", "written"]
+    for private in (str(here), socket.gethostname(), str(Path.home()) + "/", sys.prefix):
+        assert private not in text
+
+
+def test_the_log_is_of_the_run_and_goes_with_it_when_it_is_replaced(cli, here, specimen):
+    for options in ((), ("--force",)):
+        assert cli("fit", specimen.name, *ALONE, *options).status == 0
+    assert (here / "runs" / "specimen" / LOG).read_text().count("command: ") == 1
+
+
+@pytest.mark.parametrize("folder", [None, Path("runs/bar")])
+def test_what_is_said_when_stopped_names_what_is_done_and_how_to_go_on(folder, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["tissuq", "structure", "my run"])
+    monitor = Monitor(stages=[("loading", 0.0), ("", 1.0), ("fitting", 1.0)], folder=folder, tasks=9, tasks_done=4)
+    if folder is None:
+        wanted = "stopped during 'fitting' (done: loading); no run was written. To begin again: "
+    else:
+        wanted = "stopped; 4 of 9 tasks are done and kept in 'runs/bar'. To go on: "
+    assert monitor.stopped() == wanted + "tissuq structure 'my run'"
+
+
+def test_quiet_prints_the_answer_of_a_ranking_alone(cli, here, specimen):
+    assert cli("fit", specimen, *ALONE, "--out", "run").status == 0
+    options = ("--candidate", "planar 1.05:1.2 6", "--no-figures")
+    said = cli("design", "run", *options, "--quiet")
+    assert (said.status, said.err) == (0, "")
+    (line,) = said.out.splitlines()
+    loud = cli("design", "run", *options, "--force").out
+    name, _, value = line.partition(": ")
+    assert name in loud
+    assert value in " ".join(loud.split())
+    wrong = cli("design", "nowhere", "--quiet")
+    assert wrong.status == 2
+    assert "no run folder" in wrong.err
+
+
+def test_quiet_prints_the_numbers_of_a_fit_alone(cli, here, specimen):
+    said = cli("fit", specimen, *ALONE, "--out", "run", "--quiet")
+    assert (said.status, said.err) == (0, "")
+    loud = " ".join(cli("show", "run").out.split())
+    assert said.out
+    for line in said.out.splitlines():
+        name, _, value = line.partition(": ")
+        assert f"{name} {value}" in loud

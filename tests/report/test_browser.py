@@ -1,0 +1,144 @@
+"""What a person sees and does on the page of a fit, in a browser."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+import tissuq as tq
+from browser import FIRST_SCREEN, needs_chromium, opened
+from tissuq.report.specimen import write_specimen_run
+from tissuq.studies.specimen import SpecimenSettings, run_specimen
+
+pytestmark = [needs_chromium, pytest.mark.slow]
+
+TYPED, SLIDER = "#chart input[type=number]", "#chart input[aria-label$='at which to predict']"
+READOUT, OF_PARAMETERS = ".chart-readout", "#chart fieldset input[type=range]"
+NUMBER = r"-?\d+\.?\d*(?:e[+-]?\d+)?"
+
+
+@pytest.fixture(scope="module")
+def of_one_test(specimen_study, specimen_file, tmp_path_factory):
+    """The page of a fit with several formulations."""
+    folder = tmp_path_factory.mktemp("one")
+    write_specimen_run(specimen_study, [specimen_file], folder)
+    return folder / "report.html"
+
+
+@pytest.fixture(scope="module")
+def of_two_tests(tmp_path_factory):
+    """The page of a fit of two loading modes."""
+    folder, files = tmp_path_factory.mktemp("two"), []
+    for number, mode in enumerate(("uniaxial", "planar")):
+        test = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": 3.0}, np.linspace(1, 2, 9), 0.01, number, mode=mode)
+        files.append(folder / f"{mode}.csv")
+        rows = "".join(f"{x},{y}\n" for x, y in zip(test.stretch, test.stress, strict=True))
+        files[-1].write_text(f"stretch,stress_MPa\n{rows}", encoding="utf-8")
+    tests = [{"file": str(file), "mode": file.stem, "noise_sd": 0.01} for file in files]
+    study = run_specimen(SpecimenSettings(tests=tests, material="ogden-1", discrepancies=["none"]))
+    (folder / "run").mkdir()
+    write_specimen_run(study, files, folder / "run")
+    return folder / "run" / "report.html"
+
+
+def violations(page):
+    """What axe finds on a page, with the elements, by rule."""
+    found = Axe().run(page).response["violations"]
+    return {violation["id"]: [node["html"] for node in violation["nodes"]] for violation in found}
+
+
+def said(page):
+    """The numbers that are read out: stretch, measured where it is, predicted, ends of measurements, ..."""
+    return [float(text) for text in re.findall(NUMBER, page.inner_text(READOUT).replace("95 %", ""))]
+
+
+def expected(study, stretch):
+    (bands, stress, alone) = (
+        study.posteriors["auto"].predict([stretch], unit="kPa", **options).iloc[0]
+        for options in ({}, {"noise": False}, {"noise": False, "discrepancy": False})
+    )
+    return [stretch, *bands[["median", "low", "high"]], *stress[["low", "high"]], alone["median"]]
+
+
+def test_a_stretch_is_typed_reached_by_keys_and_dragged_and_its_numbers_are_read_out(of_one_test, specimen_study):
+    with opened(of_one_test) as page:
+        page.select_option("#chart select >> nth=0", "auto")
+        assert page.get_attribute(READOUT, "aria-live") == "polite"
+        page.fill(TYPED, "1.43")
+        assert said(page) == pytest.approx(expected(specimen_study, 1.43), rel=2e-2, abs=8)
+        page.focus(SLIDER)
+        page.keyboard.press("ArrowRight")
+        assert 0 < said(page)[0] - 1.43 < 0.02
+        before = said(page)
+        box = page.locator(".chart-mark").bounding_box()
+        across, down = box["x"] + box["width"] / 2, box["y"] + 40
+        page.mouse.move(across, down)
+        page.mouse.down()
+        page.mouse.move(across - 80, down, steps=3)
+        page.mouse.up()
+        after = said(page)
+        assert after[0] < before[0] - 0.1
+        at = float(page.input_value(TYPED))
+        assert after == pytest.approx(expected(specimen_study, at), rel=2e-2, abs=8)
+        page.fill(TYPED, "3")
+        assert "beyond 0.6 to 2" in page.inner_text(READOUT)
+
+
+def test_parameters_that_are_moved_draw_the_material_alone(of_one_test):
+    with opened(of_one_test) as page:
+        page.fill(TYPED, "1.5")
+        slider = page.locator(OF_PARAMETERS).first
+        slider.evaluate("slider => { slider.value = slider.max; slider.dispatchEvent(new Event('input')); }")
+        *_, yours = said(page)
+        top = float(slider.input_value())
+        assert yours == pytest.approx(2 * top * (1.5 - 1.5**-2), rel=6e-3)
+        page.click("text=back to the fit")
+        assert "yours" not in page.inner_text(READOUT)
+
+
+def test_what_is_selected_is_shown_alone_and_all_comes_back(of_one_test):
+    with opened(of_one_test) as page:
+        picture = page.locator("#chart canvas")
+        whole = picture.screenshot()
+        page.fill(TYPED, "1.2")
+        page.click("[aria-label='zoom in around the mark']")
+        assert picture.screenshot() != whole
+        page.click("[aria-label='show the whole curve']")
+        page.fill(TYPED, "2")
+        page.mouse.move(0, 0)
+        assert picture.screenshot() == whole
+
+
+@pytest.mark.parametrize("width", [1200, 400])
+def test_number_verdicts_and_curve_begin_on_the_first_screen(of_one_test, width):
+    with opened(of_one_test, width) as page:
+        for part in (".numbers strong", ".uses li >> nth=3", ".uses .next", "#chart canvas"):
+            assert page.locator(part).first.bounding_box()["y"] < FIRST_SCREEN - 40, part
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        reasons = [page.locator(part).first.is_visible() for part in (".uses li span", ".reasons li")]
+        assert reasons == ([True, False] if width > 820 else [False, True])
+
+
+@pytest.mark.parametrize("page_of", ["of_one_test", "of_two_tests"])
+@pytest.mark.parametrize("width", [1200, 400])
+def test_axe_finds_nothing_that_shuts_someone_out(request, page_of, width):
+    with opened(request.getfixturevalue(page_of), width, bypass_csp=True) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+        seen = violations(page)
+        assert seen == {}, json.dumps(seen, indent=1)
+
+
+def test_axe_finds_a_fault_that_is_planted(of_one_test):
+    with opened(of_one_test, bypass_csp=True) as page:
+        page.evaluate("document.querySelector('img').removeAttribute('alt')")
+        page.evaluate("document.querySelector('.soft').style.color = '#bbbbbb'")
+        page.evaluate("document.querySelector('.still').classList.remove('print-only')")
+        assert violations(page).keys() >= {"color-contrast", "image-alt"}
+
+
+def test_without_scripts_the_still_figure_stands_there(of_one_test):
+    with opened(of_one_test, java_script_enabled=False) as page:
+        assert page.locator(".still img").is_visible()
+        assert not page.locator("#chart").is_visible()
