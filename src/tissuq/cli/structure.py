@@ -46,6 +46,10 @@ def structure(
     discrepancy: RunDiscrepancy = None,
     draws: Annotated[int | None, typer.Option(help="Draws of the posterior [64].")] = None,
     steps: Annotated[int | None, typer.Option(help="Steps at which the force is computed [8].")] = None,
+    full_runs: Annotated[
+        int | None,
+        typer.Option(help="Draws computed in full; the others follow to first order, much faster [all]."),
+    ] = None,
     force_noise: Annotated[
         float | None,
         typer.Option(help="Sd of a new measurement of the force, N [same share of the force as in the test]."),
@@ -70,7 +74,8 @@ def structure(
         raise InputError("give the RUN folder of a fit, or --config run.toml of an earlier simulation.")
     options: dict[str, Any] = {
         "run": str(run) if run else None, "case": case, "sizes": _sizes(size or []) or None, "discrepancy": discrepancy,
-        "draws": draws, "steps": steps, "force_noise": force_noise, "bulk_ratio": bulk_ratio, "seed": seed,
+        "draws": draws, "steps": steps, "full_runs": full_runs, "force_noise": force_noise, "bulk_ratio": bulk_ratio,
+        "seed": seed,
     }  # fmt: skip
     settings = load_settings(SimulationSettings, config, options)
     beside = config.parent if config else Path()

@@ -43,6 +43,7 @@ class SimulationSettings(BaseModel):
     draws: int = Field(64, ge=2)
     steps: int = Field(8, ge=1)
     seed: int = Field(0, ge=0, le=MAX_SEED)
+    full_runs: int | None = Field(None, ge=4)
     force_noise: float | None = Field(None, ge=0, lt=inf)
     bulk_ratio: float = Field(BULK_RATIO, gt=0, lt=inf)
 
@@ -177,6 +178,7 @@ def run_simulation(
         without=posteriors.without,
         steps=settings.steps,
         seed=settings.seed,
+        full_runs=settings.full_runs,
         force_noise=settings.force_noise,
         bulk_ratio=settings.bulk_ratio,
         run=carried_out,
