@@ -27,9 +27,6 @@ class CalibrateOptions(Written):
 def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     """Identify the parameters of an expensive model, using an emulator whose error is included."""
     from tissuq.report.calibration import calibration_result
-    from tissuq.report.run_folder import run_folder
-    from tissuq.report.terminal import print_result
-    from tissuq.report.writer import write_result
     from tissuq.studies.calibration import run_calibration
 
     call.check_source("file", "a FILE of controls and measured values", "run")
@@ -41,14 +38,8 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
         study = run_calibration(settings, call.beside, runs_in=runs_in, workers=call.how.workers, step=step)
-    result = calibration_result(study, call.beside)
-    with run_folder(target, force=call.how.force) as folder:
-        write_result(result, folder, figures=call.how.figures)
-        call.monitor.write_log(folder, study.warnings)
-    record = result.record()
     print(f"Forward runs: {runs_in}")
-    print_result(record, target)
-    call.answer(record["numbers"])
+    call.carried_out(target, lambda step: study, lambda study: calibration_result(study, call.beside))
     not_converged([] if study.calibration.converged else ["the calibration"])
 
 

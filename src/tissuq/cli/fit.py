@@ -81,12 +81,13 @@ def _fit_one(
     from tissuq.cli.tables import print_summary
     from tissuq.report.answer import answer_record, readable_estimates
     from tissuq.report.specimen import write_specimen_run
-    from tissuq.studies.specimen import run_specimen
+    from tissuq.studies.specimen import run_specimen, steps_of
 
     study = call.written(
         target,
         lambda step: run_specimen(settings, call.beside, step, law, found),
         partial(write_specimen_run, sources=sources),
+        steps_of(settings) + 1,
     )
     print_summary(target, study.experiment)
     record = answer_record(study.experiment.name, study.main, study.answer, study.unit, ())
