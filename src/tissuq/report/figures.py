@@ -130,10 +130,10 @@ def predictive_figure(
 
 
 def marginal_figure(
-    posteriors: Mapping[str, Posterior], symbol: str, unit: StressUnit, truth: float | None = None
+    posteriors: Mapping[str, Posterior], symbol: str, unit: StressUnit, truth: float | None = None, width: float = 8.2
 ) -> Figure:
     """Return the marginal posteriors of one stress parameter, a row a formulation, with 95 % HPD and true value."""
-    with new_figure(8.2, 0.62 * len(posteriors) + 1.1) as figure:
+    with new_figure(width, 0.62 * len(posteriors) + 1.1) as figure:
         solutions = {name: posterior.solution for name, posterior in posteriors.items()}
         ridges(figure.subplots(), solutions, symbol, unit, truth=truth)
     return figure

@@ -44,6 +44,7 @@ __all__ = [
     "parameters_of",
     "priors_in_mpa",
     "run_specimen",
+    "steps_of",
     "warnings_of_files",
 ]
 
@@ -112,6 +113,11 @@ class SpecimenStudy:
         return [name for name, posterior in self.posteriors.items() if posterior.solution.is_approximate]
 
 
+def steps_of(settings: SpecimenSettings) -> int:
+    """Return the number of steps that `run_specimen` announces."""
+    return len(_names(settings)) * (2 if settings.held_out else 1) + 1
+
+
 def run_specimen(
     settings: SpecimenSettings,
     folder: Path = Path(),
@@ -135,8 +141,7 @@ def run_specimen(
     experiment = Experiment.of([reading.experiment for reading in readings])
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
-    is_all = settings.discrepancies == (ALL,)
-    names = _every() if is_all else list(dict.fromkeys(settings.discrepancies))
+    is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
     priors = priors_in_mpa(settings, symbols, unit)
     posteriors, seconds, skipped = {}, {}, {}
@@ -247,6 +252,11 @@ def _warning_of_file(text: str) -> ResultWarning:
     if is_doubtful(text):
         return ResultWarning(text, "doubtful-reading", Severity.PROBLEM)
     return ResultWarning(text, "stress-at-rest" if STRESS_AT_REST in text else "measurements")
+
+
+def _names(settings: SpecimenSettings) -> list[str]:
+    """Return the discrepancies that are asked for."""
+    return _every() if settings.discrepancies == (ALL,) else list(dict.fromkeys(settings.discrepancies))
 
 
 def _every() -> list[str]:
