@@ -100,7 +100,8 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     offset = posterior.answer_with([ResultWarning("at stretch 1 the stress is already 4 kPa.", "stress-at-rest")])
     assert offset.uses[0].verdict is Verdict.NO
     assert "stress at rest" in offset.uses[0].reason
-    assert "first warning" in offset.next_step.shell
+    assert offset.uses[1].verdict is Verdict.CARE
+    assert "--load-zero first" in offset.next_step.shell
     slack = ResultWarning("the first 25 rows carry no load: give --preload auto.")
     assert "first warning" in vague.answer_with([slack]).next_step.shell
     assert "design" in vague.answer.next_step.shell
@@ -113,3 +114,9 @@ def test_where_the_assumed_spread_of_specimens_sets_the_width_more_specimens_are
     assert 0.7 * (modulus.high - modulus.low) / 2 / modulus.mean < 1.96 * 0.18
     assert "spread between specimens" in answer.uses[0].reason
     assert "further specimens" in answer.next_step.shell
+
+
+def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_specimens():
+    answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
+    assert answer.meaning == tq.estimands()["specimen"].description
+    assert answer.uses[0].reason.endswith("nearly all of it the assumed error of the stress as a whole")

@@ -200,9 +200,16 @@ def test_a_campaign_goes_on_from_a_kill_before_its_recipe_was_whole(cli, here):
     (here / "out").mkdir()
     (here / "out" / "run.toml.new").write_text("designs = [")
     assert cli("study", "coverage", "--config", "small.toml", "--out", "out").status == 0
-    assert {"run.toml", "tasks.jsonl", "summary.csv", "families.csv", "figures", "report.html", "tissuq.log"} == {
-        path.name for path in (here / "out").iterdir()
-    }
+    assert {
+        "run.toml",
+        "tasks.jsonl",
+        "summary.csv",
+        "families.csv",
+        "figures",
+        "report.html",
+        "result.json",
+        "tissuq.log",
+    } == {path.name for path in (here / "out").iterdir()}
     said = cli("study", "coverage", "--config", "small.toml", "--out", "out", "--seed", "1")
     assert said.status == 2
     assert "other settings" in " ".join(said.err.split())

@@ -49,13 +49,16 @@ def calibrate_run(tmp_path_factory):
 def test_a_run_leaves_the_promised_files(calibrate_run):
     folder, said = calibrate_run
     found = {name for name, content in tree(folder / "run").items() if content is not None}
-    figures = {f"figures/{name}.{kind}" for name in ("band", "emulator", "marginals") for kind in ("svg", "png")}
+    figures = {
+        f"figures/{name}.{kind}" for name in ("answer", "band", "emulator", "marginals") for kind in ("svg", "png")
+    }
     tables = {"summary.csv", "summary.json", "prediction.csv", "forward_runs.csv", "calibration.nc",
               "leave_one_out.csv", "sensitivity.csv"}  # fmt: skip
-    files = {"input/punch.csv", "input/force.py", "report.html", "run.toml", "contents.txt", "tissuq.log"}
+    files = {"input/punch.csv", "input/force.py", "report.html", "result.json", "run.toml", "contents.txt"}
+    files |= {"tissuq.log"}
     assert found == figures | tables | files
     for words in ("force.py:force: 16 runs", "each left out", "the solver has not converged", "run-forward-runs"):
-        assert words in said.out.replace("\n      ", " ")
+        assert words in " ".join(said.out.split())
     page = (folder / "run" / "report.html").read_text()
     assert all(
         words in page

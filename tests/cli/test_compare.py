@@ -43,9 +43,9 @@ def test_runs_are_compared(cli, two_runs):
     assert said.status == 0, said.err
     for name in ("first/none", "first/constant", "second/auto"):
         assert name in said.out
-    words = " ".join(said.out.split())
-    assert "weights for averaging predictions" in words
-    assert "C10, kPa (95 %)" in words
+    assert "C10, kPa (95 %)" in said.out
+    for explained in (cli("show", "compared", "--details"), cli("compare", "first", "second")):
+        assert "weights for averaging predictions" in " ".join(explained.out.split())
     rows = rows_of(two_runs / "compared")
     assert set(rows) == {"first/none", "first/constant", "second/auto"}
     (own,) = json.loads((two_runs / "second" / "assessment.json").read_text())
@@ -55,7 +55,10 @@ def test_runs_are_compared(cli, two_runs):
     assert found == {
         "comparison.csv",
         "report.html",
+        "result.json",
         "contents.txt",
+        "figures/answer.svg",
+        "figures/answer.png",
         "figures/comparison.svg",
         "figures/comparison.png",
     }

@@ -87,7 +87,7 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert float(halves[0]["mean"]) == pytest.approx(np.mean(constants) / 2, rel=1e-8)
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "too few for a 95 % band" in page
-    assert page.count("data:image/svg+xml") == 1
+    assert page.count("data:image/svg+xml") == 2
     assert "HYPERELASTIC, NEO HOOKE" in page
 
 

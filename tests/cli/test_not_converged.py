@@ -44,7 +44,7 @@ def test_the_exit_status_is_3_and_the_message_names_the_discrepancy(fitted):
 def test_the_report_warns_and_shows_rhat_and_ess(fitted, here):
     report = (here / "runs" / "specimen" / "report.html").read_text()
     assert f'<div class="warning problem">{VERDICT}</div>' in report
-    assert "<th>R-hat</th><th>ESS</th>" in report
+    assert '<th scope="col">R-hat</th><th scope="col">ESS</th>' in report
     assert "<td>1.730</td><td>12</td>" in report
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import tomllib
 
 import numpy as np
@@ -55,7 +56,7 @@ def test_a_run_leaves_the_promised_files(population_run):
     folder, said = population_run
     found = {path.relative_to(folder / "run").as_posix() for path in (folder / "run").rglob("*") if path.is_file()}
     inputs = {f"input/S{k}.csv" for k in range(5)} | {"input/S5/first.csv", "input/S5/second.csv"}
-    figures = {f"figures/{name}.{kind}" for name in ("specimens", "new_patient") for kind in ("svg", "png")}
+    figures = {f"figures/{name}.{kind}" for name in ("answer", "specimens", "new_patient") for kind in ("svg", "png")}
     tables = {
         "data.csv",
         "population.csv",
@@ -64,12 +65,26 @@ def test_a_run_leaves_the_promised_files(population_run):
         "population.nc",
         "posterior/new-patient.nc",
     }
-    assert found == inputs | figures | tables | {"report.html", "run.toml", "contents.txt", "tissuq.log"}
+    assert found == inputs | figures | tables | {"report.html", "result.json", "run.toml", "contents.txt", "tissuq.log"}
     assert "A population of 6 specimens" in said.out
-    assert "does not describe the range of patients" in said.out
+    assert "does not describe the range of patients" in " ".join(said.out.split())
     page = (folder / "run" / "report.html").read_text()
     assert all(f"<td>S{k}</td>" in page for k in range(6))
     assert "kPa" in page
+
+
+def test_show_prints_what_the_command_printed_and_details_all_else(population_run):
+    folder, said = population_run
+    assert run_in(folder, "show", "run").out == said.out
+    details = " ".join(run_in(folder, "show", "run", "--details").out.split())
+    assert "By itself (no pooling): only the data of the specimen." in details
+    contents = json.loads(run_in(folder, "show", "run", "--json").out)
+    patient = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
+    headline = contents["result"]["numbers"][0]
+    assert headline["name"] == "initial shear modulus of a new patient"
+    for name, end in (("value", "median"), ("low", "hdi_low"), ("high", "hdi_high")):
+        assert headline[name] == pytest.approx(2 * float(patient[end]), rel=1e-6)  # the modulus is twice C10
+    assert headline["unit"] == "kPa"
 
 
 def test_predictions_and_cards_start_from_a_new_patient(population_run):

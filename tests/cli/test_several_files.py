@@ -178,7 +178,7 @@ def test_each_file_is_read_once_and_each_note_is_printed_once(cli, here, monkeyp
             sheet.append(list(row))
     book.save(here / "two.xlsx")
     with monkeypatch.context() as patch:
-        patch.setattr("tissuq.studies.measured_file.read_file", None)
+        patch.setattr("tissuq.experiments.reading.experiment_file.read_file", None)
         said = cli("fit", "two.xlsx", *ALONE)
         one = cli("fit", "two.xlsx#S2", *ALONE, "--out", "one")
         laws = cli("fit", "two.xlsx", *ALONE, "--material", "neo-hookean", "--material", "gent", "--out", "laws")

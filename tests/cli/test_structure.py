@@ -52,7 +52,7 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
         assert (folder / name).stat().st_size > 200, name
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "too few for a 95 % band" in page
-    assert page.count("data:image/svg+xml") == 3
+    assert page.count("data:image/svg+xml") == 4
 
 
 @pytest.mark.finite_elements

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from tissuq.cli.progress import _duration
+from tissuq.cli.progress import _left
 from tissuq.validation.coverage import PRESETS
 
 CAMPAIGN = """
@@ -55,7 +55,7 @@ def test_sbc_writes_its_table_and_page_and_goes_on(cli, here):
 
 @pytest.mark.parametrize(("seconds", "text"), [(None, ""), (65.0, "1:05 left, "), (7260.0, "2 h 01 min left, ")])
 def test_the_time_left_is_told_in_minutes_or_hours(seconds, text):
-    assert _duration(seconds) == text
+    assert _left(seconds) == text
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
@@ -76,7 +76,7 @@ def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, h
     arguments = ("study", "tissues", "--dataset", "brain-cortex", "--formulation", "none", "--protocol", "tests")
     said = cli(*arguments, "--out", "out")
     assert said.status == 0
-    assert "Predictions of real tests" in said.out
+    assert "Do predictions of real tests hold?" in said.out
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "Each test from the others of its set" in page
     assert {"summary.csv", "predictions.csv", "run.toml"} <= {file.name for file in (here / "out").iterdir()}

@@ -7,7 +7,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.experiments.units import StressUnit
-from tissuq.report.comparison import comparison_figure, readable_comparison, write_comparison
+from tissuq.report.comparison import comparison_figure, comparison_result, readable_comparison
+from tissuq.report.writer import write_result
 
 KPA = StressUnit("kPa", 1e-3)
 
@@ -57,7 +58,7 @@ def test_parameters_of_different_names_are_named_one_by_one(table):
 
 
 def test_the_page_says_what_a_comparison_does_not_tell(table, tmp_path):
-    write_comparison(table, ["first", "second"], KPA, tmp_path)
+    write_result(comparison_result(table, ["first", "second"], KPA), tmp_path)
     page = (tmp_path / "report.html").read_text()
     assert "do not apply to parameters" in page
     assert "tissuq compare first second" in page

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tissuq.report.coverage import coverage_result, readable_coverage
 from tissuq.report.run_folder import RECIPE
-from tissuq.report.validation import readable_coverage, write_campaign
-from tissuq.validation.coverage import CoverageSettings
+from tissuq.report.writer import write_result
+from tissuq.validation.coverage import CoverageSettings, summarise
 from tissuq.validation.coverage.campaign import tasks_of
 
 DESIGN = {"low": 0.7, "high": 2.0, "points": 12, "noise_sd": 0.1}
@@ -44,19 +45,21 @@ def made_up(settings):
 def test_every_kind_of_campaign_has_its_page_tables_and_figures(changes, tmp_path):
     settings = settings_of(**changes)
     (tmp_path / RECIPE).write_text("seed = 0\n")
-    summary = write_campaign(settings, made_up(settings), tmp_path)
+    results = made_up(settings)
+    write_result(coverage_result(settings, results), tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    _, rows = readable_coverage(summary)
+    _, rows = readable_coverage(summarise(settings, results))
     assert len(rows) == settings.cells
     assert all(cell in page for row in rows for cell in row)
     names = {
+        "answer",
         "coverage",
         *(["families"] if len(settings.families) > 1 else []),
         *(["unseen"] if settings.unseen else []),
     }
     assert {path.stem for path in (tmp_path / "figures").iterdir()} == names
     assert page.count("<img") == len(names)
-    assert {path.stem for path in tmp_path.glob("*.csv")} == {"summary", "families"} | (names - {"coverage"})
+    assert {path.stem for path in tmp_path.glob("*.csv")} == {"summary", "families"} | (names - {"answer", "coverage"})
     assert not any("nan" in cell for row in rows for cell in row)
 
 
@@ -65,5 +68,6 @@ def test_failed_fits_are_told(tmp_path):
     (tmp_path / RECIPE).write_text("seed = 0\n")
     results = made_up(settings)
     results[0]["fits"][1] = None
-    assert write_campaign(settings, results, tmp_path)["failed"].sum() == 1
+    write_result(coverage_result(settings, results), tmp_path)
+    assert summarise(settings, results)["failed"].sum() == 1
     assert "1 fits failed" in (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -12,11 +12,12 @@ import tissuq as tq
 from tissuq.report.prediction import (
     band_headers,
     prediction_figure,
+    prediction_result,
     readable_bands,
     readable_scores,
     score_headers,
-    write_prediction_run,
 )
+from tissuq.report.writer import write_result
 from tissuq.studies.prediction import predicted
 from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
 
@@ -117,11 +118,11 @@ def test_a_folder_holds_tables_arrays_figure_and_page(found, planar, tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
     settings = PredictionSettings(run="run", data=ComparedFile(file="other.csv"))
-    write_prediction_run(found, settings, folder, folder, tmp_path)
+    write_result(prediction_result(found, settings, folder, tmp_path), folder)
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
     assert names == {
         "prediction.csv", "prediction.nc", "scores.csv", "scores.json", "run.toml", "report.html", "input/other.csv",
-        "figures/prediction.svg", "figures/prediction.png",
+        "figures/prediction.svg", "figures/prediction.png", "figures/answer.svg", "figures/answer.png", "result.json",
     }  # fmt: skip
     with (folder / "prediction.csv").open() as table:
         first = list(csv.DictReader(table))[2]
@@ -138,7 +139,7 @@ def test_a_folder_holds_tables_arrays_figure_and_page(found, planar, tmp_path):
 
 def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(posterior, tmp_path):
     found = predicted(posterior, mode="planar", stretch=[1.0, 1.2, 9.0])
-    write_prediction_run(found, PredictionSettings(run="run"), tmp_path, tmp_path, figures=False)
+    write_result(prediction_result(found, PredictionSettings(run="run"), tmp_path), tmp_path, figures=False)
     page = (tmp_path / "report.html").read_text()
     assert "At stretch 1.2 in mode planar, the engineering stress is" in page
     assert "How the measurements are predicted" not in page

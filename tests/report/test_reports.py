@@ -11,9 +11,10 @@ from xml.etree import ElementTree
 import pytest
 
 from marks import slow_but
+from tissuq.report.paper import paper_result
 from tissuq.report.run_folder import LIBRARIES, write_figures
 from tissuq.report.specimen import write_specimen_run
-from tissuq.report.validation import write_paper_run
+from tissuq.report.writer import write_result
 from tissuq.validation.paper.claims import CLAIMS
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -64,15 +65,15 @@ def paper_folder(paper_study, tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tissuq.report.validation.write_figures", write_some)
-        write_paper_run(paper_study, folder)
+        patch.setattr("tissuq.report.writer.write_figures", write_some)
+        write_result(paper_result(paper_study), folder)
     return folder
 
 
 @pytest.fixture(scope="session")
 def long_paper_folder(paper_study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("long_paper")
-    write_paper_run(paper_study, folder)
+    write_result(paper_result(paper_study), folder)
     return folder
 
 

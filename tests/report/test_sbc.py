@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tissuq.report.run_folder import RECIPE
-from tissuq.report.validation import readable_ranks, write_sbc
-from tissuq.validation.sbc import SbcSettings
+from tissuq.report.sbc import readable_ranks, sbc_result
+from tissuq.report.writer import write_result
+from tissuq.validation.sbc import SbcSettings, summarise_ranks
 
 
 def test_the_page_says_what_is_wrong_and_what_failed(tmp_path):
@@ -19,7 +20,8 @@ def test_the_page_says_what_is_wrong_and_what_failed(tmp_path):
         {"formulation": 1, "noise": 0, "below": dict(zip(("C10", "c", "psi"), uniform[1:], strict=True))},
     ]
     (tmp_path / RECIPE).write_text("seed = 0\n")
-    table = write_sbc(settings, results, tmp_path)
+    write_result(sbc_result(settings, results), tmp_path)
+    table = summarise_ranks(settings, results)
     assert list(table["calibrated"]) == [True, True, True, False]
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 of 4 parameters is NOT calibrated" in page

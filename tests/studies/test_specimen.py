@@ -6,7 +6,7 @@ from marks import slow_but
 from tissuq.errors import ConvergenceError, InputError, ModelError
 from tissuq.posterior import fitting
 from tissuq.studies import specimen
-from tissuq.studies.specimen import SpecimenSettings, run_specimen
+from tissuq.studies.specimen import SpecimenSettings, run_specimen, steps_of
 
 STRETCH = np.array([0.8, 0.9, 1.1, 1.2, 1.3, 1.4, 1.6])
 STRESS_KPA = 100 * (STRETCH - STRETCH**-2) + np.array([1, 0, 0.5, -1, 0, -0.5, 0.25])
@@ -73,6 +73,14 @@ def test_all_discrepancies_are_fitted_and_those_that_do_not_apply_are_skipped_wi
     assert set(found.skipped) == {"mooney-rivlin"}
     assert "C01" in found.skipped["mooney-rivlin"]
     assert found.seconds.keys() == found.posteriors.keys()
+
+
+def test_the_number_of_steps_is_known_before_they_are_announced(file):
+    settings = SpecimenSettings(file=str(file), discrepancies=("none", "constant", "none"), noise_sd=1.0)
+    announced = []
+    run_specimen(settings, step=announced.append)
+    assert announced == ["none", "constant", "assessing"]
+    assert steps_of(settings) == len(announced)
 
 
 def test_a_discrepancy_with_more_parameters_than_measurements_is_skipped_when_all_are_asked_for(tmp_path, offered):

@@ -18,6 +18,7 @@ from tissuq.experiments.curve import Curve
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.marginal import Marginal
 from tissuq.inference.solution import PROBABLE_DIRECTION, Solution
+from tissuq.model.tolerances import TISSUE
 from tissuq.prediction.bands import Band, predict_band
 from tissuq.result_warning import ResultWarning, Severity
 
@@ -29,8 +30,9 @@ MIN_INSIDE = 0.9
 """Share of the measurements inside their 95 % bands below which these do not describe the test."""
 MIN_STABLE, MIN_OFTEN_STABLE = 0.95, 0.5
 """Probabilities of stability over the measured range above which simulations rarely fail, and often succeed."""
-NORMAL_HALF_WIDTH, SET_BY_SPREAD = 1.96, 0.7
+NORMAL_HALF_WIDTH, SET_BY_COMMON_ERROR = 1.96, 0.7
 """Half width of a normal 95 % interval over its sd, and the share of a half width that sets it."""
+SPREAD = "assumed spread between specimens"
 GRID_POINTS = 9
 """Stretches at which the width of a band is looked at."""
 
@@ -172,14 +174,11 @@ def _reporting(
         return _worst(verdict, Verdict.CARE), f"{width}, but the tests contradict each other"
     if "not-near-reference" in codes:
         return _worst(verdict, Verdict.CARE), f"{width}, extrapolated to the reference, near which nothing was measured"
-    if _is_spread_of_specimens(solution, half_width):
-        return verdict, f"{width}, nearly all of it the assumed spread between specimens"
+    model = solution.model
+    if model.common_error * NORMAL_HALF_WIDTH > SET_BY_COMMON_ERROR * half_width:
+        common = SPREAD if model.tolerances.estimand == TISSUE else "assumed error of the stress as a whole"
+        return verdict, f"{width}, nearly all of it the {common}"
     return verdict, width
-
-
-def _is_spread_of_specimens(solution: Solution, half_width: float) -> bool:
-    """Return whether an error that all tests have in common, above all the spread between specimens, sets a width."""
-    return solution.model.common_error * NORMAL_HALF_WIDTH > SET_BY_SPREAD * half_width
 
 
 def _precision(half_width: float) -> tuple[Verdict, str]:
@@ -212,8 +211,10 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
     if held < MIN_INSIDE * count:
         return Verdict.NO, f"only {counts}"
     sentence = f"stress {width} on average where it was measured, {counts}"
-    if "unmodelled-curve" in codes:
-        return _worst(verdict, Verdict.CARE), f"{sentence}, but the fitted curve departs from the measured one"
+    for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
+                         ("stress-at-rest", "there is stress at rest, where the material has none")):  # fmt: skip
+        if code in codes:
+            return _worst(verdict, Verdict.CARE), f"{sentence}, but {reason}"
     return verdict, sentence
 
 
@@ -307,6 +308,14 @@ STEPS: Mapping[str, Step] = {
         "act on the first warning: it concerns the measurements themselves.",
         "act on the first warning: it concerns the measurements themselves.",
     ),
+    "zero": Step(
+        "take off what the load cell shows at rest: fit again with --load-zero first, or as the first warning says.",
+        'take off what the load cell shows at rest: fit again with load_zero="first", or as the first warning says.',
+    ),
+    "few": Step(
+        "measure at more stretches, from near rest onward: tissuq design {run} says which.",
+        "measure at more stretches, from near rest onward: posterior.design() says which.",
+    ),
     "specimens": Step(
         "measure further specimens: how much they differ is assumed so far, and sets the width.",
         "measure further specimens: how much they differ is assumed so far, and sets the width.",
@@ -338,16 +347,20 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     reporting, _, others, simulating = (use.verdict for use in uses)
     codes = {warning.code for warning in warnings}
     model = solution.model
-    if reporting is not Verdict.YES and not codes.isdisjoint({"measurements", "stress-at-rest"}):
+    if "stress-at-rest" in codes:
+        return STEPS["zero"]
+    if reporting is not Verdict.YES and "measurements" in codes:
         return STEPS["measurements"]
     if not solution.is_of_data:
         return STEPS["export"]
     if not model.energy_symbols and model.material.is_isotropic:
         return STEPS["auto"]
+    if "few-measurements" in codes and reporting is Verdict.NO:
+        return STEPS["few"]
     if "unstable" in codes:
         return STEPS["stable"]
     if reporting is not Verdict.YES:
-        return STEPS["specimens" if "spread between specimens" in uses[0].reason else "design"]
+        return STEPS["specimens" if SPREAD in uses[0].reason else "design"]
     if others is not Verdict.YES and len(model.experiment.modes) == 1:
         return STEPS["second mode"]
     return STEPS["export" if simulating is not Verdict.NO else "design"]

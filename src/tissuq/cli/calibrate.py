@@ -26,9 +26,7 @@ class CalibrateOptions(Written):
 @command(CalibrationSettings, CalibrateOptions)
 def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     """Identify the parameters of an expensive model, using an emulator whose error is included."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.calibration import HEADERS, readable_calibration, write_calibration_run
-    from tissuq.report.run_folder import run_folder
+    from tissuq.report.calibration import calibration_result
     from tissuq.studies.calibration import run_calibration
 
     call.check_source("file", "a FILE of controls and measured values", "run")
@@ -40,14 +38,8 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
         study = run_calibration(settings, call.beside, runs_in=runs_in, workers=call.how.workers, step=step)
-    with run_folder(target, force=call.how.force) as folder:
-        write_calibration_run(study, folder, call.beside, figures=call.how.figures)
-        call.monitor.write_log(folder, study.warnings)
-    title = f"{settings.forward_model.name}: {len(study.calibration.runs)} runs"
-    print_rows(title, HEADERS, readable_calibration(study.calibration))
-    print(f"Emulator, {study.calibration.check}")
-    print_warnings(study.warnings)
-    print(f"Forward runs: {runs_in}\nReport: {target / 'report.html'}")
+    print(f"Forward runs: {runs_in}")
+    call.carried_out(target, lambda step: study, lambda study: calibration_result(study, call.beside))
     not_converged([] if study.calibration.converged else ["the calibration"])
 
 

@@ -20,7 +20,7 @@ from tissuq.studies.settings import load_settings
 
 if TYPE_CHECKING:
     from tissuq.mechanics import Material
-    from tissuq.report.result import Result
+    from tissuq.report.result import Record, Result
 
 __all__ = ["Call", "not_converged"]
 
@@ -141,7 +141,7 @@ class Call(Generic[Kind, How]):
         from tissuq.report.terminal import print_result
         from tissuq.report.writer import write_result
 
-        records: list[dict[str, Any]] = []
+        records: list[Record] = []
 
         def write(study: Study, *, folder: Path, figures: bool) -> None:
             result = result_of(study)
@@ -152,6 +152,17 @@ class Call(Generic[Kind, How]):
         print_result(records[0], target)
         self.answer(records[0]["numbers"])
         return study
+
+    def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
+        """Write a result into the folder of a campaign, and print it."""
+        from tissuq.report.terminal import print_result
+        from tissuq.report.writer import write_result
+
+        write_result(result, folder, figures=figures)
+        self.monitor.write_log(folder, result.warnings)
+        record = result.record()
+        print_result(record, folder)
+        self.answer(record["numbers"])
 
     def answer(self, numbers: Sequence[Mapping[str, Any]]) -> None:
         """Print the numbers of a result, with --quiet alone, which leaves all else out."""

@@ -36,17 +36,11 @@ class CompareOptions(Running):
 def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     """Compare fits of the same measurements by evidence and by leave-one-out prediction."""
     from tissuq.assessment import compare as compare_fits
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
     from tissuq.experiments.units import stress_unit
-    from tissuq.report.comparison import (
-        EXPLANATIONS,
-        HEADERS,
-        comparison_warnings,
-        parameter_header,
-        readable_comparison,
-        write_comparison,
-    )
+    from tissuq.report.comparison import comparison_result
     from tissuq.report.run_folder import check_target, run_folder
+    from tissuq.report.terminal import print_result
+    from tissuq.report.writer import write_result
 
     runs, out, force = call.settings.runs, call.how.out, call.how.force
     if out is not None:
@@ -57,14 +51,11 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
     table = compare_fits(trees)
     units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
-    headers = [*HEADERS, parameter_header(table, unit)]
-    print_rows("Fits of the same measurements", headers, readable_comparison(table, unit))
-    print_explanations(EXPLANATIONS)
-    print_warnings(comparison_warnings(table))
+    result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
         with run_folder(out, force=force) as folder:
-            write_comparison(table, [str(run) for run in runs], unit, folder)
-        print(f"Report: {out / 'report.html'}")
+            write_result(result, folder)
+    print_result(result.record(), out, details=out is None)
 
 
 def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:

@@ -45,10 +45,10 @@ class EnsembleOptions(LawOfRun, Configured):
 @command(EnsembleSettings, EnsembleOptions)
 def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     """Run your own finite-element model with draws of a posterior; the same command resumes a stopped ensemble."""
-    from tissuq.cli.tables import print_explanations, print_rows, print_warnings
-    from tissuq.report.ensemble import readable_quantities, write_ensemble
+    from tissuq.report.ensemble import ensemble_result
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import check_source
+    from tissuq.report.terminal import print_explanations
     from tissuq.studies.ensemble import prepare_ensemble, run_ensemble
     from tissuq.studies.ensemble_files import forget_failures
     from tissuq.studies.stream import open_pool
@@ -79,12 +79,8 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
             prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
             retries=how.retries, keep=how.keep, progress=call.campaign_in(folder),
         )  # fmt: skip
-    write_ensemble(study, folder, figures=how.figures)
-    call.monitor.write_log(folder, study.warnings)
-    print_rows(f"Model '{prepared.deck.main}' with {settings.draws} draws, at the end", *readable_quantities(study))
     print_explanations(prepared.card_warnings)
-    print_warnings(study.warnings)
-    print(f"Report: {folder / 'report.html'}")
+    call.put_into(folder, ensemble_result(study, folder), figures=how.figures)
 
 
 def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings:

@@ -12,7 +12,6 @@ from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
 from tissuq.cli.running import Written
 from tissuq.errors import InputError
-from tissuq.result_warning import Severity
 from tissuq.studies.measured_file import ReadingSettings
 from tissuq.studies.option import option
 from tissuq.studies.settings import setting_of
@@ -82,12 +81,13 @@ def _fit_one(
     from tissuq.cli.tables import print_summary
     from tissuq.report.answer import answer_record, readable_estimates
     from tissuq.report.specimen import write_specimen_run
-    from tissuq.studies.specimen import run_specimen
+    from tissuq.studies.specimen import run_specimen, steps_of
 
     study = call.written(
         target,
         lambda step: run_specimen(settings, call.beside, step, law, found),
         partial(write_specimen_run, sources=sources),
+        steps_of(settings) + 1,
     )
     print_summary(target, study.experiment)
     record = answer_record(study.experiment.name, study.main, study.answer, study.unit, ())
@@ -107,21 +107,14 @@ def _compare_laws(
     target: Path,
 ) -> None:
     """Fit several laws, write the run and print their table."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.laws import HEADERS, law_lead, readable_laws, write_law_run
+    from tissuq.report.laws import law_result
     from tissuq.studies.laws import run_laws
 
-    study = call.written(
+    study = call.carried_out(
         target,
         lambda step: run_laws(settings, call.beside, step, own, found),
-        partial(write_law_run, sources=sources),
+        partial(law_result, sources=sources),
     )
-    problems = [warning for warning in study.warnings if warning.severity is Severity.PROBLEM]
-    print_warnings(problems)
-    print_rows(f"Laws of {study.experiment.name}, moduli in {study.unit.name}", HEADERS, readable_laws(study))
-    print(law_lead(study))
-    print_warnings([warning for warning in study.warnings if warning not in problems])
-    print(f"Report: {target / 'report.html'}")
     _print_omissions(study)
 
 

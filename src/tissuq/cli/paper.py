@@ -26,15 +26,12 @@ class PaperRunning(Written):
 @command(PaperOptions, PaperRunning, "tissuq.validation.paper:PaperSettings")
 def paper(call: Call[PaperOptions, PaperRunning]) -> None:
     """Carry out the study of Zeraatpisheh, Bordas & Beex (2021) and check its claims."""
-    from tissuq.cli.tables import print_summary, print_warnings
-    from tissuq.report.validation import write_paper_run
+    from tissuq.report.paper import paper_result
     from tissuq.validation.paper import PaperSettings, run_paper
     from tissuq.validation.paper.study import steps_of
 
     low, high = call.how.stretch_range or (None, None)
     settings = call.loaded_as(PaperSettings, stretch_low=low, stretch_high=high)
     target = call.target(call.how.out)
-    study = call.written(target, lambda step: run_paper(settings, step), write_paper_run, steps_of(settings))
-    print_summary(target)
-    print_warnings(study.warnings)
+    study = call.carried_out(target, lambda step: run_paper(settings, step), paper_result, steps_of(settings))
     not_converged(study.not_converged)

@@ -23,22 +23,17 @@ class PopulationOptions(Written):
 @command(PopulationSettings, PopulationOptions)
 def population(call: Call[PopulationSettings, PopulationOptions]) -> None:
     """Identify a population from its specimens, every specimen within it, and what to expect for a new patient."""
-    from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.mechanics import material_named
-    from tissuq.report.population import HEADERS, readable_population, write_population_run
+    from tissuq.report.population import population_result
     from tissuq.studies.population import run_population
 
     call.check_source("files", "the FILES of several specimens, folders of them", "run")
     settings, material = call.loaded(rivals=("noise", "noise_sd")), call.stated.get("material")
     law = material_named(material, laws=True) if material else None
     target = call.target(Path("runs") / "population")
-    study = call.written(
+    study = call.carried_out(
         target,
         lambda step: run_population(settings, call.beside, step, law),
-        partial(write_population_run, beside=call.beside),
+        partial(population_result, beside=call.beside),
     )
-    print_rows(f"A population of {len(study.tests)} specimens", HEADERS, readable_population(study))
-    print("Complete pooling treats all specimens as one: its interval does not describe the range of patients.")
-    print_warnings(study.warnings)
-    print(f"Report: {target / 'report.html'}")
     not_converged([] if study.population.converged else ["the population"])

@@ -25,14 +25,7 @@ class PredictOptions(OfRun):
 @command(PredictionSettings, PredictOptions)
 def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
     """Predict the stress in any loading mode from a fit, and compare it with measurements."""
-    from tissuq.cli.tables import print_rows, print_warnings
-    from tissuq.report.prediction import (
-        band_headers,
-        readable_bands,
-        readable_scores,
-        score_headers,
-        write_prediction_run,
-    )
+    from tissuq.report.prediction import prediction_result
 
     call.check_source("run", "the RUN folder of a fit", "prediction")
     data = call.stated.get("data", {})
@@ -44,18 +37,9 @@ def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
     source = beside / settings.run
     named = source if source.name.strip(".") else source.resolve()  # "." and ".." have no name of their own
     target = call.target(named.parent / f"{named.name}-{settings.mode_in(beside)}", apart_from=source)
-    prediction = call.written(
+    prediction = call.carried_out(
         target,
         lambda step: run_prediction(settings, beside, step, law),
-        partial(write_prediction_run, settings=settings, target=target, beside=beside, law=call.how.user_law),
+        partial(prediction_result, settings=settings, target=target, beside=beside, law=call.how.user_law),
     )
-    print_rows(
-        f"Stress in mode {prediction.mode.name}, {prediction.unit.name}",
-        band_headers(prediction),
-        readable_bands(prediction),
-    )
-    if prediction.scores is not None and prediction.data is not None:
-        print_rows(f"Measurements of {prediction.data.name}", score_headers(prediction), readable_scores(prediction))
-    print_warnings(prediction.warnings)
-    print(f"Report: {target / 'report.html'}")
     not_converged(["the fit"] if prediction.posterior.solution.is_approximate else [])

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import platform
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from threading import Timer
 from time import monotonic
@@ -111,6 +109,9 @@ class Monitor:
 
     def write_log(self, folder: Path, warnings: Iterable[str] = ()) -> None:
         """Write into a run's folder how it came about; an earlier log of a campaign stays above."""
+        import platform
+        from importlib.metadata import version
+
         lines = [
             f"{self.started_at:%Y-%m-%d %H:%M:%S} UTC  tissuq {version('tissuq')}, Python {platform.python_version()}",
             f"command: {_as_typed()}",

@@ -28,9 +28,9 @@ class StructureOptions(LawOfRun, Configured):
 @command(SimulationSettings, StructureOptions)
 def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     """Compute the force in a case with draws of a posterior; the same command resumes a stopped simulation."""
-    from tissuq.cli.tables import print_rows, print_warnings
     from tissuq.report.run_folder import check_apart
-    from tissuq.report.simulation import SOURCE, check_source, copy_source, readable_forces, write_simulation
+    from tissuq.report.simulation import SOURCE, check_source, copy_source, simulation_result
+    from tissuq.report.terminal import print_warnings
     from tissuq.studies.stream import open_pool
     from tissuq.studies.structure import load_posteriors, run_simulation
 
@@ -57,8 +57,5 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     campaign = call.campaign_in(folder)
     with open_pool(processes, call.how.scheduler) as pool:
         study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign)
-    write_simulation(study, folder, figures=call.how.figures)
-    call.monitor.write_log(folder, study.warnings)
-    print_rows(f"Case '{named}' with {settings.draws} draws", *readable_forces(study))
-    print_warnings([*dict.fromkeys(str(warning.message) for warning in raised), *study.warnings])
-    print(f"Report: {folder / 'report.html'}")
+    print_warnings(list(dict.fromkeys(str(warning.message) for warning in raised)))
+    call.put_into(folder, simulation_result(study, folder), figures=call.how.figures)

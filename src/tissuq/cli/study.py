@@ -41,8 +41,7 @@ def _study() -> None:
 @command(CoverageOptions, CoverageRunning, "tissuq.validation.coverage:CoverageSettings")
 def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
-    from tissuq.cli.tables import print_rows
-    from tissuq.report.validation import readable_coverage, write_campaign
+    from tissuq.report.coverage import coverage_result
     from tissuq.validation.coverage import PRESETS, CoverageSettings, preset, run_campaign
     from tissuq.validation.coverage.campaign import tasks_of
 
@@ -56,9 +55,7 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     settings = call.loaded_as(CoverageSettings, **of_preset | call.stated)
     folder = call.how.out or Path("runs") / f"coverage-{name or (call.config or Path()).stem}"
     results = _carry_out(call, settings, folder, len(tasks_of(settings)), run_campaign)
-    summary = write_campaign(settings, results, folder)
-    print_rows("Coverage of C10", *readable_coverage(summary))
-    print(f"± are Monte Carlo standard errors. Report: {folder / 'report.html'}")
+    call.put_into(folder, coverage_result(settings, results))
 
 
 @study.command("sbc", cls=Command)
@@ -70,8 +67,7 @@ def sbc(call: Call[SbcOptions, Campaign]) -> None:
 
 def _calibrate(call: Call[SbcOptions, Any]) -> None:
     """Carry out simulation-based calibration."""
-    from tissuq.cli.tables import print_rows
-    from tissuq.report.validation import readable_ranks, write_sbc
+    from tissuq.report.sbc import sbc_result
     from tissuq.validation.sbc import SbcSettings, run_sbc, tasks_of
 
     settings, material = call.loaded_as(SbcSettings), call.stated.get("material")
@@ -79,25 +75,21 @@ def _calibrate(call: Call[SbcOptions, Any]) -> None:
         call.config.stem if call.config else f"sbc-{material}" if material else "sbc"
     )
     results = _carry_out(call, settings, folder, len(tasks_of(settings)), run_sbc)
-    table = write_sbc(settings, results, folder)
-    print_rows("Ranks of the truth", *readable_ranks(table))
-    print(f"Report: {folder / 'report.html'}")
+    call.put_into(folder, sbc_result(settings, results))
 
 
 @study.command("tissues", cls=Command)
 @command(TissueOptions, Campaign, "tissuq.validation.tissues:TissueSettings")
 def tissues(call: Call[TissueOptions, Campaign]) -> None:
     """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
-    from tissuq.cli.tables import print_rows
-    from tissuq.report.tissues import readable_tissues, write_tissues
+    from tissuq.report.tissues import tissue_result
     from tissuq.validation.tissues import TissueSettings, run_benchmark
     from tissuq.validation.tissues.benchmark import tasks_of
 
     settings = call.loaded_as(TissueSettings)
     target = call.how.out or Path("runs") / (call.config.stem if call.config else "tissues")
     results = _carry_out(call, settings, target, len(tasks_of(settings)), run_benchmark)
-    print_rows("Predictions of real tests", *readable_tissues(write_tissues(settings, results, target)))
-    print(f"Report: {target / 'report.html'}")
+    call.put_into(target, tissue_result(settings, results))
 
 
 def _carry_out(
@@ -109,6 +101,4 @@ def _carry_out(
     check_folder(folder, settings)
     with open_pool(call.how.workers, call.how.scheduler) as pool, call.campaign_in(folder)(total) as step:
         write_campaign_recipe(folder, settings)
-        results = run(settings, folder, pool=pool, step=step)
-    call.monitor.write_log(folder)
-    return results
+        return run(settings, folder, pool=pool, step=step)

@@ -322,8 +322,8 @@ class Population:
         return drawn.result
 
     def draw(self, drawn: Panels, unit: StressUnit) -> None:
-        """Draw `plot` on panels, one a parameter, with stresses in a unit."""
-        units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols}
+        """Draw `plot` on panels, one a parameter as far as there are panels, with stresses in a unit."""
+        units = {symbol: self.unit_of(symbol, unit).name for symbol in self.symbols[: len(drawn.axes)]}
         draw_specimens(drawn, self.summary(unit=unit.name), self.specimen_summary(unit=unit.name), units)
 
     def _repr_html_(self) -> str:

@@ -1,8 +1,7 @@
-"""The run folder of a calibration: measurements, tables, forward runs, draws, figures and the report."""
+"""The result of a calibration: the parameters, tables, forward runs, draws and figures."""
 
 from __future__ import annotations
 
-import shutil
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,14 +10,15 @@ import numpy as np
 
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import legend_above
-from tissuq.drawing.style import BAND, BASE, INK, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.emulation import Calibration, FileForward
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
-from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
-from tissuq.report.tables import Row, interval, significant, write_csv, write_json
+from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
+from tissuq.report.run_folder import INPUT
+from tissuq.report.tables import Row, interval, known_number, significant
+from tissuq.report.writer import posterior_files
 from tissuq.studies.calibration import CalibrationStudy, Measured
-from tissuq.studies.earlier_run import POSTERIORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,94 +27,131 @@ if TYPE_CHECKING:
 __all__ = [
     "HEADERS",
     "band_figure",
+    "calibration_result",
     "check_figure",
     "marginals_figure",
     "readable_calibration",
-    "write_calibration_run",
 ]
 
+LARGE_SHARE = 0.1
+"""Share of the variance of a parameter that is due to the emulator, beyond which more runs are worth while."""
+BY_EMULATOR = (
+    "HPD: highest-density interval. By emulator: share of the posterior variance caused by the error of the emulator."
+)
+EMULATOR = (
+    "A Gaussian process replaces the model: its prediction and the variance of its error are part of the likelihood. "
+    "Checks on runs that were not used to build it:"
+)
+WORST = (
+    "The runs that are predicted worst from the others. Error and sd: root mean square over the outputs, as a share of "
+    "that of all runs; standardised: error in standard deviations of the emulator, about 1."
+)
+SOBOL = (
+    "Share of the variance of the outputs, where all parameters vary over their priors, that a parameter explains "
+    "alone (first) and with its interactions (total): Sobol's indices from the emulator."
+)
 HEADERS = ["parameter", "mean", "sd", "95 % HPD", "ESS", "by emulator"]
 """Of `readable_calibration`."""
 
 
-def write_calibration_run(
-    study: CalibrationStudy, folder: Path, beside: Path = Path(), *, figures: bool = True
-) -> None:
-    """Write the results of a calibration into an empty folder.
+def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result:
+    """Return what a calibration says.
 
     Parameters
     ----------
     study : CalibrationStudy
-    folder : Path
-        Exists and is empty.
     beside : Path
         Where the file of the settings lies, unless it is absolute.
-    figures : bool
-        Draw them, too.
     """
-    calibration = study.calibration
-    (folder / INPUT).mkdir()
-    relocated = _copied(study, folder, beside)
-    named = f" --forward {relocated['forward']}" if "forward" in relocated else f" --umbridge {study.settings.umbridge}"
-    command = f"calibrate{'' if figures else ' --no-figures'}{named}"
-    write_recipe(folder, command, study.settings.model_copy(update=relocated))
-    _write_tables(study, folder)
-    calibration.save(folder / "calibration.nc")
+    calibration, settings = study.calibration, study.settings
+    copies, relocated = _copies(study, beside)
+    forward = relocated.get("forward")
+    files = copies | _tables(study) | {"calibration.nc": calibration.save}
     if study.posterior is not None:
-        (folder / POSTERIORS).mkdir()
-        study.posterior.save(folder / POSTERIORS / f"{NoDiscrepancy.name}.nc")
-    if figures:
-        drawn = {
-            "band": band_figure(calibration, study.data),
-            "emulator": check_figure(calibration),
-            "marginals": marginals_figure(calibration),
-        }
-        write_figures(folder, drawn)
-    write_page(folder, "calibration.html", **_context(study), command=command)
+        files |= posterior_files({NoDiscrepancy.name: study.posterior})
+    model, runs = settings.forward_model.name, len(calibration.runs)
+    has_discrepancy = calibration.problem.discrepancy.is_correlated
+    inside_alone = calibration.predictive_coverage(discrepancy=False)
+    alone = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
+    numbers = [
+        Number(symbol, marginal.mean, *marginal.hdi(), interval_is="95 % HPD")
+        for symbol, marginal in calibration.marginals.items()
+        if symbol in calibration.problem.forward_symbols
+    ]
+    inside = f"{calibration.predictive_coverage():.0%} of the measurements"
+    return Result(
+        command=f"calibrate --forward {forward}" if forward else f"calibrate --umbridge {settings.umbridge}",
+        title="Parameters of an expensive forward model",
+        subject=f"{len(study.data.control)} measurements · forward model {model} · {runs} runs · discrepancy "
+        f"{settings.discrepancy}",
+        numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=alone)),
+        finding=_lead(study),
+        next_step=_next_step(study),
+        picture=Picture(
+            "answer", lambda: band_figure(calibration, study.data, is_narrow=True),
+            "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
+        ),
+        tables=(
+            Table(HEADERS, readable_calibration(calibration), f"{model}: {runs} runs",
+                  note=f"{BY_EMULATOR} Emulator, {calibration.check}."),
+        ),
+        sections=_sections(study),
+        warnings=tuple(study.warnings),
+        files=files,
+        recipe=settings.model_copy(update=relocated),
+    )  # fmt: skip
 
 
-def _copied(study: CalibrationStudy, folder: Path, beside: Path) -> dict[str, Any]:
-    """Copy the user's files, so that the run can be repeated, and return the settings that name the copies."""
+def _next_step(study: CalibrationStudy) -> str:
+    calibration = study.calibration
+    if not calibration.converged:
+        return "make the posterior converge: repeat it with --method nuts, or narrower priors."
+    if max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols) > LARGE_SHARE:
+        return "make the emulator more accurate where the posterior is: repeat the command with --refine 20."
+    if not calibration.problem.discrepancy.is_correlated:
+        return "let the forward model be wrong: repeat the command with --discrepancy gp."
+    if study.posterior is not None:
+        return "take the material further: tissuq predict, export or structure {run}"
+    return "name the law of the model with --material LAW; predict, export and structure then take the run."
+
+
+def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the user's files, so that the run can be repeated, and the settings that name the copies."""
     source = beside / study.settings.file
-    shutil.copyfile(source, folder / INPUT / source.name)
+    copies: dict[str, Any] = {f"{INPUT}/{source.name}": source}
     relocated: dict[str, Any] = {"file": f"{INPUT}/{source.name}"}
     if study.settings.forward is None:
-        return relocated
+        return copies, relocated
     match, file = LAW.fullmatch(study.settings.forward), FileForward(study.settings.forward).file
     if match and file:
-        shutil.copyfile(file, folder / INPUT / file.name)
-        return relocated | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
-    return relocated | {"forward": study.settings.forward}
+        copies[f"{INPUT}/{file.name}"] = file
+        return copies, relocated | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
+    return copies, relocated | {"forward": study.settings.forward}
 
 
-def _write_tables(study: CalibrationStudy, folder: Path) -> None:
+def _tables(study: CalibrationStudy) -> dict[str, Any]:
     calibration, data = study.calibration, study.data
-    summary = calibration.summary()
     rows: list[Row] = [
         {"parameter": str(symbol), "prior": str(calibration.problem.priors[str(symbol)])}
-        | {str(name): None if np.isnan(value) else float(value) for name, value in estimates.items()}
-        for symbol, estimates in summary.iterrows()
+        | {str(name): known_number(value) for name, value in estimates.items()}
+        for symbol, estimates in calibration.summary().iterrows()
     ]
-    write_csv(folder / "summary.csv", rows)
-    write_json(folder / "summary.json", rows)
     bands = {name: calibration.predict(discrepancy=kind) for name, kind in (("", True), ("_model_alone", False))}
     table: dict[str, Any] = {"control": data.control, "measured": data.measured}
     for suffix, band in bands.items():
         table |= {f"{name}{suffix}": band[name].to_numpy() for name in ("mean", "low", "high")}
-    write_csv(folder / "prediction.csv", _rows(table))
-    left_out, sensitivity = calibration.leave_one_out, calibration.sensitivity.reset_index()
-    for name, frame in (("leave_one_out", left_out), ("sensitivity", sensitivity)):
-        write_csv(
-            folder / f"{name}.csv",
-            [dict(zip(frame.columns, row, strict=True)) for row in frame.itertuples(index=False)],
-        )
     runs = calibration.runs
     parameters = dict(zip(runs.symbols, runs.points.T, strict=True))
     outputs = {f"output_{number}": column for number, column in enumerate(runs.outputs.T, 1)}
-    write_csv(folder / "forward_runs.csv", [
-        {**row, "error": error}
-        for row, error in zip(_rows(parameters | {"seconds": runs.seconds} | outputs), runs.errors, strict=True)
-    ])  # fmt: skip
+    numbers = _rows(parameters | {"seconds": runs.seconds} | outputs)
+    return {
+        "summary.csv": rows,
+        "summary.json": rows,
+        "prediction.csv": _rows(table),
+        "leave_one_out.csv": calibration.leave_one_out.to_dict("records"),
+        "sensitivity.csv": calibration.sensitivity.reset_index().to_dict("records"),
+        "forward_runs.csv": [{**row, "error": error} for row, error in zip(numbers, runs.errors, strict=True)],
+    }
 
 
 WORST_RUNS = 8
@@ -147,48 +184,91 @@ def readable_calibration(calibration: Calibration) -> list[list[str]]:
     return rows
 
 
-def _context(study: CalibrationStudy) -> dict[str, Any]:
-    calibration = study.calibration
-    runs, emulator = calibration.runs, calibration.emulator
-    failures = [
-        [*(significant(float(value), 4) for value in point), error]
-        for point, error in zip(runs.points, runs.errors, strict=True)
-        if error
+def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
+    """Return what a page folds: posteriors, the emulator, what outputs depend on, failures, how it was computed."""
+    calibration, runs = study.calibration, study.calibration.runs
+    symbols, held_out = list(runs.symbols), calibration.held_out
+    has_discrepancy = calibration.problem.discrepancy.is_correlated
+    both = (
+        " Left: forward model and discrepancy. Right: the forward model alone; where it misses, the model is wrong."
+        if has_discrepancy
+        else ""
+    )
+    band = Picture(
+        "band", lambda: band_figure(calibration, study.data), "Predictive bands over the measurements",
+        f"95 % predictive band of a new measurement, including noise.{both}", not has_discrepancy,
+    )  # fmt: skip
+    marginals = Picture(
+        "marginals", lambda: marginals_figure(calibration), "Marginal posteriors",
+        "Blue: marginal posterior and its 95 % HPD. Dashed: without the error of the emulator. Dotted: prior.",
+    )  # fmt: skip
+    alone = (
+        f", and {100 * calibration.predictive_coverage(discrepancy=False):.0f} % inside that of the forward model alone"
+        if has_discrepancy
+        else ""
+    )
+    coverage = (
+        f"{100 * calibration.predictive_coverage():.0f} % of the measurements lie inside the band{alone}. A good "
+        "predictive check does not mean that the parameters are right."
+    )
+    placed = ", and runs placed in the posterior, before they were added to the emulator (orange)" if held_out else ""
+    errors = Picture(
+        "emulator", lambda: check_figure(calibration), "Errors of the emulator",
+        f"Every run predicted from the others (blue){placed}. Bars: 95 %.",
+    )  # fmt: skip
+    checks = (
+        f"{calibration.check}.",
+        *(f"Batch {number} in the posterior, {check}." for number, check in enumerate(held_out, 1)),
+        f"The emulator's error is at most {calibration.error_ratio:.2g} of noise and discrepancy (variances, in the "
+        "worst direction of the data, mean over the posterior).",
+    )
+    sensitivity = [
+        [str(symbol), f"{100 * first:.0f} %", f"{100 * total:.0f} %"]
+        for symbol, first, total in calibration.sensitivity.itertuples()
     ]
-    return {
-        "settings": study.settings,
-        "model": study.settings.forward_model.name,
-        "lead": _lead(study),
-        "warnings": study.warnings,
-        "headers": HEADERS,
-        "summary": readable_calibration(calibration),
-        "inside": calibration.predictive_coverage(),
-        "inside_alone": calibration.predictive_coverage(discrepancy=False),
-        "has_discrepancy": calibration.problem.discrepancy.is_correlated,
-        "measurements": len(study.data.control),
-        "check": calibration.check,
-        "held_out": calibration.held_out,
-        "left_out": _worst_runs(calibration),
-        "sensitivity": [
-            [str(symbol), f"{100 * first:.0f} %", f"{100 * total:.0f} %"]
-            for symbol, first, total in calibration.sensitivity.itertuples()
-        ],
-        "material": "" if study.posterior is None else study.posterior.model.material.name,
-        "runs": len(runs),
-        "seconds_a_run": significant(float(np.median(runs.seconds))),
-        "seconds": f"{study.seconds:.0f}",
-        "directions": emulator.basis.directions.shape[1],
-        "is_log": emulator.basis.is_log,
-        "logarithms": emulator.logarithms,
-        "ratio": f"{calibration.error_ratio:.2g}",
-        "failures": failures,
-        "failure_summary": runs.failure_summary,
-        "symbols": list(runs.symbols),
-        "priors": [[symbol, str(prior)] for symbol, prior in calibration.problem.priors.items()],
-        "verdict": calibration.posterior.verdict,
-        "method": calibration.posterior.method,
-        "evidence": "" if calibration.log_evidence is None else f"{calibration.log_evidence:.2f}",
-    }
+    sections = [
+        Section("Posteriors and predictive checks", (band, coverage, marginals)),
+        Section("The emulator", (EMULATOR, checks, errors, WORST,
+                Table([*symbols, "error", "sd", "standardised"], _worst_runs(calibration)))),
+        Section("What the outputs depend on", (SOBOL, Table(["parameter", "first", "total"], sensitivity))),
+    ]  # fmt: skip
+    if runs.failure_summary:
+        failures = [
+            [*(significant(float(value), 4) for value in point), error]
+            for point, error in zip(runs.points, runs.errors, strict=True)
+            if error
+        ]
+        table = Table([*symbols, "reason"], failures)
+        sections.append(Section("Runs that failed", (str(runs.failure_summary), table)))
+    return (*sections, Section("How it was computed", _computed(study)))
+
+
+def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
+    calibration, settings = study.calibration, study.settings
+    runs, emulator = calibration.runs, calibration.emulator
+    directions = emulator.basis.directions.shape[1]
+    refined = ", then points in the posterior" if calibration.held_out else ""
+    whose = "The logarithms of the outputs" if emulator.basis.is_log else "The outputs"
+    logarithms = f"; taken by logarithm: {', '.join(emulator.logarithms)}" if emulator.logarithms else ""
+    evidence = "" if calibration.log_evidence is None else f" Log evidence {calibration.log_evidence:.2f}."
+    sentences = (
+        "measured = emulator(parameters) + discrepancy(control) + noise (Kennedy & O'Hagan 2001), all Gaussian given "
+        f"the parameters; noise sd {settings.noise_sd}.",
+        f"{len(runs)} runs ({settings.design} design{refined}), {significant(float(np.median(runs.seconds)))} s each. "
+        f"{whose} vary in {directions} direction{'s' * (directions != 1)}, each a process with the kernel "
+        f"{settings.kernel} and a {settings.trend} mean{logarithms}. The variation outside these directions is part of "
+        "the error.",
+        f"Posterior by {calibration.posterior.method}. {calibration.posterior.verdict}{evidence} {study.seconds:.0f} s "
+        "in all.",
+    )
+    priors = [[symbol, str(prior)] for symbol, prior in calibration.problem.priors.items()]
+    blocks: list[Block] = [sentences, Table(["parameter", "prior"], priors, text_columns=(1,))]
+    if study.posterior is not None:
+        blocks.append(
+            f"The posterior of the material {study.posterior.model.material.name} is in posterior/none.nc: tissuq "
+            "predict, export and structure take this run."
+        )
+    return tuple(blocks)
 
 
 def _lead(study: CalibrationStudy) -> str:
@@ -212,12 +292,17 @@ MAX_COLUMNS = 3
 """Panels in a row of the figure of marginals."""
 
 
-def band_figure(calibration: Calibration, data: Measured) -> Figure:
-    """Return the 95 % predictive band over the measurements: with the discrepancy, and of the forward model alone."""
+def band_figure(calibration: Calibration, data: Measured, *, is_narrow: bool = False) -> Figure:
+    """Return the 95 % predictive band over the measurements: with the discrepancy, and of the forward model alone.
+
+    Where it is to be narrow, without the latter.
+    """
     titles = {True: "with the discrepancy", False: "forward model alone"}
     if not calibration.problem.discrepancy.is_correlated:
         titles = {True: "forward model"}
-    with new_figure(4.6 * len(titles) + 0.8, 3.9) as figure:
+    elif is_narrow:
+        titles = {True: titles[True]}
+    with new_figure(ANSWER_WIDTH if is_narrow else 4.6 * len(titles) + 0.8, 3.9) as figure:
         panels = figure.subplots(1, len(titles), squeeze=False, sharey=True)[0]
         order = np.argsort(data.control, kind="stable")
         for axis, (with_discrepancy, title) in zip(panels, titles.items(), strict=True):

@@ -1,18 +1,17 @@
-"""The folder of a comparison: fits side by side as a table, a figure and a page."""
+"""The result of a comparison: which fit the evidence and the predictions prefer, and the parameter of each."""
 
 from __future__ import annotations
 
 from math import isnan
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.drawing.pieces import forest
-from tissuq.drawing.style import BAND, BASE, INK, new_figure
+from tissuq.drawing.pieces import forest, rows
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.experiments.units import StressUnit
-from tissuq.report.run_folder import write_figures, write_page
-from tissuq.report.tables import interval, with_named_units, write_csv
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.tables import interval, significant, with_named_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,10 +22,10 @@ __all__ = [
     "EXPLANATIONS",
     "HEADERS",
     "comparison_figure",
+    "comparison_result",
     "comparison_warnings",
     "parameter_header",
     "readable_comparison",
-    "write_comparison",
 ]
 
 HEADERS = [
@@ -55,10 +54,10 @@ MAX_DRAWN_DIFFERENCE = 25.0
 
 def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]]:
     """Return the rows of a comparison as text, under `HEADERS` and the parameter in the given unit."""
-    rows = []
+    readable = []
     for name, row in table.iterrows():
         ends = row["log_bayes_factor_low"], row["log_bayes_factor_high"]
-        rows.append(
+        readable.append(
             [
                 str(name),
                 _text(row["log_evidence"], ".2f"),
@@ -70,7 +69,7 @@ def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]
                 _interval(row, unit),
             ]
         )
-    return rows
+    return readable
 
 
 def comparison_warnings(table: pd.DataFrame) -> list[str]:
@@ -91,7 +90,7 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
     """
     with new_figure(11.5, 1.9 + 0.42 * len(table)) as figure:
         evidence, prediction, parameter = figure.subplots(1, 3, sharey=True, width_ratios=(1, 1.15, 1))
-        levels = np.arange(len(table))[::-1]
+        levels = rows(evidence, [str(name) for name in table.index])
         low, high = (table[f"log_bayes_factor_{end}"] for end in ("low", "high"))
         _differences(evidence, levels, table["log_bayes_factor"], low, high)
         evidence.set_title("Evidence")
@@ -109,8 +108,6 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
                 fontsize=9, color="#5a6472",
             )  # fmt: skip
         _intervals(parameter, levels, table, unit)
-        evidence.set_yticks(levels, [str(name) for name in table.index])
-        evidence.set_ylim(-0.6, len(table) - 0.4)
         for axis in (evidence, prediction, parameter):
             axis.tick_params(axis="y", length=0)
             axis.grid(axis="y", color="#e6e9ee", linewidth=0.8)
@@ -118,8 +115,8 @@ def comparison_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
     return figure
 
 
-def write_comparison(table: pd.DataFrame, runs: list[str], unit: StressUnit, folder: Path) -> None:
-    """Write comparison.csv, the figure and report.html into an empty folder.
+def comparison_result(table: pd.DataFrame, runs: list[str], unit: StressUnit) -> Result:
+    """Return what a comparison says.
 
     Parameters
     ----------
@@ -129,21 +126,65 @@ def write_comparison(table: pd.DataFrame, runs: list[str], unit: StressUnit, fol
         What was compared, as it was named.
     unit : StressUnit
         Of the parameter.
-    folder : Path
-        Exists and is empty.
     """
-    rows = [{"fit": name, **row} for name, row in table.astype(object).where(table.notna(), None).iterrows()]
-    write_csv(folder / "comparison.csv", with_named_units(rows, ("median", "hdi_low", "hdi_high"), unit))
-    write_figures(folder, {"comparison": comparison_figure(table, unit)})
-    write_page(
-        folder,
-        "comparison.html",
-        headers=[*HEADERS, parameter_header(table, unit)],
-        rows=readable_comparison(table, unit),
-        explanations=EXPLANATIONS,
-        warnings=comparison_warnings(table),
-        command=" ".join(["tissuq compare", *runs]),
+    records = [{"fit": name, **row} for name, row in table.astype(object).where(table.notna(), None).iterrows()]
+    command = " ".join(["compare", *runs])
+    caption = (
+        "Log Bayes factors, leave-one-out predictions and 95 % intervals of the parameter. The fit with the largest "
+        "evidence is first; this does not imply that its interval contains the true value."
     )
+    figure = Picture("comparison", lambda: comparison_figure(table, unit),
+                     "Evidence, prediction and parameter of every fit", caption)  # fmt: skip
+    answer = Picture("answer", lambda: _parameter_figure(table, unit), "The parameter of every fit",
+                     "95 % HPD and median of the parameter; the fit with the largest evidence is on top.")  # fmt: skip
+    excluding = (
+        "Where the intervals of the parameter exclude each other, the choice of discrepancy matters more than the "
+        "noise: read what each fit's own report says of its share of the initial stiffness."
+    )
+    return Result(
+        command=command,
+        title="Fits of the same measurements, side by side",
+        subject=f"{len(table)} fits",
+        numbers=_numbers(table, unit),
+        next_step="before you take one of these numbers, read in its own report what its discrepancy does to the "
+        "initial stiffness.",
+        picture=answer,
+        tables=(
+            Table([*HEADERS, parameter_header(table, unit)], readable_comparison(table, unit),
+                  "Fits of the same measurements"),
+        ),
+        sections=(Section("Evidence, prediction and parameter", (figure,)),
+                  Section("How to read it", ((*EXPLANATIONS, excluding),))),
+        warnings=tuple(comparison_warnings(table)),
+        files={"comparison.csv": with_named_units(records, ("median", "hdi_low", "hdi_high"), unit)},
+        how_to_repeat=f"`tissuq {command}`. Every number is in `comparison.csv` in this folder.",
+    )  # fmt: skip
+
+
+def _numbers(table: pd.DataFrame, unit: StressUnit) -> tuple[Number, ...]:
+    """Return the fit with the largest evidence, the one that predicts best, and whether the intervals overlap."""
+    numbers = []
+    if table["log_evidence"].notna().any():
+        name = str(table["log_evidence"].idxmax())
+        numbers.append(Number("largest evidence", name, remark=f"probability {table['probability'][name]:.0%}"))
+    best = str(table["elpd_difference"].idxmax())
+    numbers.append(Number("best for left-out measurements", best, remark=f"stacking {table['stacking'][best]:.2f}"))
+    known = table.dropna(subset=["median"])
+    if len(known) and known["parameter"].nunique() == 1:
+        low, high = (float(end) / unit.to_mpa for end in (known["median"].min(), known["median"].max()))
+        overlap = known["hdi_low"].max() <= known["hdi_high"].min()
+        words = "all 95 % intervals overlap" if overlap else "the 95 % intervals contradict each other"
+        value = f"{significant(low)} to {significant(high)} {unit.name}"
+        numbers.append(Number(f"median of {known['parameter'].iloc[0]}, over the fits", value, remark=words))
+    return tuple(numbers)
+
+
+def _parameter_figure(table: pd.DataFrame, unit: StressUnit) -> Figure:
+    """Return the headline parameter of every fit."""
+    with new_figure(ANSWER_WIDTH, 1.3 + 0.34 * len(table)) as figure:
+        axis = figure.subplots()
+        _intervals(axis, rows(axis, [str(name) for name in table.index]), table, unit)
+    return figure
 
 
 def parameter_header(table: pd.DataFrame, unit: StressUnit) -> str:

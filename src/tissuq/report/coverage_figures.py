@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.drawing import pieces
 from tissuq.drawing.panels import legend_above
-from tissuq.drawing.pieces import heat
-from tissuq.drawing.style import BAND, BASE, MARKERS, SERIES, STYLE, TRUTH
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, MARKERS, SERIES, STYLE, TRUTH, new_figure
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLORS", "MARKERS", "campaign_figures", "panel_grid"]
+__all__ = ["campaign_figures", "dots_by_row", "panel_grid", "shares_figure"]
 
 COLORS = SERIES
 CELL = ["design", "strength", "noise"]
 BAR_HALF_WIDTH = 1.96
 """Half width of an error bar in Monte Carlo standard errors (95 %)."""
+GAP = 0.17
+"""Distance of the marks of two series in one row."""
 WIDE_ROW = 3
 """Panels in a row from which the figure keeps its width."""
 
@@ -42,6 +44,17 @@ def campaign_figures(tables: Mapping[str, pd.DataFrame], prob: float) -> dict[st
         if "unseen" in tables:
             figures["unseen"] = _of_unseen(tables["unseen"], prob)
     return figures
+
+
+def shares_figure(table: pd.DataFrame, column: str, nominal: float, label: str) -> Figure:
+    """Return shares by formulation, a mark for each row of a table, for the head of a page; ``nominal`` in percent."""
+    names = list(dict.fromkeys(table["formulation"]))
+    with new_figure(ANSWER_WIDTH, 1.0 + 0.3 * len(names)) as figure:
+        axis = figure.subplots()
+        dots_by_row(axis, names, {"": (table["formulation"], 100 * table[column], None)}, nominal)
+        axis.set_xlim(-2, 102)
+        axis.set_xlabel(label)
+    return figure
 
 
 def _overview(summary: pd.DataFrame, prob: float) -> Figure:
@@ -115,7 +128,7 @@ def _by_family(families: pd.DataFrame, prob: float) -> Figure:
     for axis, (title, rows) in zip(axes, panels, strict=False):
         table = rows.pivot_table("coverage", "family", "cell", sort=False, aggfunc="first")
         values = table.reindex(index=names, columns=columns).to_numpy()
-        heat(axis, _shade(values, prob), 100 * values, columns, names, colors)
+        pieces.heat(axis, _shade(values, prob), 100 * values, columns, names, colors)
         axis.set_title(str(title))
     return figure
 
@@ -152,28 +165,52 @@ def _of_strength(summary: pd.DataFrame, prob: float) -> Figure:
 def _of_unseen(unseen: pd.DataFrame, prob: float) -> Figure:
     """Draw coverage and error of the true stress in other loading modes, a row of panels a design and noise."""
     panels = list(unseen.groupby(CELL, sort=False))
-    names, modes = list(dict.fromkeys(unseen["formulation"])), list(dict.fromkeys(unseen["mode"]))
+    names = list(dict.fromkeys(unseen["formulation"]))
     figure, axes = panel_grid(len(panels), 2, 0.75 + 0.3 * len(names))
     for row, (_, table) in zip(axes, panels, strict=True):
-        for index, mode in enumerate(modes):
-            rows = table[table["mode"] == mode]
-            heights = [len(names) - 1 - names.index(name) + 0.2 * (0.5 * (len(modes) - 1) - index)
-                      for name in rows["formulation"]]  # fmt: skip
-            for axis, measure in zip(row, ("coverage", "error"), strict=True):
-                bars = BAR_HALF_WIDTH * 100 * rows[f"{measure}_error"]
-                style: dict[str, Any] = {"fmt": MARKERS[index], "markersize": 4, "color": COLORS[index], "label": mode}
-                axis.errorbar(100 * rows[measure], heights, xerr=bars, **style)
-        row[0].axvline(100 * prob, color=BASE, linewidth=1, zorder=0)
+        for axis, measure in zip(row, ("coverage", "error"), strict=True):
+            series = {
+                str(mode): (rows["formulation"], 100 * rows[measure], BAR_HALF_WIDTH * 100 * rows[f"{measure}_error"])
+                for mode, rows in table.groupby("mode", sort=False)
+            }
+            dots_by_row(axis, names, series, 100 * prob if measure == "coverage" else None, is_named=axis is row[0])
         row[0].set_xlim(-2, 102)
-        for axis in row:
-            axis.set_yticks(range(len(names)), names[::-1] if axis is row[0] else [""] * len(names))
-            axis.set_ylim(-0.6, len(names) - 0.4)
         row[0].set_title(_labels(table)[0])
     axes[-1][1].set_xlim(left=0)
     axes[-1][0].set_xlabel(f"true stress in the {100 * prob:g} % band [%]")
     axes[-1][1].set_xlabel("median error of the predicted median [%]")
     legend_above(figure, axes[0][:1], font_size=10)
     return figure
+
+
+def dots_by_row(
+    axis: Axes,
+    names: Sequence[str],
+    series: Mapping[str, tuple[Iterable[str], Any, Any]],
+    nominal: float | None = None,
+    *,
+    is_named: bool = True,
+) -> None:
+    """Draw values in named rows, a series beneath the other in each, and a line where they should be.
+
+    Parameters
+    ----------
+    axis : Axes
+    names : sequence of str
+        Of the rows, from top to bottom.
+    series : mapping of str to (names of rows, values, half widths of error bars or None)
+    nominal : float, optional
+        Where the line stands.
+    is_named : bool
+        Whether the axis shows the names.
+    """
+    levels = dict(zip(names, pieces.rows(axis, names, is_named=is_named), strict=True))
+    for index, (label, (of_rows, values, errors)) in enumerate(series.items()):
+        heights = [levels[name] + GAP * (0.5 * (len(series) - 1) - index) for name in of_rows]
+        style: dict[str, Any] = {"fmt": MARKERS[index % len(MARKERS)], "color": COLORS[index % len(COLORS)]}
+        axis.errorbar(values, heights, xerr=errors, markersize=4.5, label=label, **style)
+    if nominal is not None:
+        axis.axvline(nominal, color=BASE, linewidth=1, zorder=0)
 
 
 def panel_grid(down: int, across: int, height: float) -> tuple[Figure, list[list[Axes]]]:

@@ -25,6 +25,8 @@ HEADERS = ["test", "expected sd", "reduction", "note"]
 """Of `readable_design`."""
 MAX_ROWS = 16
 """Number of tests in a panel of the figure, besides repeats of the tests of the data."""
+MAX_TARGETS = 2
+"""Targets in the answer; the finding and the tables have all."""
 FEW_ROWS, WIDTH = 6, 9.5
 """Number of tests in the figure beside the answer, and width of that of all, inches."""
 CAPTION = (
@@ -102,7 +104,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
         command="design",
         title="Which test to make next",
         subject=f"{model.experiment.name} · {model.material.name}, discrepancy {model.discrepancy.name}",
-        numbers=tuple(best),
+        numbers=tuple(best[:MAX_TARGETS]),
         finding=" ".join(_sentences(study)),
         next_step=NEXT if best else "",
         picture=Picture(
@@ -208,5 +210,5 @@ def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) 
     axis.set_ylim(-0.7, len(table) - 0.3)
     axis.set_xlim(0, 1.04 * sd_now)
     axis.set_title(target.title(study.posterior.model))
-    axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}; line: now")
+    axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}\n(line: now)")
     axis.tick_params(axis="y", length=0)

@@ -1,10 +1,11 @@
-"""The folder of an ensemble of a user's model: tables, curves, fields, figures and the report."""
+"""The result of an ensemble of a user's model: every quantity with its band, tables, curves, fields and figures."""
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
+from collections.abc import Callable
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,20 +17,32 @@ from tissuq.decks.fields import FinalFields
 from tissuq.decks.model_run import FIELDS
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.ensemble_figures import ensemble_figures, write_fields
-from tissuq.report.run_folder import write_figures, write_page
-from tissuq.report.tables import significant, write_csv
+from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
+from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
+from tissuq.report.tables import significant
 from tissuq.studies.ensemble import EnsembleStudy
 from tissuq.studies.ensemble_files import DRAWS
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
-__all__ = ["copy_functions", "readable_quantities", "write_ensemble"]
+__all__ = ["copy_functions", "ensemble_result", "readable_quantities"]
 
 FUNCTIONS = "quantities"
 """Folder with copies of the files of the user's functions."""
+MUCH_BEYOND, FEW_DRAWS = 0.2, 64
+"""Share of elements beyond the measurements from which these are to be extended; draws that give a sound band."""
+SHARES = (
+    "Q is the quantity of a draw with its discrepancy, Q0 that of the same draw with its material parameters alone. "
+    "**Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0); they add up to 100 % of Var Q, and a share below "
+    "zero says that the two compensate each other."
+)
+STATES = (
+    "Left: I1 − 3 and I2 − 3 of the elements at the end (of F / J^(1/3), mean over the nodes), all draws together; "
+    "what was measured lies within the frame. Right: the share of elements beyond it, mean of the draws."
+)
 ROWS = 12
 """Times that the page shows of every quantity."""
 
@@ -48,35 +61,64 @@ def copy_functions(study_quantities: tuple[object, ...], folder: Path) -> dict[s
     return texts
 
 
-def write_ensemble(study: EnsembleStudy, folder: Path, *, figures: bool = True) -> None:
-    """Write tables, curves, fields, figures and page of an ensemble beside the runs of its draws.
-
-    Parameters
-    ----------
-    study : EnsembleStudy
-    folder : Path
-        Holds the recipe, the model and the runs.
-    figures : bool
-        Draw them, too.
-    """
-    result = study.result
+def ensemble_result(study: EnsembleStudy, folder: Path) -> Result:
+    """Return what an ensemble of a user's model says; its folder holds the recipe, the model and the runs."""
+    result, prepared = study.result, study.prepared
     tables = {name: result.table(name) for name in result.curves}
-    _write_tables(study, tables, folder)
-    (folder / "model.diff").write_text(study.prepared.diff() + "\n", encoding="utf-8", errors="surrogateescape")
-    for name, cards in study.prepared.cards[COMPLETE].items():
-        write_csv(folder / f"cards-{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}.csv", [dict(row) for row in cards.index])
-    (folder / "curves.nc").write_bytes(bytes(_curves(study).to_netcdf(engine="h5netcdf")))
     stored = [folder / DRAWS / name / FIELDS for name in result.folders]
     fields = [FinalFields.load(path) for path in stored if path.is_file()]
-    (folder / "fields.vtu").unlink(missing_ok=True)
     has_fields = len(fields) > 1 and find_spec("meshio") is not None
-    if has_fields:
-        write_fields(folder / "fields.vtu", fields)
-    shutil.rmtree(folder / "figures", ignore_errors=True)
-    if figures:
-        limits = study.prepared.tasks(folder)[0].limits
-        write_figures(folder, ensemble_figures(result, fields, limits))
-    write_page(folder, "ensemble.html", **_context(study, tables, has_fields))
+    for name in ("fields.vtu", "failures.csv"):
+        (folder / name).unlink(missing_ok=True)
+    figures = cache(lambda: ensemble_figures(result, fields, prepared.tasks(folder)[0].limits))
+    headers, rows = readable_quantities(study)
+    count = len(prepared.ensembles)
+    first = next(iter(tables))
+    return Result(
+        command="ensemble",
+        title="From the posterior into your model",
+        subject=f"{prepared.deck.main} with draws of {count} material{'s' * (count > 1)} · {len(result.folders)} of "
+        f"{result.draws} draws completed",
+        numbers=_numbers(study, tables),
+        finding=_lead(study, tables),
+        next_step=_next_step(study),
+        picture=Picture("answer", lambda: band_over_time(result, first), f"Band of {first} over time",
+                        f"{first}: mean and {_headers(study, tables)[4]} band over draws of the posterior."),
+        tables=(Table(headers, rows, f"Model '{prepared.deck.main}' with {result.draws} draws, at the end"),),
+        sections=_sections(study, tables, figures, has_states=bool(fields) and bool(len(fields[0].invariants)),
+                           has_fields=has_fields),
+        warnings=tuple(study.warnings),
+        files=_files(study, tables) | ({"fields.vtu": lambda path: write_fields(path, fields)} if has_fields else {}),
+    )  # fmt: skip
+
+
+def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Number, ...]:
+    """Return every quantity at the end with its band, and the largest share of the variance of the first."""
+    percent, numbers = _headers(study, tables)[4], []
+    for name, table in list(tables.items())[:MAX_NUMBERS]:
+        row = _last(table)
+        numbers.append(
+            Number(f"{name} at the end", row["mean"], row["low"], row["high"], interval_is=f"{percent} band")
+        )
+    row = _last(next(iter(tables.values())))
+    shares = {name: row[name] for name in ("parameters", "discrepancy") if study.result.is_shared}
+    if shares and all(np.isfinite(share) for share in shares.values()):
+        largest = max(shares, key=lambda name: shares[name])
+        share = f"{100 * shares[largest]:.0f} ± {100 * row[f'{largest}_error']:.0f} % of the variance"
+        numbers.append(Number("uncertain mostly by", largest, remark=share))
+    return tuple(numbers)
+
+
+def _next_step(study: EnsembleStudy) -> str:
+    result = study.result
+    if result.failures:
+        return "look at the draws that failed below, and make them again: repeat the command with --again."
+    beyond = None if result.beyond is None else float(np.nanmean(result.beyond[1][:, -1]))
+    if beyond is not None and beyond > MUCH_BEYOND:
+        return "measure up to the strains of the model: tissuq design RUN says which test helps most (RUN: the fit)"
+    if result.draws < FEW_DRAWS:
+        return f"make the band more accurate: repeat the command with --draws {FEW_DRAWS}."
+    return "see which test would make the band narrower: tissuq design RUN (RUN: the fit)"
 
 
 def readable_quantities(study: EnsembleStudy) -> tuple[list[str], list[list[str]]]:
@@ -87,34 +129,41 @@ def readable_quantities(study: EnsembleStudy) -> tuple[list[str], list[list[str]
     return headers, [[name, *_row(study, _last(table))] for name, table in tables.items()]
 
 
-def _write_tables(study: EnsembleStudy, tables: dict[str, pd.DataFrame], folder: Path) -> None:
+def _files(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
+    """Return tables, curves, cards, summary and the changes of the deck."""
     import pandas as pd
 
-    result = study.result
+    result, prepared = study.result, study.prepared
     frames = [table.assign(quantity=name) for name, table in tables.items()]
     everything = pd.concat(frames, ignore_index=True).drop(columns=["noise", "noise_error"], errors="ignore")
     everything.insert(0, "quantity", everything.pop("quantity"))
-    everything.to_csv(folder / "quantities.csv", index=False)
-    write_csv(folder / "draws.csv", _draw_rows(study))
-    (folder / "failures.csv").unlink(missing_ok=True)
-    if result.failures:
-        rows = [{**vars(item), "number": item.number + 1, "lines": " | ".join(item.lines)} for item in result.failures]
-        write_csv(folder / "failures.csv", rows)
     beyond = result.beyond
-    summary = {
-        "model": study.prepared.settings.model,
-        "materials": list(study.prepared.ensembles),
-        "solver": study.prepared.solver.name,
-        "draws": result.draws,
-        "failed": sum(failure.family == COMPLETE for failure in result.failures),
-        "quantities": {name: _plain(_last(table)) for name, table in tables.items()},
-        "measured_invariants": {name: list(ensemble.most) for name, ensemble in study.prepared.ensembles.items()},
-        "elements_beyond": None if beyond is None else float(np.nanmean(beyond[1][:, -1])),
-        "seconds": result.seconds,
-        "cards": study.prepared.card_warnings,
-        "warnings": study.warnings,
+    files: dict[str, Any] = {
+        "quantities.csv": everything,
+        "draws.csv": _draw_rows(study),
+        "model.diff": f"{prepared.diff()}\n",
+        "curves.nc": bytes(_curves(study).to_netcdf(engine="h5netcdf")),
+        "summary.json": {
+            "model": prepared.settings.model,
+            "materials": list(prepared.ensembles),
+            "solver": prepared.solver.name,
+            "draws": result.draws,
+            "failed": sum(failure.family == COMPLETE for failure in result.failures),
+            "quantities": {name: _plain(_last(table)) for name, table in tables.items()},
+            "measured_invariants": {name: list(ensemble.most) for name, ensemble in prepared.ensembles.items()},
+            "elements_beyond": None if beyond is None else float(np.nanmean(beyond[1][:, -1])),
+            "seconds": result.seconds,
+            "cards": prepared.card_warnings,
+            "warnings": study.warnings,
+        },
     }
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    if result.failures:
+        files["failures.csv"] = [
+            {**vars(item), "number": item.number + 1, "lines": " | ".join(item.lines)} for item in result.failures
+        ]
+    for name, cards in prepared.cards[COMPLETE].items():
+        files[f"cards-{re.sub(r'[^A-Za-z0-9_-]+', '-', name)}.csv"] = [dict(row) for row in cards.index]
+    return files
 
 
 def _draw_rows(study: EnsembleStudy) -> list[dict[str, Any]]:
@@ -170,44 +219,72 @@ def _row(study: EnsembleStudy, row: dict[str, Any]) -> list[str]:
     return cells
 
 
-def _context(study: EnsembleStudy, tables: dict[str, pd.DataFrame], has_fields: bool) -> dict[str, Any]:
+def _sections(
+    study: EnsembleStudy,
+    tables: dict[str, pd.DataFrame],
+    figures: Callable[[], dict[str, Figure]],
+    *,
+    has_states: bool,
+    has_fields: bool,
+) -> tuple[Section, ...]:
+    """Return what a page folds: every quantity, states of the material, failures, how it was computed."""
     prepared, result = study.prepared, study.result
-    shown = {}
-    for name, table in tables.items():
-        full = table[table["draws"] > 1]
-        picked = full.iloc[np.unique(np.linspace(0, len(full) - 1, ROWS).round().astype(int))]
-        shown[name] = [
-            _row(study, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")
-        ]
+    headers = _headers(study, tables)
+    sections = [
+        Section(f"{name} over time", _quantity(study, name, table, headers, figures)) for name, table in tables.items()
+    ]
+    if result.is_shared:
+        sections.append(Section("Sources of uncertainty", (SHARES,)))
     materials = [
         [name, ensemble.model.experiment.name, ensemble.model.material.name, ensemble.model.discrepancy.name,
          f"{ensemble.most[0]:.3g}", f"{ensemble.most[1]:.3g}"]
         for name, ensemble in prepared.ensembles.items()
     ]  # fmt: skip
-    return {
-        "command": "ensemble",
-        "model": prepared.deck.main,
-        "solver": prepared.solver.name,
-        "command_line": prepared.solver.command or prepared.solver.template,
-        "definitions": {quantity.name: quantity.text for quantity in prepared.quantities},
-        "lead": _lead(study, tables),
-        "warnings": study.warnings,
-        "cards": prepared.card_warnings,
-        "headers": _headers(study, tables),
-        "tables": shown,
-        "materials": materials,
-        "draws": result.draws,
-        "complete": len(result.folders),
-        "is_shared": result.is_shared,
-        "has_fields": has_fields,
-        "percent": _headers(study, tables)[4],
-        "failures": [
-            [FAMILIES[item.family], item.number + 1, f"{item.reached:.4g}", item.problem, "\n".join(item.lines)]
+    columns = ["material", "data", "law", "discrepancy", "measured I1 − 3 up to", "I2 − 3 up to"]
+    states = Picture("states", lambda: figures()["states"], "Invariants of the elements against those measured", STATES)
+    asked: tuple[Block, ...] = (states,) if has_states else ()
+    asked += (Table(columns, materials, text_columns=(1, 2, 3)),)
+    sections.append(Section("What the model asks of the material", asked))
+    if result.failures:
+        failures = tuple(
+            Section(
+                f"{FAMILIES[item.family]}: number {item.number + 1}, at time {item.reached:.4g}: {item.problem}",
+                (Preformatted("\n".join(item.lines)),),
+            )
             for item in result.failures
-        ],
-        "diff": prepared.diff().encode("utf-8", "replace").decode(),
-        "seconds": f"{result.seconds:.0f}",
-    }
+        )
+        sections.append(Section("Draws that failed", failures))
+    stored = " `fields.vtu` holds mean and standard deviation of the fields at the end for ParaView." * has_fields
+    computed = (
+        f"{result.draws} draws of the posterior, the same and in the same order as `tissuq export` writes. Solver: "
+        f"{prepared.solver.name}, `{prepared.solver.command or prepared.solver.template}`; {result.seconds:.0f} s in "
+        "all.",
+        *prepared.card_warnings,
+        "Where the solver chose its increments draw by draw, curves are interpolated linearly between them; values at "
+        "the end are its own.",
+        f"The error of the model's mesh, of its loads and of its supports is in no number here.{stored}",
+    )
+    changed = prepared.diff().encode("utf-8", "replace").decode()
+    deck = Section("What was changed in the deck, for the first draw", (Preformatted(changed),))
+    return (*sections, Section("How it was computed", (computed, deck)))
+
+
+def _quantity(
+    study: EnsembleStudy, name: str, table: pd.DataFrame, headers: list[str], figures: Callable[[], dict[str, Figure]]
+) -> tuple[Block, ...]:
+    """Return definition, figure and some times of a quantity."""
+    full, is_shared = table[table["draws"] > 1], study.result.is_shared
+    picked = full.iloc[np.unique(np.linspace(0, len(full) - 1, ROWS).round().astype(int))]
+    rows = [_row(study, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")]
+    text = next(quantity.text for quantity in study.prepared.quantities if quantity.name == name)
+    shares = " Right: shares of the variance, ± one standard error (bootstrap)." * is_shared
+    figure = Picture(
+        f"quantity-{name}", lambda: figures()[f"quantity-{name}"], f"Band of {name} over time, and its values at the "
+        "end",
+        f"Left: mean and {headers[4]} band over draws of the posterior, over the time of the model. "
+        f"{'Middle' if is_shared else 'Right'}: the draws at its end.{shares}",
+    )  # fmt: skip
+    return f"{text}, in the units of the model", figure, Table(headers, rows)
 
 
 def _lead(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> str:

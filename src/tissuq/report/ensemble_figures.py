@@ -12,18 +12,22 @@ from numpy.typing import NDArray
 from tissuq.decks.calculix_results import CELL_TYPES
 from tissuq.decks.fields import FinalFields
 from tissuq.decks.model_ensemble import ModelEnsemble
+from tissuq.drawing import pieces
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.figures import BAND, BASE, INK, STYLE, TRUTH
+from tissuq.report.simulation_figures import SHARES as ALL_SHARES
+from tissuq.report.simulation_figures import draw_shares
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ensemble_figures", "write_fields"]
+__all__ = ["band_over_time", "ensemble_figures", "write_fields"]
 
 FloatArray = NDArray[np.float64]
 
-SHARES = {"parameters": BAND, "discrepancy": TRUTH}
+SHARES = {name: color for name, color in ALL_SHARES.items() if name != "noise"}
 
 
 def ensemble_figures(
@@ -39,6 +43,25 @@ def ensemble_figures(
     return figures
 
 
+def band_over_time(ensemble: ModelEnsemble, name: str) -> Figure:
+    """Return the band of a quantity over time, for the head of a page."""
+    table = ensemble.table(name)
+    with new_figure(ANSWER_WIDTH, 3.6) as figure:
+        _draw_band(figure.subplots(), table[table["draws"] > 1], name)
+    return figure
+
+
+def _draw_band(axis: Axes, table: pd.DataFrame, name: str) -> None:
+    """Draw mean and band of a quantity over time; of a single time as an interval."""
+    time, percent = table["time"], f"{100 * band_probability(int(table['draws'].max())):.0f} %"
+    is_path = len(table) > 1
+    pieces.band(axis, time, table["low"], table["high"], strength=0.25, label=percent, is_path=is_path)
+    pieces.line(axis, time, table["mean"], label="mean", is_path=is_path)
+    axis.set_xlabel("time")
+    axis.set_title(name)
+    axis.legend(fontsize=9)
+
+
 def _quantity(ensemble: ModelEnsemble, name: str) -> Figure:
     """Draw the band of a quantity over time, the last values, and the shares of the variance where there are any."""
     from matplotlib.figure import Figure
@@ -48,34 +71,15 @@ def _quantity(ensemble: ModelEnsemble, name: str) -> Figure:
     axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
     table = ensemble.table(name)
     table = table[table["draws"] > 1]
-    time, percent = table["time"], f"{100 * band_probability(int(table['draws'].max())):.0f} %"
-    marker = "o" if len(table) == 1 else ""
-    axes[0].fill_between(time, table["low"], table["high"], color=BAND, alpha=0.25, lw=0, label=percent)
-    axes[0].plot(time, table["mean"], color=BAND, lw=1.7, marker=marker, label="mean")
-    axes[0].set_xlabel("time")
-    axes[0].set_title(name)
-    axes[0].legend(fontsize=9)
+    _draw_band(axes[0], table, name)
     last = ensemble.last_values(name)
     axes[1].hist(last[np.isfinite(last)], bins="auto", color=BAND, alpha=0.6, lw=0)
     axes[1].set_title(f"{name} at the end")
     axes[1].set_ylabel("draws")
     if has_shares:
-        _draw_shares(axes[2], table)
+        draw_shares(axes[2], table["time"], table, SHARES)
+        axes[2].set_xlabel("time")
     return figure
-
-
-def _draw_shares(axis: object, table: pd.DataFrame) -> None:
-    from matplotlib.axes import Axes
-
-    assert isinstance(axis, Axes)  # noqa: S101 (of subplots)
-    axis.axhline(0, color=INK, lw=0.8)
-    for name, color in SHARES.items():
-        share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
-        axis.fill_between(table["time"], share - error, share + error, color=color, alpha=0.2, lw=0)
-        axis.plot(table["time"], share, color=color, lw=1.6, label=name)
-    axis.set_title("Share of the variance [%]")
-    axis.set_xlabel("time")
-    axis.legend(fontsize=9)
 
 
 def _states(

@@ -1,4 +1,4 @@
-"""The folder of a comparison of laws: table, posteriors, figures and a page."""
+"""The result of a comparison of laws: the averaged modulus, which law, table, posteriors and figures."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import columns_of, legend_above, on_figure
-from tissuq.drawing.style import BASE, SERIES, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
 from tissuq.pictures.curves import points_along, ways_of
 from tissuq.prediction.bands import predict_band
-from tissuq.report.run_folder import write_figures, write_page, write_posteriors
-from tissuq.report.specimen import lines_of_tests, noise_in_words, write_inputs
+from tissuq.report.inputs import inputs_of
+from tissuq.report.result import Block, Number, Picture, Result, Section, Table
+from tissuq.report.specimen import lines_of_tests, noise_in_words
 from tissuq.report.tables import (
     in_unit_of,
     known_number,
@@ -20,16 +21,14 @@ from tissuq.report.tables import (
     significant,
     tolerances_in_words,
     with_named_units,
-    write_csv,
-    write_json,
 )
-from tissuq.result_warning import in_shell
+from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.laws import LawStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["HEADERS", "law_lead", "readable_laws", "write_law_run"]
+__all__ = ["HEADERS", "law_lead", "law_result", "readable_laws"]
 
 MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
@@ -37,25 +36,82 @@ SIGNIFICANT_ERRORS = 2.0
 """Standard errors of a difference of elpd beyond which it counts."""
 MODULUS = ("modulus", "modulus_low", "modulus_high")
 """Columns that are stresses."""
+HOW_TO_READ = (
+    "Probability: of the law with its discrepancy, were all laws as probable before the data. A law with more "
+    "parameters pays for those that the data do not need. It says nothing about whether a law is true.",
+    "elpd less best: by how much the expected log density of new measurements (each left out in turn) falls short of "
+    "the best, with its standard error. Less than two errors is no difference.",
+    "R2 and error alone: of the law fitted without discrepancy; the error is the root mean square over that of the "
+    "stress. Share of discrepancy: of the stress beside this law, on average.",
+    "Stable / to 1.5 I: probability of stability over the range of I1 and I2 that was measured, and up to 1.5 times "
+    "these, with the discrepancy where it is an energy; in the least stable loading mode.",
+    "To continue with one law: tissuq predict, export or design with this folder and --discrepancy LAW.",
+)
 HEADERS = [
     "law", "modulus", "95 % HPD", "parameters", "probability", "elpd less best", "R2 alone", "error alone",
     "share of discrepancy", "stable / to 1.5 I",
 ]  # fmt: skip
 
 
-def write_law_run(study: LawStudy, sources: Sequence[Path], folder: Path, *, figures: bool = True) -> None:
-    """Write the results of a comparison into an empty folder; arguments as of `write_specimen_run`."""
-    command = write_inputs(study.settings, study.experiment, sources, folder, figures=figures)
+def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
+    """Return what a comparison of laws says; ``sources`` are the files that were read."""
+    comparison, settings, unit = study.comparison, study.settings, study.unit
     rows = [
         {"law": name} | {str(column): known_number(value) for column, value in row.items()}
-        for name, row in study.comparison.table_in("MPa").iterrows()
+        for name, row in comparison.table_in("MPa").iterrows()
     ]
-    write_csv(folder / "laws.csv", with_named_units(rows, MODULUS, study.unit))
-    write_json(folder / "laws.json", in_unit_of(rows, MODULUS, study.unit))
-    write_posteriors(folder, study.comparison.fits)
-    if figures:
-        write_figures(folder, {"moduli": modulus_figure(study), "curves": curve_figure(study)})
-    write_page(folder, "laws.html", **_context(study), command=command)
+    inputs = inputs_of(settings, study.experiment, sources)
+    files = {
+        "laws.csv": with_named_units(rows, MODULUS, unit),
+        "laws.json": in_unit_of(rows, MODULUS, unit),
+    }
+    discrepancy = settings.discrepancies[0]
+    tests = lines_of_tests(study.experiment)
+    caption = (
+        f"Initial shear modulus under every law with the discrepancy '{discrepancy}': median and 95 % HPD, and the "
+        "average by the laws' probabilities."
+    )
+    headers = [HEADERS[0], f"modulus [{unit.name}]", *HEADERS[2:]]
+    return Result(
+        command=f"fit{inputs.options}",
+        title=f"{study.experiment.name}: which law",
+        subject=tests[0] if len(tests) == 1 else f"{len(tests)} tests",
+        numbers=_numbers(study),
+        finding=f"{law_lead(study)} The interval is of {study.tolerances.meaning}.",
+        next_step=f"to continue with one law: tissuq predict, export or design {{run}} --discrepancy {rows[0]['law']}",
+        picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
+        tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",
+                      note="Log evidences, intervals of the shares and times are in `laws.csv`."),),
+        sections=_sections(study, tests),
+        warnings=tuple(study.warnings),
+        files=inputs.files | data_file(study.experiment, unit) | files | posterior_files(comparison.fits),
+        recipe=inputs.recipe,
+        without=inputs.without,
+    )  # fmt: skip
+
+
+def _numbers(study: LawStudy) -> tuple[Number, ...]:
+    """Return the averaged modulus, the most probable law, and the one that predicts best."""
+    comparison, scale = study.comparison, study.unit.to_mpa
+    table, modulus = comparison.table_in("MPa"), comparison.modulus
+    low, high = (end / scale for end in modulus.hdi())
+    median = float(modulus.quantile(0.5)) / scale
+    numbers = [Number("initial shear modulus, averaged over the laws", median, low, high, study.unit.name)]
+    if table.probability.notna().any():
+        law = str(table.probability.idxmax())
+        remark = f"probability {_percent(float(table.probability[law]))}"
+        numbers.append(Number("most probable law", law, remark=remark))
+    best = str(table.elpd_difference.idxmax())
+    close = _close(study)
+    as_good = f"{len(close) - 1} other{'s' * (len(close) > 2)} as good" if len(close) > 1 else "no other as good"
+    return (*numbers, Number("best for left-out measurements", best, remark=as_good))
+
+
+def _close(study: LawStudy) -> list[str]:
+    """Return the laws that predict left-out measurements as well as the best."""
+    table = study.comparison.table_in("MPa")
+    is_close = table.elpd_difference > -SIGNIFICANT_ERRORS * table.elpd_difference_error
+    return [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]
 
 
 def readable_laws(study: LawStudy) -> list[list[str]]:
@@ -85,8 +141,7 @@ def law_lead(study: LawStudy) -> str:
     comparison, unit = study.comparison, study.unit
     table, modulus = comparison.table_in("MPa"), comparison.modulus
     low, high = (significant(end / unit.to_mpa) for end in modulus.hdi())
-    is_close = table.elpd_difference > -SIGNIFICANT_ERRORS * table.elpd_difference_error
-    close = [str(name) for name in table.index[is_close | (table.elpd_difference == 0)]]
+    close = _close(study)
     told = (
         f"of {len(table)} laws, only {close[0]} describes the measurements so well that no other is as good"
         if len(close) == 1
@@ -108,7 +163,7 @@ def law_lead(study: LawStudy) -> str:
 
 def modulus_figure(study: LawStudy) -> Figure:
     """Return the moduli of all laws with 95 % HPD, and their average."""
-    with new_figure(8.2, 0.34 * (len(study.comparison.fits) + 1) + 1.0) as figure:
+    with new_figure(ANSWER_WIDTH, 0.34 * (len(study.comparison.fits) + 1) + 1.0) as figure:
         study.comparison.plot(figure.subplots(), unit=study.unit.name)
     return figure
 
@@ -136,22 +191,30 @@ def curve_figure(study: LawStudy) -> Figure:
     return figure
 
 
-def _context(study: LawStudy) -> dict[str, Any]:
+def _sections(study: LawStudy, tests: list[str]) -> tuple[Section, ...]:
+    """Return what a page folds: the curves of the laws, how to read the table, how it was computed, the data."""
     comparison = study.comparison
-    return {
-        "experiment": study.experiment,
-        "tests": lines_of_tests(study.experiment),
-        "lead": law_lead(study),
-        "headers": [HEADERS[0], f"modulus [{study.unit.name}]", *HEADERS[2:]],
-        "rows": readable_laws(study),
-        "warnings": list(map(in_shell, study.warnings)),
-        "estimand": study.tolerances.meaning,
-        "tolerances": tolerances_in_words(study.tolerances, study.unit),
-        "discrepancy": study.settings.discrepancies[0],
-        "noise": noise_in_words(study.settings, next(iter(comparison.fits.values())), study.unit),
-        "methods": readable_methods(comparison.fits),
-        "skipped": comparison.skipped,
-    }
+    caption = "The laws fitted alone, without discrepancy: medians of those that come nearest to the measurements."
+    curves = Picture("curves", lambda: curve_figure(study), "Curves of the laws", caption, is_slim=True)
+    tolerances = tolerances_in_words(study.tolerances, study.unit)
+    noise = noise_in_words(study.settings, next(iter(comparison.fits.values())), study.unit)
+    data: list[Block] = [tuple(tests)] if len(tests) > 1 else []
+    data.append(f"{study.experiment.source}.")
+    data += [f"Errors of whole tests (standard deviations): {tolerances}."] * bool(tolerances)
+    data.append(
+        f"Noise: {noise}. Default priors are uniform and wide: boxes ten times as large as a least-squares fit "
+        "requires."
+    )
+    if comparison.skipped:
+        reasons = " ".join(f"{name} ({reason})" for name, reason in comparison.skipped.items())
+        data.append(f"Not fitted: {reasons}")
+    methods = tuple(f"**{law}**: {text}" for law, text in readable_methods(comparison.fits).items())
+    return (
+        Section("The laws alone", (curves,)),
+        Section("How to read it", (HOW_TO_READ,)),
+        Section("How it was computed", (methods,)),
+        Section("The data", tuple(data)),
+    )
 
 
 def _percent(share: float) -> str:

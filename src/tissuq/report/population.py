@@ -1,8 +1,7 @@
-"""The run folder of a population: the converted data, tables, draws, figures and the report."""
+"""The result of a population: what to expect of a new patient, tables, draws, figures and the converted data."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -10,22 +9,19 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.modulus import modulus_symbols
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import on_figure
-from tissuq.drawing.style import BASE, TRUTH, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BASE, TRUTH, new_figure
 from tissuq.errors import ModelError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
+from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.picture import height_of, numbers_of
-from tissuq.report.run_folder import (
-    INPUT,
-    copied_laws,
-    write_figures,
-    write_page,
-    write_posteriors,
-    write_recipe,
-)
-from tissuq.report.tables import Row, interval, significant, with_named_units, write_csv
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.run_folder import INPUT, law_files
+from tissuq.report.tables import Row, interval, significant, with_named_units
+from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
 
 if TYPE_CHECKING:
@@ -39,9 +35,9 @@ __all__ = [
     "HEADERS",
     "Bands",
     "patient_figure",
+    "population_result",
     "readable_population",
     "specimens_figure",
-    "write_population_run",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -101,6 +97,31 @@ def _draw_patient(axis: Axes, population: Population, mode: LoadingMode, bands: 
 
 PATIENT = "new-patient"
 """Name of the file with the posterior of a new patient, from which other commands start."""
+ENDS = ("hdi_low", "hdi_high")
+NO_RANGE = "Complete pooling treats all specimens as one: its interval does not describe the range of patients."
+SPECIMENS = (
+    "Every specimen by itself (grey) and within the population (blue): 95 % HPD and median. Bands: 95 % for a new "
+    "patient, and for the median of the population. At the bottom, complete pooling. Grey bars may run out of the "
+    "panel."
+)
+PATIENT_CAPTION = (
+    "Without measurement noise. Blue: material from the population, and the model error of a random specimen measured "
+    "at that stretch, scaled with the initial modulus. Dotted: the material alone."
+)
+HOW_TO_READ = (
+    "**By itself** (no pooling): only the data of the specimen. **Within the population** (partial pooling): the other "
+    "specimens inform what its data do not determine, so a poorly measured specimen moves towards the population and a "
+    "well measured one hardly moves.",
+    "**A new patient**: the median and spread of the population with the uncertainty of both. Use this range for "
+    "someone who has not been measured.",
+    "**Complete pooling** treats all specimens as one. Its interval shrinks with every measurement, however much "
+    "patients differ: it understates the uncertainty and is shown for comparison only.",
+    "The specimens' model errors are taken to be independent. An error that all of them share (the same missing "
+    "physics) does not average out and is not included in the interval of the population median; the interval of a new "
+    "patient, which reflects the differences between patients, is hardly affected.",
+    "The spread of a positive parameter is the sd of its logarithm: 0.3 means that two thirds of patients lie within "
+    "about ± 30 % of the median.",
+)
 POINTS = 81
 """Of the stress of a new patient."""
 HEADERS = ["parameter", "unit", "quantity", "median", "95 % HPD"]
@@ -113,42 +134,122 @@ QUANTITIES = {
 }
 
 
-def write_population_run(study: PopulationStudy, folder: Path, beside: Path = Path(), *, figures: bool = True) -> None:
-    """Write everything that a population leaves behind into an empty folder.
+def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
+    """Return what a population says.
 
     Parameters
     ----------
     study : PopulationStudy
-    folder : Path
-        Exists and is empty.
     beside : Path
         Where the files of the settings lie, unless they are absolute.
-    figures : bool
-        Draw them, too.
     """
-    population, unit = study.population, study.unit
-    (folder / INPUT).mkdir()
-    relocated = {"files": _copied(study, folder, beside), "material": copied_laws(study.settings.material, folder)}
-    named = f" --material {relocated['material']}" if relocated["material"] != study.settings.material else ""
-    command = f"population{'' if figures else ' --no-figures'}{named}"
-    write_recipe(folder, command, study.settings.model_copy(update=relocated))
+    population, unit, settings = study.population, study.unit, study.settings
+    sources, names = _copies(study, beside)
+    law, laws = law_files(settings.material)
     several = len(study.modes) > 1
-    write_csv(folder / "data.csv", with_named_units(_data_rows(study, several), ["stress"], unit))
+    files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
     tables = {name: _in_units(study, table) for name, table in summaries.items()}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
-    bands, not_predicted, drawn = *_bands(study), {}
+    bands, not_predicted = _bands(study)
     if bands:
         band_table = _band_table(bands, several) / unit.to_mpa
         tables["new_patient"] = band_table.rename(columns={name: f"{name} [{unit.name}]" for name in band_table})
-        drawn = {"new_patient": patient_figure(population, bands, unit)} if figures else {}
-    for name, table in tables.items():
-        table.to_csv(folder / f"{name}.csv")
-    population.save(folder / "population.nc")
-    write_posteriors(folder, {PATIENT: population.patient})
-    if figures:
-        write_figures(folder, drawn | {"specimens": specimens_figure(population, unit)})
-    write_page(folder, "population.html", **_context(study), command=command, not_predicted=not_predicted)
+    files |= {f"{name}.csv": table.to_csv for name, table in tables.items()} | {"population.nc": population.save}
+    count, measurements = len(study.tests), sum(len(test) for tests in study.tests.values() for test in tests)
+    modes = ", ".join(mode.name for mode in study.modes)
+    return Result(
+        command="population" + (f" --material {law}" if law != settings.material else ""),
+        title=f"{settings.material} parameters of a population",
+        subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
+        numbers=_numbers(study),
+        finding=_lead(study),
+        next_step="take a new patient into finite elements: tissuq export {run} --discrepancy new-patient",
+        picture=Picture(
+            "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
+        ),
+        tables=(Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),),
+        sections=_sections(study, bands, not_predicted),
+        warnings=tuple(study.warnings),
+        files=files | sources | laws | posterior_files({PATIENT: population.patient}),
+        recipe=settings.model_copy(update={"files": names, "material": law}),
+    )  # fmt: skip
+
+
+def _first_parameter(population: Population, unit: StressUnit) -> Figure:
+    """Return the panel of the first parameter, for the head of a page."""
+    with new_figure(ANSWER_WIDTH, height_of(len(population.names)) + 1.0) as figure:
+        population.draw(on_figure(figure, 1, 1), unit)
+    return figure
+
+
+def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
+    """Return what to expect of a new patient, and median and spread of the population.
+
+    Of the initial shear modulus where it is a multiple of the first parameter, and of this parameter otherwise.
+    """
+    population = study.population
+    symbol, is_log = population.symbols[0], bool(population.coordinates.is_log[0])
+    factor, unit = _scale(study, symbol)
+    table = numbers_of(population.summary(unit="MPa"))
+    model = population.complete.model
+    is_multiple = modulus_symbols(model) == (symbol,) and not model.bent_symbols
+    words = "initial shear modulus" if is_multiple else symbol
+    alone = [float(parameter.symbol == symbol) for parameter in model.material.parameters]
+    times = initial_shear_modulus(model.material, alone) if is_multiple else 1.0
+
+    def number(name: str, quantity: str, divisor: float, unit: str) -> Number:
+        median, low, high = (table[symbol, quantity][end] / divisor for end in ("median", *ENDS))
+        return Number(name, median, low, high, unit)
+
+    spread = "spread between specimens" + (" (sd of the logarithm)" if is_log else "")
+    return (
+        number(f"{words} of a new patient", "new patient", factor / times, unit),
+        number(f"{words}, median of the population", "median", factor / times, unit),
+        number(spread, "spread", 1.0 if is_log else factor / times, "" if is_log else unit),
+    )
+
+
+def _sections(
+    study: PopulationStudy, bands: Mapping[LoadingMode, Bands], not_predicted: list[str]
+) -> tuple[Section, ...]:
+    """Return what a page folds: every parameter, new patients, specimens, how to read it, how it was computed."""
+    population, diagnostics, settings = study.population, study.population.diagnostics, study.settings
+    is_one = len(population.symbols) == 1
+    specimens = Picture(
+        "specimens", lambda: specimens_figure(population, study.unit),
+        "Parameters of every specimen by itself and within the population", SPECIMENS, is_one,
+    )  # fmt: skip
+    headers = ["specimen", "parameter", "unit", "by itself", "95 % HPD", "within the population", "95 % HPD"]
+    sections = [Section("Every specimen", (specimens, Table(headers, _readable_specimens(study), text_columns=(1, 2))))]
+    patient: list[Any] = [f"Not predicted: {reason}" for reason in not_predicted]
+    if bands:
+        patient.append(
+            Picture(
+                "new_patient", lambda: patient_figure(population, bands, study.unit),
+                "Predicted stress of a new patient", PATIENT_CAPTION, len(study.modes) == 1,
+            )
+        )  # fmt: skip
+    if patient:
+        sections.append(Section("Stress of a new patient", tuple(patient)))
+    pairs = [[str(name), *_text(numbers)] for name, numbers in numbers_of(population.correlations()).items()]
+    if pairs:
+        table = Table(["parameters", "correlation between specimens", "95 % HPD"], pairs)
+        sections.append(Section("Correlations", (table,)))
+    logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
+    linear = [symbol for symbol in population.symbols if symbol not in logs]
+    gaussian = [f"The logarithm{'s' * (len(logs) > 1)} of {', '.join(logs)}"] * bool(logs)
+    gaussian += [f"{', '.join(linear)} {'itself' if len(linear) == 1 else 'themselves'}"] * bool(linear)
+    sizes = " (in units of the typical size, for parameters of either sign)" if linear else ""
+    computed = (
+        "Every specimen was fitted separately, with its own discrepancy and noise and wide priors, which are then "
+        "divided out (Lunn et al. 2013).",
+        f"{' and '.join(gaussian)} {'is' if is_one else 'are'} Gaussian between specimens. The prior of every spread "
+        f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2).",
+        f"The specimens are integrated in closed form. {diagnostics.verdict} Effective share of the draws after "
+        f"importance correction: {population.hierarchy.effective:.1%}. {study.seconds:.0f} s.",
+    )
+    return (*sections, Section("How to read it", (HOW_TO_READ,)), Section("How it was computed", (computed,)))
 
 
 def _data_rows(study: PopulationStudy, several: bool) -> list[Row]:
@@ -192,15 +293,15 @@ def _band_table(bands: Mapping[LoadingMode, Bands], several: bool) -> pd.DataFra
     return pd.concat(tables, names=["mode"]) if several else next(iter(tables.values()))
 
 
-def _copied(study: PopulationStudy, folder: Path, beside: Path) -> tuple[str, ...]:
-    """Copy the user's files, so that the run can be repeated, and return what names them there."""
+def _copies(study: PopulationStudy, beside: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the user's files, so that the run can be repeated, and what names them there."""
+    copies: dict[str, Any] = {}
     for name, files in study.settings.sources(beside).items():
         is_folder = len(files) > 1 or files[0].stem != name
-        target = folder / INPUT / name if is_folder else folder / INPUT
-        target.mkdir(exist_ok=True)
         for file in files:
-            shutil.copyfile(file, target / file.name)
-    return (INPUT,) if study.settings.specimen is None else (f"{INPUT}/{Path(study.settings.files[0]).name}",)
+            copies[f"{INPUT}/{name}/{file.name}" if is_folder else f"{INPUT}/{file.name}"] = file
+    is_one_file = study.settings.specimen is not None
+    return copies, (f"{INPUT}/{Path(study.settings.files[0]).name}" if is_one_file else INPUT,)
 
 
 def _in_units(study: PopulationStudy, table: pd.DataFrame) -> pd.DataFrame:
@@ -249,31 +350,6 @@ def _text(numbers: Mapping[str, float], factor: float = 1.0, prefix: str = "") -
     low, middle, high = (numbers[f"{prefix}{name}"] / factor for name in ("hdi_low", "median", "hdi_high"))
     width = (high - low) / 4
     return interval(middle, middle, width)[0], "[{}, {}]".format(*interval(low, high, width))
-
-
-def _context(study: PopulationStudy) -> dict[str, Any]:
-    population, diagnostics = study.population, study.population.diagnostics
-    logs = [s for s, is_log in zip(population.symbols, population.coordinates.is_log, strict=True) if is_log]
-    pairs = numbers_of(population.correlations())
-    return {
-        "settings": study.settings,
-        "count": len(study.tests),
-        "measurements": sum(len(test) for tests in study.tests.values() for test in tests),
-        "is_one": len(population.symbols) == 1,
-        "is_in_modes": len(study.modes) > 1,
-        "mode": ", ".join(mode.name for mode in study.modes),
-        "lead": _lead(study),
-        "warnings": study.warnings,
-        "headers": HEADERS,
-        "summary": readable_population(study),
-        "correlations": [[name, *_text(numbers)] for name, numbers in pairs.items()],
-        "specimens": _readable_specimens(study),
-        "verdict": diagnostics.verdict,
-        "effective": f"{population.hierarchy.effective:.1%}",
-        "seconds": f"{study.seconds:.0f}",
-        "logs": logs,
-        "linear_symbols": [symbol for symbol in population.symbols if symbol not in logs],
-    }
 
 
 def _lead(study: PopulationStudy) -> str:

@@ -1,21 +1,23 @@
-"""The folder of a prediction: bands and scores as tables and labelled arrays, the figure and a page."""
+"""The result of a prediction: the stress at the end of the range, bands and scores as tables and labelled arrays."""
 
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Mapping
+from dataclasses import replace
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tissuq.drawing.panels import legend_above
-from tissuq.drawing.style import new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.prediction.bands import Band
-from tissuq.report.run_folder import INPUT, write_figures, write_page, write_recipe
-from tissuq.report.tables import interval, significant, write_csv, write_json
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.run_folder import INPUT
+from tissuq.report.tables import interval, significant
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction
 from tissuq.studies.prediction_picture import draw_prediction
@@ -28,25 +30,13 @@ if TYPE_CHECKING:
 __all__ = [
     "band_headers",
     "prediction_figure",
+    "prediction_result",
     "readable_bands",
     "readable_scores",
     "score_headers",
-    "write_prediction_run",
 ]
 
-
-def prediction_figure(prediction: Prediction) -> Figure:
-    """Return a row of panels for each stress: with the discrepancy, where it is known, and the material alone.
-
-    The stretches at which an invariant is larger than in the measurements of the run are hatched.
-    """
-    count, kinds = len(prediction.stresses), len(prediction.kinds)
-    with new_figure(4.9 * kinds + (1.6 if kinds == 1 else 0.4), 3.7 * count + 0.7) as figure:
-        axes = figure.subplots(count, kinds, squeeze=False, sharey="row", sharex=prediction.points.ndim == 1)
-        draw_prediction(list(axes.ravel()), prediction)
-        legend_above(figure, axes.ravel(), 3 * kinds if kinds > 1 else 2)
-    return figure
-
+FloatArray = NDArray[np.float64]
 
 MAX_ROWS = 13
 """Number of rows of the table of bands on page and terminal; the files have all."""
@@ -54,54 +44,182 @@ MAX_SHARE, MAX_STRESS, MIN_STRESS = 10.0, 1e5, 1e-12
 """Largest share shown as a percentage; stresses (in the unit of the run) shown in powers of ten, and as zero."""
 
 
-def write_prediction_run(
+def prediction_figure(prediction: Prediction) -> Figure:
+    """Return a row of panels for each stress: with the discrepancy, where it is known, and the material alone.
+
+    The stretches at which an invariant is larger than in the measurements of the run are hatched.
+    """
+    kinds = len(prediction.kinds)
+    return _figure(prediction, 4.9 * kinds + (1.6 if kinds == 1 else 0.4), 3 * kinds if kinds > 1 else 2)
+
+
+def _figure(prediction: Prediction, width: float, across: int) -> Figure:
+    count, kinds = len(prediction.stresses), len(prediction.kinds)
+    with new_figure(width, 3.7 * count + 0.7) as figure:
+        axes = figure.subplots(count, kinds, squeeze=False, sharey="row", sharex=prediction.points.ndim == 1)
+        draw_prediction(list(axes.ravel()), prediction)
+        legend_above(figure, axes.ravel(), across)
+    return figure
+
+
+def prediction_result(
     prediction: Prediction,
     settings: PredictionSettings,
-    folder: Path,
     target: Path,
     beside: Path = Path(),
     *,
     law: str | None = None,
-    figures: bool = True,
-) -> None:
-    """Write everything that a prediction leaves behind into an empty folder.
+) -> Result:
+    """Return what a prediction says.
 
     Parameters
     ----------
     prediction : Prediction
     settings : PredictionSettings
         From which it came.
-    folder : Path
-        Exists and is empty.
     target : Path
-        What the folder will be in the end: the recipe names the run from there.
+        The run folder to be: the recipe names the run from there.
     beside : Path
         Where the relative paths of the settings lie.
     law : str, optional
         The material that was named, where it is a law in the user's file.
-    figures : bool
-        Draw them, too.
     """
-    command = f"predict{'' if figures else ' --no-figures'}{f' --user-law {law}' if law else ''}"
     relocated: dict[str, Any] = {"run": os.path.relpath(beside / settings.run, target), "mode": prediction.mode.name}
+    files: dict[str, Any] = {"prediction.csv": prediction.rows, "prediction.nc": prediction.save}
     if settings.data is not None:
-        (folder / INPUT).mkdir()
         source = beside / settings.data.file
-        shutil.copyfile(source, folder / INPUT / source.name)
+        files[f"{INPUT}/{source.name}"] = source
         copy = {"file": f"{INPUT}/{source.name}", "mode": prediction.mode.name}
         relocated["data"] = settings.data.model_copy(update=copy)
-    write_recipe(folder, command, settings.model_copy(update=relocated))
-    write_csv(folder / "prediction.csv", prediction.rows)
-    prediction.save(folder / "prediction.nc")
     if prediction.scores is not None:
         rows = [{str(name): value for name, value in row.items()} for row in prediction.scores.to_dict("records")]
         unit = prediction.unit.name
         names = {name: f"{name} [{unit}]" for name in ("crps", "interval_score")}
-        write_csv(folder / "scores.csv", [{names.get(name, name): row[name] for name in row} for row in rows])
-        write_json(folder / "scores.json", [row | {"unit": unit} for row in rows])
-    if figures:
-        write_figures(folder, {"prediction": prediction_figure(prediction)})
-    write_page(folder, "prediction.html", **_context(prediction, settings), command=command)
+        files["scores.csv"] = [{names.get(name, name): row[name] for name in row} for row in rows]
+        files["scores.json"] = [row | {"unit": unit} for row in rows]
+    model = prediction.posterior.model
+    measured = " and ".join(f"{test.mode.name} ({len(test)} measurements)" for test in model.experiment.tests)
+    run = Path(settings.run).name or settings.run
+    return Result(
+        command=f"predict{f' --user-law {law}' if law else ''}",
+        title=f"Predicted stress: {prediction.mode.name}",
+        subject=f"run {run}: {model.material.name}, discrepancy {model.discrepancy.name}, fitted to {measured}",
+        numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
+        finding=_lead(prediction),
+        next_step=_next_step(prediction),
+        picture=Picture(
+            "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
+            f"Predicted bands of the stress in mode {prediction.mode.name}", _caption(prediction),
+        ),
+        tables=_tables(prediction),
+        sections=_sections(prediction),
+        warnings=tuple(prediction.warnings),
+        files=files,
+        recipe=settings.model_copy(update=relocated),
+    )  # fmt: skip
+
+
+def _stresses_at_the_end(prediction: Prediction) -> list[Number]:
+    """Return every stress at the point farthest from rest, with its band."""
+    index, scale = int(_changes(prediction).argmax()), prediction.unit.to_mpa
+    is_known = prediction.is_calibrated[index]
+    numbers = []
+    for channel, name in enumerate(prediction.stresses):
+        band = prediction.curves[channel, prediction.kinds[0], False]
+        median, low, high = (float(column[index]) / scale for column in (band.median, band.low, band.high))
+        words = f"{name} at {_point(prediction, index)}{'' if is_known else ', extrapolated'}"
+        share = f"{100 * prediction.prob:.4g} % interval"
+        numbers.append(Number(words, median, low, high, prediction.unit.name, share))
+    return numbers
+
+
+def _shares(prediction: Prediction) -> list[Number]:
+    """Return how many measurements lie inside the band, and how much of the range is extrapolated."""
+    numbers, count = [], len(prediction.points)
+    if prediction.scores is not None:
+        kind = "with" if prediction.kinds[0] else "without"
+        rows = prediction.scores[(prediction.scores["discrepancy"] == kind) & (prediction.scores["range"] == "all")]
+        inside, all_of_them = round(float((rows["inside"] * rows["count"]).sum())), int(rows["count"].sum())
+        value = f"{inside} of {all_of_them}"
+        numbers.append(Number("measurements inside the band", value, remark=f"{100 * prediction.prob:.4g} % expected"))
+    beyond = count - int(prediction.is_calibrated.sum())
+    remark = "outside the measured range of I1 and I2" if beyond else "all within the measured range"
+    numbers.append(Number("extrapolated", f"{beyond / count:.0%} of the points", remark=remark))
+    return numbers
+
+
+def _next_step(prediction: Prediction) -> str:
+    if not prediction.is_calibrated.all():
+        return "see which test would make the extrapolated stress less uncertain: tissuq design RUN (RUN: the fit)"
+    if prediction.scores is None:
+        return "compare with a measurement of this mode, if there is one: tissuq predict RUN --data FILE (RUN: the fit)"
+    return "see which laws describe all tests together: tissuq fit FILES --material LAW --material OTHER"
+
+
+def _caption(prediction: Prediction) -> str:
+    share = f"{100 * prediction.prob:.4g} %"
+    return (
+        f"Dark: {share} of the stress itself, noise off. Light: {share} of measurements of it. Hatched: an invariant "
+        "is larger than in any measurement of the run; there bands may run out of the panel."
+    )
+
+
+def _tables(prediction: Prediction) -> tuple[Table, ...]:
+    several, unit = len(prediction.stresses) > 1, prediction.unit.name
+    text_column = (len(prediction.mode.controls),) if several else ()
+    alone = "Alone: the material without the discrepancy. " if prediction.kinds[0] else ""
+    count = len(prediction.points)
+    part = f"Some of {count} points; all are in `prediction.csv`." if count > MAX_ROWS else ""
+    note = f"{unit}, {', '.join(prediction.stresses)}. {alone}{part}".strip()
+    title = f"Stress in mode {prediction.mode.name}, {unit}"
+    tables = [Table(band_headers(prediction), readable_bands(prediction), title, text_column, note)]
+    if prediction.scores is not None and prediction.data is not None:
+        title = f"Measurements of {prediction.data.name}"
+        columns = (1, 2) if several else (1,)
+        tables.append(Table(score_headers(prediction), readable_scores(prediction), title, columns))
+    return tuple(tables)
+
+
+def _sections(prediction: Prediction) -> tuple[Section, ...]:
+    """Return what a page folds: all bands as figures, how to read them, the warnings of the fit, the measurements."""
+    model, data = prediction.posterior.model, prediction.data
+    share = f"{100 * prediction.prob:.4g} %"
+    figure = Picture(
+        "prediction", lambda: prediction_figure(prediction), f"All bands of the stress in mode {prediction.mode.name}",
+        _caption(prediction), len(prediction.kinds) == 1,
+    )  # fmt: skip
+    whole = " and an error of the whole test like theirs" if model.tolerances else ""
+    reading = [
+        "The band of the stress is the uncertainty of the fitted material; that of measurements adds the noise of the "
+        f"run's measurements{whole}.",
+        "Calibrated: within the range in which both invariants I1 and I2 were measured (in a mode of the run, the "
+        "stretches that were). Even inside that range one mode does not determine how the energy depends on the other "
+        "invariant, so bands of other modes are wider than those of the measured mode.",
+    ]
+    if prediction.kinds[0]:
+        reading.append(
+            "Where bands with and without the discrepancy are far apart, the material alone does not describe the "
+            "tissue; its narrow band then understates the uncertainty."
+        )
+    scores = (
+        f"**Inside**: the share of measurements in the {share} band of measurements, which should be about {share}; if "
+        "it is less, the band is too narrow for these data; if it is 100 %, the band may be too wide.",
+        "**Half width** of that band and **error** of its mean: root mean squares, relative to that of the measured "
+        "stress.",
+        "**CRPS** (continuous ranked probability score) and **interval score** reward bands that are narrow and hold "
+        "the data, in the unit of stress; less is better. They compare predictions of the same measurements, here with "
+        "and without the discrepancy, and mean nothing in isolation.",
+        "Measurements without stress are left out: at rest it is zero by definition.",
+    )
+    sections = [Section("All bands", (figure,)), Section("How to read it", (tuple(reading),))]
+    if data is not None:
+        sections.append(Section("How the measurements are predicted", (scores,)))
+    if prediction.posterior.warnings:
+        sections.append(Section("Warnings of the fit", (tuple(map(in_shell, prediction.posterior.warnings)),)))
+    if data is not None:
+        words = f"{data.name}: {len(data)} measurements, {data.source}."
+        sections.append(Section("The measurements", (words,)))
+    return tuple(sections)
 
 
 def band_headers(prediction: Prediction) -> list[str]:
@@ -192,26 +310,6 @@ def _ends(band: Band, index: int, scale: float) -> str:
     return "{} to {}".format(*texts)
 
 
-def _context(prediction: Prediction, settings: PredictionSettings) -> dict[str, Any]:
-    model = prediction.posterior.model
-    data = prediction.data
-    return {
-        "prediction": prediction,
-        "run": Path(settings.run).name or settings.run,
-        "model": model,
-        "measured": " and ".join(f"{test.mode.name} ({len(test)} measurements)" for test in model.experiment.tests),
-        "lead": _lead(prediction),
-        "share": f"{100 * prediction.prob:.4g} %",
-        "headers": band_headers(prediction),
-        "rows": readable_bands(prediction),
-        "is_part": len(prediction.points) > MAX_ROWS,
-        "data": data,
-        "score_headers": score_headers(prediction),
-        "scores": [] if prediction.scores is None else readable_scores(prediction),
-        "fit_warnings": list(map(in_shell, prediction.posterior.warnings)),
-    }
-
-
 def _lead(prediction: Prediction) -> str:
     """Return the finding in a sentence or two."""
     return _lead_of_bands(prediction) if prediction.scores is None else _lead_of_scores(prediction)
@@ -243,15 +341,8 @@ def _lead_of_scores(prediction: Prediction) -> str:
 
 
 def _lead_of_bands(prediction: Prediction) -> str:
-    calibrated = np.flatnonzero(prediction.is_calibrated)
-    change = np.abs(
-        prediction.points.reshape(len(prediction.points), -1) - np.atleast_1d(prediction.mode.reference)
-    ).max(axis=1)
+    calibrated, change = np.flatnonzero(prediction.is_calibrated), _changes(prediction)
     index = int(calibrated[change[calibrated].argmax()] if len(calibrated) else change.argmax())
-    point_words = " and ".join(
-        f"{control.name} {column[index]:.4g}"
-        for control, column in zip(prediction.mode.controls, prediction.controls.values(), strict=True)
-    )
     texts = []
     for channel, name in enumerate(prediction.stresses):
         band, scale = prediction.curves[channel, prediction.kinds[0], False], prediction.unit.to_mpa
@@ -259,4 +350,18 @@ def _lead_of_bands(prediction: Prediction) -> str:
         texts.append(f"the {name} is {median} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
     extrapolated = "" if len(calibrated) else ", which is outside the measured range"
     kind = _kind(prediction, prediction.kinds[0])
-    return f"At {point_words} in mode {prediction.mode.name}{extrapolated}, {' and '.join(texts)}: {kind}."
+    return (
+        f"At {_point(prediction, index)} in mode {prediction.mode.name}{extrapolated}, {' and '.join(texts)}: {kind}."
+    )
+
+
+def _changes(prediction: Prediction) -> FloatArray:
+    """Return how far every point is from rest."""
+    points = prediction.points.reshape(len(prediction.points), -1)
+    changes: FloatArray = np.abs(points - np.atleast_1d(prediction.mode.reference)).max(axis=1)
+    return changes
+
+
+def _point(prediction: Prediction, index: int) -> str:
+    controls = zip(prediction.mode.controls, prediction.controls.values(), strict=True)
+    return " and ".join(f"{control.name} {column[index]:.4g}" for control, column in controls)

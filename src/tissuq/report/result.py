@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 from tissuq.assessment.answer import Use
 from tissuq.report.tables import interval, known_number, significant
@@ -26,12 +26,85 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pydantic import BaseModel
 
-__all__ = ["RESULT", "Block", "Number", "Picture", "Preformatted", "Result", "Section", "Table", "few_and_others"]
+__all__ = [
+    "MAX_NUMBERS",
+    "RESULT",
+    "Block",
+    "Number",
+    "Picture",
+    "Preformatted",
+    "Record",
+    "Result",
+    "Section",
+    "Table",
+    "few_and_others",
+]
 
 RESULT = "result.json"
 """The file with the record of a result."""
+MAX_NUMBERS = 3
+"""Numbers of one kind in an answer; tables have all."""
 MAX_SHOWN = 3
 """Warnings that are shown at once; notes and the others are counted and folded."""
+
+
+class NumberRecord(TypedDict):
+    """A number in result.json."""
+
+    name: str
+    value: float | str | None
+    low: float | None
+    high: float | None
+    unit: str
+    text: str
+    remark: str
+
+
+class TableRecord(TypedDict):
+    """A table in result.json."""
+
+    title: str
+    headers: list[str]
+    rows: list[list[str]]
+    note: str
+
+
+class UseRecord(TypedDict):
+    """A use in result.json."""
+
+    purpose: str
+    verdict: str
+    reason: str
+
+
+class WarningRecord(TypedDict):
+    """A warning in result.json."""
+
+    code: str
+    severity: str
+    text: str
+
+
+class SectionRecord(TypedDict):
+    """A section in result.json: its sentences, and its tables."""
+
+    title: str
+    text: list[str]
+    tables: list[TableRecord]
+
+
+class Record(TypedDict):
+    """What stands in result.json: a result without its figures and files."""
+
+    title: str
+    subject: str
+    numbers: list[NumberRecord]
+    finding: str
+    uses: list[UseRecord]
+    next: str
+    warnings: list[WarningRecord]
+    tables: list[TableRecord]
+    sections: list[SectionRecord]
 
 
 @dataclass(frozen=True)
@@ -90,12 +163,17 @@ class Number:
         """The width that says how many digits count; zero where there is none."""
         return 0.0 if self.low is None or self.high is None else (self.high - self.low) / 4
 
-    def record(self) -> dict[str, Any]:
-        """Return it as a row of a file."""
+    @property
+    def beside(self) -> str:
+        """What stands beside the value."""
+        return f"{self.interval_is} {self.range}" if self.range else self.remark
+
+    def record(self) -> NumberRecord:
+        """Return it as it goes into a file."""
         value = self.value if isinstance(self.value, str) else known_number(self.value)
-        beside = f"{self.interval_is} {self.range}" if self.range else self.remark
-        numbers = {"value": value, "low": self.low, "high": self.high, "unit": self.unit}
-        return {"name": self.name, **numbers, "text": self.text, "remark": beside}
+        low, high = (None if end is None else known_number(end) for end in (self.low, self.high))
+        return {"name": self.name, "value": value, "low": low, "high": high, "unit": self.unit, "text": self.text,
+                "remark": self.beside}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -121,7 +199,7 @@ class Table:
 
     kind = "table"
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> TableRecord:
         """Return it as it goes into a file."""
         rows = [list(map(str, row)) for row in self.rows]
         return {"title": self.title, "headers": list(self.headers), "rows": rows, "note": self.note}
@@ -172,9 +250,9 @@ class Section:
 
     kind = "section"
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> SectionRecord:
         """Return title, sentences and tables, those of sections within it among them."""
-        record: dict[str, Any] = {"title": self.title, "text": [], "tables": []}
+        record: SectionRecord = {"title": self.title, "text": [], "tables": []}
         for block in self.blocks:
             if isinstance(block, str):
                 record["text"].append(block)
@@ -220,7 +298,8 @@ class Result:
     warnings : tuple of str
         `ResultWarning`s, or plain sentences, which are cautions.
     files : mapping of str to object
-        By name in the run folder: rows (``.csv``, ``.json``), text, bytes, a file to copy, or a function of the path.
+        By name in the run folder: rows (``.csv``, ``.json``), a table of pandas without its index, text, bytes, a file
+        to copy, or a function of the path.
     recipe : BaseModel, optional
         The settings for run.toml, where it is not written yet; ``without`` those of no meaning.
     how_to_repeat : str
@@ -250,7 +329,7 @@ class Result:
             yield self.picture
         yield from _pictures_of(self.sections)
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> Record:
         """Return everything but figures and files as it stands in result.json, with warnings in the form of a shell."""
         known = most_severe_first(self.warnings)
         return {
@@ -258,7 +337,7 @@ class Result:
             "subject": self.subject,
             "numbers": [number.record() for number in self.numbers],
             "finding": self.finding,
-            "uses": [use._asdict() for use in self.uses],
+            "uses": [{"purpose": use.purpose, "verdict": str(use.verdict), "reason": use.reason} for use in self.uses],
             "next": self.next_step,
             "warnings": [{"code": w.code, "severity": str(w.severity), "text": w.shell} for w in known],
             "tables": [table.record() for table in self.tables],
@@ -266,7 +345,7 @@ class Result:
         }
 
 
-def few_and_others(warnings: list[dict[str, str]]) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
+def few_and_others(warnings: list[WarningRecord]) -> tuple[list[WarningRecord], list[WarningRecord]]:
     """Return the warnings of a record to show at once, and the others; they are in the order of their severity."""
     count = min(MAX_SHOWN, sum(warning["severity"] != Severity.NOTE for warning in warnings))
     return warnings[:count], warnings[count:]

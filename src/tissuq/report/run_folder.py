@@ -48,8 +48,9 @@ __all__ = [
     "RECIPE",
     "check_apart",
     "check_target",
-    "copied_laws",
+    "law_files",
     "run_folder",
+    "summary_tables",
     "versions",
     "write_data",
     "write_figures",
@@ -276,12 +277,21 @@ def write_tables(
     suffix: str = "",
     unit: StressUnit | None = None,
 ) -> None:
-    """Write summary.csv, summary.json and parameters.csv; the summary, which is in MPa, in a unit where one is said."""
+    """Write the tables of `summary_tables`."""
+    for name, rows in summary_tables(summary, posteriors, suffix, unit).items():
+        (write_csv if name.endswith(".csv") else write_json)(folder / name, rows)
+
+
+def summary_tables(
+    summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "", unit: StressUnit | None = None
+) -> dict[str, list[Row]]:
+    """Return summary.csv, summary.json and parameters.csv; the summary, in MPa, in a unit where one is said."""
     columns = headline_columns(summary[0])
-    in_names = summary if unit is None else with_named_units(summary, columns, unit)
-    write_csv(folder / f"summary{suffix}.csv", in_names)
-    write_json(folder / f"summary{suffix}.json", summary if unit is None else in_unit_of(summary, columns, unit))
-    write_csv(folder / f"parameters{suffix}.csv", parameter_rows(posteriors))
+    return {
+        f"summary{suffix}.csv": summary if unit is None else with_named_units(summary, columns, unit),
+        f"summary{suffix}.json": summary if unit is None else in_unit_of(summary, columns, unit),
+        f"parameters{suffix}.csv": parameter_rows(posteriors),
+    }
 
 
 def write_posteriors(folder: Path, posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
@@ -309,14 +319,14 @@ def write_recipe(folder: Path, command: str, settings: BaseModel, without: froze
     (folder / RECIPE).write_text(header + tomli_w.dumps(plain), encoding="utf-8")
 
 
-def copied_laws(material: str, folder: Path) -> str:
-    """Return the name of a material with the laws in the user's files, of which copies go with the run."""
+def law_files(material: str) -> tuple[str, dict[str, Path]]:
+    """Return the name of a material with the laws in the user's files as their copies are named, and these files."""
     from tissuq.mechanics.user_law import LAW
 
-    terms = material.split("+")
+    terms, copies = material.split("+"), dict[str, Path]()
     for index, match in enumerate(map(LAW.fullmatch, terms)):
         if match:
             law = Path(match["path"].strip())
-            shutil.copyfile(law, folder / INPUT / law.name)
+            copies[f"{INPUT}/{law.name}"] = law
             terms[index] = f"{INPUT}/{law.name}:{match['name']}"
-    return "+".join(terms)
+    return "+".join(terms), copies

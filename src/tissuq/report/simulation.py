@@ -1,10 +1,10 @@
-"""The folder of a simulation: tables, curves, fields, figures and the report."""
+"""The result of a simulation: the force with its band, tables, curves, fields and figures."""
 
 from __future__ import annotations
 
 import filecmp
-import json
 import shutil
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,17 @@ from tissuq.errors import InputError
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
-from tissuq.report.run_folder import INPUT, RECIPE, write_figures, write_page
-from tissuq.report.simulation_figures import force_unit, simulation_figures, write_collection, write_vtu
-from tissuq.report.tables import significant, write_csv
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.run_folder import INPUT, RECIPE
+from tissuq.report.simulation_figures import (
+    SHARES,
+    force_figure,
+    force_unit,
+    simulation_figures,
+    write_collection,
+    write_vtu,
+)
+from tissuq.report.tables import significant
 from tissuq.studies.earlier_run import POSTERIORS
 from tissuq.studies.structure import SimulationStudy
 
@@ -24,10 +32,12 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["SOURCE", "check_source", "copy_source", "readable_forces", "write_simulation"]
+__all__ = ["SOURCE", "check_source", "copy_source", "readable_forces", "simulation_result"]
 
 SOURCE = "source"
 """The folder with copies of the files of the run that the posterior comes from."""
+MUCH_BEYOND = 0.2
+"""Share of the strain energy beyond the measurements from which these are to be extended."""
 CELL_FIELDS = {
     "first_invariant": "I1 - 3",
     "second_invariant": "I2 - 3",
@@ -69,32 +79,66 @@ def copy_source(run: Path, folder: Path) -> None:
         scratch.rename(stored)
 
 
-def write_simulation(study: SimulationStudy, folder: Path, *, figures: bool = True) -> None:
-    """Write tables, curves, fields, figures and page of a simulation beside its results.
-
-    Parameters
-    ----------
-    study : SimulationStudy
-    folder : Path
-        Holds the results of the draws and the recipe.
-    figures : bool
-        Draw them, too.
-    """
-    simulation = study.simulation
+def simulation_result(study: SimulationStudy, folder: Path) -> Result:
+    """Return what a simulation says; its folder holds the results of the draws and the recipe."""
+    simulation, model = study.simulation, study.posteriors.fitted.model
     table = simulation.table()
-    table.to_csv(folder / "forces.csv", index=False)
     (folder / "failures.csv").unlink(missing_ok=True)
-    if simulation.failures:
-        write_csv(folder / "failures.csv", [vars(failure) for failure in simulation.failures])
-    summary = json.dumps(_summary(study, table), indent=2, allow_nan=False)
-    (folder / "summary.json").write_text(summary + "\n", encoding="utf-8")
-    curves = bytes(_curves(study).to_netcdf(engine="h5netcdf"))
-    (folder / "curves.nc").write_bytes(curves)
-    _write_fields(study, folder)
-    shutil.rmtree(folder / "figures", ignore_errors=True)
-    if figures:
-        write_figures(folder, simulation_figures(simulation, table))
-    write_page(folder, "simulation.html", **_context(study, table))
+    failures = [vars(failure) for failure in simulation.failures]
+    draws, case = len(simulation.forces[COMPLETE]), simulation.case
+    complete = int(np.isfinite(simulation.forces[COMPLETE][:, -1]).sum())
+    headers, rows = readable_forces(study)
+    percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
+    against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
+    caption = (
+        f"Force over {case.travel_name}: mean and {percent} % band over draws of the posterior, without the noise of a "
+        f"measurement{against}."
+    )
+    files = {
+        "forces.csv": table,
+        "summary.json": _summary(study, table),
+        "curves.nc": bytes(_curves(study).to_netcdf(engine="h5netcdf")),
+        "middle_draw.pvd": lambda path: _write_fields(study, path.parent),
+    }
+    return Result(
+        command="structure",
+        title="From the posterior to a force",
+        subject=f"{case.description} · {model.experiment.name}, {model.material.name}, discrepancy "
+        f"{model.discrepancy.name} · {complete} of {draws} draws completed",
+        numbers=_numbers(study, table),
+        finding=_lead(simulation, table),
+        next_step=_next_step(simulation),
+        picture=Picture("answer", lambda: force_figure(simulation, table), "Band of the force", caption),
+        tables=(Table(headers, rows, f"Case '{case.name}' with {study.settings.draws} draws"),),
+        sections=_sections(study, table),
+        warnings=tuple(study.warnings),
+        files=files | ({"failures.csv": failures} if failures else {}),
+    )
+
+
+def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
+    """Return the force at the last step, the largest share of its variance, and how much of the body extrapolates."""
+    simulation, last = study.simulation, _last_step(table)
+    unit, factor = force_unit(table)
+    percent = f"{100 * band_probability(int(last['draws'])):.0f} % band"
+    mean, low, high = (last[name] * factor for name in ("mean", "low", "high"))
+    name = simulation.case.travel_name
+    numbers = [Number(f"force at {name} {last[f'{name}_mm']:.3g} mm", mean, low, high, unit, percent)]
+    shares = {name: last[name] for name in SHARES if name in last and np.isfinite(last[name])}
+    if len(shares) > 1:
+        largest = max(shares, key=lambda name: shares[name])
+        share = f"{_percent(shares[largest], last[f'{largest}_error'])} of the variance"
+        numbers.append(Number("uncertain mostly by", largest, remark=share))
+    beyond = _last_mean(simulation.energy_beyond)
+    if beyond is not None:
+        numbers.append(Number("energy strained beyond the measurements", f"{100 * beyond:.0f} %"))
+    return tuple(numbers)
+
+
+def _next_step(simulation: Simulation) -> str:
+    if (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
+        return "measure up to the strains of the body: tissuq design RUN says which test helps most (RUN: the fit)"
+    return "run your own model with the same draws: tissuq ensemble RUN MODEL --material NAME --qoi NAME=WHAT"
 
 
 def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]:
@@ -203,38 +247,79 @@ def _write_fields(study: SimulationStudy, folder: Path) -> None:
     write_collection(folder / "middle_draw.pvd", files)
 
 
-def _context(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
-    simulation, model, failed = study.simulation, study.posteriors.fitted.model, study.simulation.failures
+def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...]:
+    """Return what a page folds: strains beyond, sources of uncertainty, fields, failures, how it was computed."""
+    simulation, settings = study.simulation, study.settings
     unit, factor = force_unit(table)
-    headers, rows = readable_forces(study)
-    count = int(table["draws"].max())
-    return {
-        "command": "structure",
-        "case": simulation.case,
-        "sizes": [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items()],
-        "material": model.material.name,
-        "discrepancy": model.discrepancy.name,
-        "data": model.experiment.name,
-        "lead": _lead(simulation, table),
-        "warnings": study.warnings,
-        "headers": headers,
-        "rows": rows,
-        "percent": f"{100 * band_probability(count):.0f}",
-        "draws": len(simulation.forces[COMPLETE]),
-        "complete": int(np.isfinite(simulation.forces[COMPLETE][:, -1]).sum()),
-        "is_shared": MATERIAL_ONLY in simulation.forces,
-        "is_compared": WITHOUT in simulation.forces,
-        "failures": [
-            [FAMILIES[failure.family], failure.number + 1, f"{failure.reached:.3g}", failure.problem]
-            for failure in failed
-        ],
-        "noise": f"{significant(simulation.noise_sd * factor)} {unit}",
-        "noise_is_given": study.settings.force_noise is not None,
-        "bulk_ratio": f"{study.settings.bulk_ratio:g}",
-        "cells": len(simulation.case.mesh().cells),
-        "seconds": f"{simulation.seconds:.0f}",
-        "mesh": simulation.mesh_change,
-    }
+    draws = len(simulation.forces[COMPLETE])
+    figures = cache(lambda: simulation_figures(simulation, table))
+    noise = f"{significant(simulation.noise_sd * factor)} {unit}"
+    origin = "the same share of the largest force as the test's noise is of its largest stress"
+    percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
+    against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
+    forces = Picture(
+        "forces", lambda: figures()["forces"], "Band of the force, and what is strained beyond the measurements",
+        f"Left: force over {simulation.case.travel_name}: mean and {percent} % band over draws of the posterior, "
+        f"without the noise of a measurement{against}. Right: how much of the body is strained beyond the measured I1 "
+        "or I2, and how much of the strain energy is there.",
+    )  # fmt: skip
+    sections = [Section("What is strained beyond the measurements", (forces,))]
+    if MATERIAL_ONLY in simulation.forces:
+        shares = Picture(
+            "shares", lambda: figures()["shares"], "Shares of the variance, and standard deviations",
+            f"Left: shares of the variance of a new measurement of the force; shaded, ± one standard error of {draws} "
+            "draws (bootstrap). Right: how much the force would spread by each part alone; where the total is less "
+            "than its parts, they compensate each other.",
+        )  # fmt: skip
+        said = ", as given" if settings.force_noise is not None else f": {origin}"
+        sentences = (
+            "Q is the force of a draw with its discrepancy, Q0 that of the same draw with its material parameters "
+            "alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of a new "
+            f"measurement's noise (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
+            "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
+            "posterior. A negative share means that more information on this part alone would not narrow the band.",
+        )
+        sections.append(Section("Sources of uncertainty", (shares, sentences)))
+    else:
+        said = " (as given)" if settings.force_noise is not None else f" ({origin})"
+        words = (
+            "The posterior is without discrepancy: the band is due to the parameters alone. Noise of a new measurement "
+            f"of the force: sd {noise}{said}."
+        )
+        sections.append(Section("Sources of uncertainty", (words,)))
+    if len(simulation.fields.get("largest", ())) > 1:
+        fields = Picture(
+            "fields", lambda: figures()["fields"], "Deformed section with mean and standard deviation of the largest "
+            "stretch",
+            "A section through the axis, deformed by the mean displacement at the last step. fields.vtu and "
+            "middle_draw.pvd hold the fields for ParaView.",
+        )  # fmt: skip
+        sections.append(Section("Where the body is strained", (fields,)))
+    if simulation.failures:
+        failures = [
+            [FAMILIES[failure.family], f"{failure.number + 1}", f"{failure.reached:.3g}", failure.problem]
+            for failure in simulation.failures
+        ]
+        failed = Table(["draws", "number", "reached, mm", "reason"], failures, text_columns=(0, 3))
+        sections.append(Section("Draws that were not completed", (failed,)))
+    change = simulation.mesh_change
+    mesh = (
+        f" On a mesh of twice the fineness the force of one draw at {change[1]:.3g} mm changes by "
+        f"{100 * change[0]:+.1f} %."
+        if change
+        else ""
+    )
+    computed = (
+        f"{draws} draws of the posterior, each stable in every loading mode over the measured range, each a complete "
+        f"material including the discrepancy in the energy. Bulk modulus: {settings.bulk_ratio:g} times the draw's "
+        "initial shear modulus.",
+        f"{len(simulation.case.mesh().cells)} axisymmetric quadrilaterals with one pressure and one volume each (mean "
+        f"dilatation), FElupe's; Newton's method with load steps that are halved where it fails.{mesh}",
+        "Numbers after ± are bootstrap standard errors from the number of draws. "
+        f"{simulation.seconds:.0f} s of one processor.",
+    )
+    sizes = [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items()]
+    return (*sections, Section("How it was computed", (computed, Table(["size", "value"], sizes))))
 
 
 def _size(name: str, value: float | str) -> str:
@@ -246,7 +331,7 @@ def _size(name: str, value: float | str) -> str:
 def _lead(simulation: Simulation, table: pd.DataFrame) -> str:
     """Return the finding in a sentence or two."""
     unit, factor = force_unit(table)
-    last_step: dict[str, Any] = dict(table[table["draws"] > 1].iloc[-1].items())  # type: ignore[arg-type]
+    last_step = _last_step(table)
     mean, _, ends = _band(last_step, factor, "")
     percent = f"{100 * band_probability(int(last_step['draws'])):.0f} %"
     name = simulation.case.travel_name
@@ -256,3 +341,8 @@ def _lead(simulation: Simulation, table: pd.DataFrame) -> str:
         without, _, without_ends = _band(last_step, factor, "without_")
         text += f" Without discrepancy it is {without} {unit} ({without_ends} {unit})."
     return text
+
+
+def _last_step(table: pd.DataFrame) -> dict[str, Any]:
+    """Return the last row with a band."""
+    return {str(name): value for name, value in table[table["draws"] > 1].iloc[-1].items()}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.drawing import pieces
-from tissuq.drawing.style import BAND, BASE, INK, STYLE, TRUTH
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
 from tissuq.finite_elements.case import AXIAL, RADIAL, Mesh
 from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["force_unit", "simulation_figures", "write_collection", "write_vtu"]
+__all__ = ["SHARES", "draw_shares", "force_figure", "force_unit", "simulation_figures", "write_collection", "write_vtu"]
 
 FloatArray = NDArray[np.float64]
 
@@ -58,12 +58,14 @@ def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str,
     return figures
 
 
-def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
-    """Draw the bands of the force, and beside them what of the body is strained beyond the measurements."""
-    from matplotlib.figure import Figure
+def force_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
+    """Return the bands of the force, for the head of a page."""
+    with new_figure(ANSWER_WIDTH, 3.9) as figure:
+        _draw_forces(figure.subplots(), simulation, table[table["draws"] > 1])
+    return figure
 
-    figure = Figure(figsize=(9.6, 3.9))
-    axis, share_axis = figure.subplots(1, 2, width_ratios=(1.75, 1))
+
+def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> None:
     unit, factor = force_unit(table)
     travel = _from_zero(table[f"{simulation.case.travel_name}_mm"])
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
@@ -78,6 +80,15 @@ def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
     axis.set_ylabel(f"force [{unit}]")
     axis.set_xlim(0, simulation.case.travel)
     axis.legend(fontsize=9)
+
+
+def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
+    """Draw the bands of the force, and beside them what of the body is strained beyond the measurements."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.6, 3.9))
+    axis, share_axis = figure.subplots(1, 2, width_ratios=(1.75, 1))
+    _draw_forces(axis, simulation, table)
     for rows, label, color in (
         (simulation.energy_beyond, "of the strain energy", INK), (simulation.volume_beyond, "of the volume", BASE),
     ):  # fmt: skip
@@ -108,12 +119,7 @@ def _shares(simulation: Simulation, table: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(9.6, 3.9))
     axis, sd_axis = figure.subplots(1, 2)
     travel = table[f"{simulation.case.travel_name}_mm"].to_numpy()
-    axis.axhline(0, color=INK, lw=0.8)
-    for name, color in SHARES.items():
-        share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
-        axis.fill_between(travel, share - error, share + error, color=color, alpha=0.2, lw=0)
-        axis.plot(travel, share, "o-", color=color, lw=1.6, ms=3.5, label=name)
-    axis.set_title("Share of the variance [%]")
+    draw_shares(axis, travel, table, SHARES)
     unit, factor = force_unit(table)
     sizes = {
         "force of a draw": (table["sd"], INK, "-"),
@@ -130,6 +136,17 @@ def _shares(simulation: Simulation, table: pd.DataFrame) -> Figure:
         panel.set_xlabel(f"{simulation.case.travel_name} [mm]")
         panel.legend(fontsize=9)
     return figure
+
+
+def draw_shares(axis: Axes, along: Any, table: pd.DataFrame, colors: Mapping[str, str]) -> None:
+    """Draw the shares of a variance, ± their standard errors, over time or travel."""
+    axis.axhline(0, color=INK, lw=0.8)
+    for name, color in colors.items():
+        share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
+        pieces.band(axis, along, share - error, share + error, color=color, strength=0.2)
+        pieces.line(axis, along, share, color=color, label=name, marker="o", ms=3.5)
+    axis.set_title("Share of the variance [%]")
+    axis.legend(fontsize=9)
 
 
 def _fields(simulation: Simulation) -> Figure:

@@ -15,16 +15,16 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
 from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.pictures.curves import Described, described
+from tissuq.pictures.curves import Described
 from tissuq.posterior.posterior import Posterior
 from tissuq.report.answer import ANSWER, answer_record, readable_estimates, shown_and_folded
 from tissuq.report.chart import chart_data
-from tissuq.report.figures import BAND, BASE, INK, new_figure
+from tissuq.report.figures import BAND, BASE, INK, described_curves, new_figure
+from tissuq.report.inputs import inputs_of
 from tissuq.report.run_folder import (
     ASSESSMENT,
     HELD_OUT_TESTS,
     INPUT,
-    copied_laws,
     write_data,
     write_figures,
     write_page,
@@ -50,8 +50,6 @@ from tissuq.report.tables import (
     write_csv,
     write_json,
 )
-from tissuq.studies.laws import LawSettings
-from tissuq.studies.measured_file import MeasuredFile
 from tissuq.studies.specimen import SpecimenSettings, SpecimenStudy
 
 if TYPE_CHECKING:
@@ -112,7 +110,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
     record = answer_record(_title(study), study.main, study.answer, study.unit, study.warnings)
     write_json(folder / ANSWER, record)
-    found = {name: described(posterior.solution) for name, posterior in study.posteriors.items()}
+    found = {name: described_curves(posterior) for name, posterior in study.posteriors.items()}
     if figures:
         write_figures(folder, _figures(study, found))
     context = _context(study, summary, record)
@@ -124,41 +122,14 @@ def write_inputs(
     settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path], folder: Path, *, figures: bool
 ) -> str:
     """Write copies of the files and laws, recipe and measurements of a fit; return the command in the recipe."""
+    inputs = inputs_of(settings, experiment, sources)
     (folder / INPUT).mkdir()
-    named = list(settings.laws) if isinstance(settings, LawSettings) else [settings.material]
-    copies = [copied_laws(name, folder) for name in named]
-    relocated = _with_copied_files(settings, experiment, sources, folder)
-    without = frozenset(MeasuredFile.model_fields) if settings.tests else frozenset(["tests"])
-    if isinstance(settings, LawSettings):
-        relocated, without = relocated | {"laws": tuple(copies)}, without | {"material"}
-    else:
-        relocated |= {"material": copies[0]}
-    options = "".join(f" --material {name}" for name in copies) if copies != named else ""
-    command = f"fit{'' if figures else ' --no-figures'}{options}"
-    write_recipe(folder, command, settings.model_copy(update=relocated), without=without)
+    for name, source in inputs.files.items():
+        shutil.copyfile(source, folder / name)
+    command = f"fit{'' if figures else ' --no-figures'}{inputs.options}"
+    write_recipe(folder, command, inputs.recipe, without=inputs.without)
     write_data(folder, experiment, stress_unit(experiment.stress_unit))
     return command
-
-
-def _with_copied_files(
-    settings: SpecimenSettings, experiment: Experiment, sources: Sequence[Path], folder: Path
-) -> dict[str, Any]:
-    """Return the settings of what was measured with the names of the files' copies, which go with the run."""
-    files = list(dict.fromkeys(sources))
-    names = [file.name for file in files]
-    copy_of = {
-        file: f"{INPUT}/{number}-{file.name}" if names.count(file.name) > 1 else f"{INPUT}/{file.name}"
-        for number, file in enumerate(files, 1)
-    }
-    for file, copy in copy_of.items():
-        shutil.copyfile(file, folder / copy)
-    if not settings.tests:
-        return {"file": copy_of[sources[0]], "mode": experiment.mode.name}
-    tests = [
-        test.model_copy(update={"file": copy_of[source], "name": measured.name, "mode": measured.mode.name})
-        for test, source, measured in zip(settings.tests, sources, experiment.tests, strict=True)
-    ]
-    return {"tests": tuple(tests)}
 
 
 def _assessment_row(name: str, assessment: Assessment) -> Row:

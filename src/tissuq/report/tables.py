@@ -176,7 +176,7 @@ def write_csv(path: Path, rows: list[Row]) -> None:
         writer.writerows(rows)
 
 
-def write_json(path: Path, content: Sequence[Row] | Row) -> None:
+def write_json(path: Path, content: Sequence[Row] | Mapping[str, Any]) -> None:
     """Write rows, or one record, as JSON, which knows no nan: null stands for it."""
     path.write_text(json.dumps(_without_nan(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 

@@ -7,9 +7,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import Any
 
-from tissuq.report.result import few_and_others
+from tissuq.report.result import NumberRecord, Record, TableRecord, UseRecord, few_and_others
 from tissuq.result_warning import Severity, in_shell
 
 __all__ = ["print_explanations", "print_result", "print_rows", "print_warnings"]
@@ -54,12 +53,12 @@ def print_explanations(explanations: Sequence[str]) -> None:
         print(fill(text, TEXT_WIDTH, initial_indent="- ", subsequent_indent="  "))
 
 
-def print_result(record: dict[str, Any], folder: Path | None = None, *, details: bool = False) -> None:
+def print_result(record: Record, folder: Path | None = None, *, details: bool = False) -> None:
     """Print the record of a result.
 
     Parameters
     ----------
-    record : dict
+    record : Record
         Of `Result.record`, or of `read_record`.
     folder : Path, optional
         The run folder, where there is one.
@@ -95,14 +94,14 @@ def print_result(record: dict[str, Any], folder: Path | None = None, *, details:
     print(f"Report: {folder / 'report.html'}")
 
 
-def _print_numbers(numbers: Sequence[dict[str, Any]]) -> None:
+def _print_numbers(numbers: Sequence[NumberRecord]) -> None:
     width = max((len(number["name"]) for number in numbers), default=0)
     for number in numbers:
         remark = f", {number['remark']}" if number["remark"] else ""
         print(f"  {number['name']:<{width}}  {number['text']}{remark}")
 
 
-def _print_uses(uses: Sequence[dict[str, Any]]) -> None:
+def _print_uses(uses: Sequence[UseRecord]) -> None:
     width = max((len(use["verdict"]) for use in uses), default=0)
     for use in uses:
         start = f"  {use['verdict'].upper():<{width}}  "
@@ -110,7 +109,7 @@ def _print_uses(uses: Sequence[dict[str, Any]]) -> None:
                    subsequent_indent=" " * len(start)))  # fmt: skip
 
 
-def _print_table(table: dict[str, Any]) -> None:
+def _print_table(table: TableRecord) -> None:
     print_rows(table["title"], table["headers"], table["rows"])
     if table["note"]:
         print(fill(_plain(table["note"]), TEXT_WIDTH))

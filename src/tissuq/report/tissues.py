@@ -1,14 +1,14 @@
-"""The run folder of the benchmark on real tissue: tables, a figure and the report."""
+"""The result of the benchmark on real tissue: how often bands hold, by formulation, protocol and class of tissue."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tissuq.drawing.panels import legend_above
-from tissuq.drawing.style import BASE, STYLE
-from tissuq.report.coverage_figures import COLORS, MARKERS, panel_grid
-from tissuq.report.run_folder import write_figures, write_page
+from tissuq.drawing.style import STYLE
+from tissuq.report.coverage import numbers_of_shares
+from tissuq.report.coverage_figures import dots_by_row, panel_grid, shares_figure
+from tissuq.report.result import Picture, Result, Section, Table
 from tissuq.report.tables import significant
 from tissuq.validation.tissues import TissueSettings, summarise_tissues
 from tissuq.validation.tissues.benchmark import ALL, PROBABILITIES, TARGET_HALF_WIDTH, TARGET_INSIDE
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["readable_tissues", "write_tissues"]
+__all__ = ["readable_tissues", "tissue_result"]
 
 SHARES = {"inside_50": "in 50 %", "inside_80": "in 80 %", "inside_95": "in 95 %", "useful": "useful"}
 RATIOS = {"half_width": "half width", "error": "error", "score": "score"}
@@ -41,35 +41,91 @@ SMALLEST_SHOWN = 1.0
 """Where it begins."""
 MIN_TIMES = 10.0
 """Ratio to the stress from which it is given as so many times, not in per cent."""
-MOVED = 0.16
-"""Distance of the marks of two formulations, in rows."""
 
 
-def write_tissues(settings: TissueSettings, results: list[dict[str, Any]], folder: Path) -> pd.DataFrame:
-    """Write the tables as CSV, the figure and report.html beside the results; return the summary."""
+def tissue_result(settings: TissueSettings, results: list[dict[str, Any]]) -> Result:
+    """Return what a benchmark on real tissue says."""
     import pandas as pd
 
     summary = summarise_tissues(results)
-    summary.to_csv(folder / "summary.csv", index=False)
-    pd.DataFrame(map(_plain, results)).to_csv(folder / "predictions.csv", index=False)
-    write_figures(folder, {"tissues": _figure(summary)})
-    tables = {
-        protocol: (TESTS[protocol], *readable_tissues(summary[summary["protocol"] == protocol]))
-        for protocol in dict.fromkeys(summary["protocol"])
-    }
-    write_page(
-        folder,
-        "tissues.html",
-        settings=settings,
-        tables=tables,
-        has_moduli=bool(summary["modulus_inside"].notna().any()),
-        sets=list(dict.fromkeys(result["tissue"] for result in results)),
-        failures=_failures(results),
-        inside=100 * TARGET_INSIDE,
-        width=100 * TARGET_HALF_WIDTH,
-        command="study tissues",
+    predictions = pd.DataFrame(map(_plain, results))
+    sets = list(dict.fromkeys(result["tissue"] for result in results))
+    nominal, by_class = PROBABILITIES[-1], summary[summary["class"] != ALL]
+    tables = tuple(
+        Table(
+            *readable_tissues(rows),
+            TESTS.get(str(protocol), str(protocol)),
+            (1,) if rows["class"].nunique() > 1 else (),
+        )
+        for protocol, rows in summary.groupby("protocol", sort=False, observed=True)
     )
-    return summary
+    return Result(
+        command="study tissues",
+        title="Do predictions of real tests hold?",
+        subject=f"benchmark on real tissue, {len(sets)} set{'s' * (len(sets) > 1)} of measured tests, material "
+        f"{settings.material}",
+        numbers=numbers_of_shares(by_class, "inside_95", nominal, "measurements inside the band of"),
+        finding="Every test is predicted from a fit of others that does not see it: one material, "
+        f"{' or '.join(settings.formulations)} as its discrepancy, {_errors_in_words(settings)}.",
+        next_step="see how your own tests are predicted from one another: tissuq study tissues FOLDER",
+        picture=Picture(
+            "answer",
+            lambda: shares_figure(by_class, "inside_95", 100 * nominal, PANELS["inside_95"][0]),
+            "Share of the measurements in the 95 % band", "A mark for each protocol and class of tissue; line: "
+            "nominal.",
+        ),
+        tables=tables,
+        sections=_sections(settings, summary, results, sets),
+        files={
+            "summary.csv": summary,
+            "predictions.csv": predictions,
+        },
+    )  # fmt: skip
+
+
+def _errors_in_words(settings: TissueSettings) -> str:
+    if settings.tolerances is None:
+        return "everything else as by default"
+    sizes = ", ".join(f"{name} {size:g}" for name, size in settings.tolerances.items())
+    return f"errors of the tests {sizes or 'none'}"
+
+
+def _sections(
+    settings: TissueSettings, summary: pd.DataFrame, results: list[dict[str, Any]], sets: list[str]
+) -> tuple[Section, ...]:
+    """Return what a page folds: by class of tissue, how to read it, what was not predicted, the sets."""
+    figure = Picture(
+        "tissues", lambda: _figure(summary), "Coverage, half width and error by class of tissue",
+        "Share of the measurements in the 95 % band, half width of the band and error of its median, by class of "
+        "tissue. Grey lines: the nominal share, and the half width up to which a prediction counts as useful. Marks at "
+        "the edges may lie beyond them.",
+    )  # fmt: skip
+    reading = [
+        "In 50, 80 and 95 %: share of the measurements inside the central interval of a new test with noise, mean over "
+        "the predictions; it should be near the nominal one.",
+        "Half width: root mean square of half of the 95 % band; error: that of its median's error; both over the root "
+        "mean square of the stress, median over the predictions.",
+        "Score: the mean interval score of the 95 % band (its width, plus a penalty for measurements outside) over the "
+        "root mean square of the stress, median over the predictions. Lower is better.",
+        f"Useful: share of the predictions with {100 * TARGET_INSIDE:g} % or more of the measurements in a band whose "
+        f"half width is below {100 * TARGET_HALF_WIDTH:g} % of the stress.",
+    ]
+    if summary["modulus_inside"].notna().any():
+        reading.append(
+            "Modulus in: share of the 95 % intervals of the initial shear modulus from the fitted tests that hold the "
+            "median of the one from the predicted test; upper / lower end: ratio of the ends of that interval, median."
+        )
+    reading += [
+        "A discrepancy in stress (such as gp) says nothing about a mode that was not fitted, and is left out of its "
+        "prediction.",
+        f"At most {settings.points} measurements are taken from a test, and at most {settings.predictions} predictions "
+        "are made for each set and protocol.",
+    ]
+    sections = [Section("By class of tissue", (figure,)), Section("How to read it", (tuple(reading),))]
+    if failures := _failures(results):
+        sections.append(Section("Not predicted", (tuple(failures),)))
+    own = "" if settings.folder else " (those that come with tissuq: `tissuq datasets` tells their sources)"
+    return (*sections, Section("Sets", (f"{', '.join(sets)}{own}.",)))
 
 
 def readable_tissues(summary: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
@@ -115,21 +171,17 @@ def _figure(summary: pd.DataFrame) -> Figure:
 
     protocols = list(dict.fromkeys(summary["protocol"]))
     classes = list(dict.fromkeys(summary["class"]))
-    names = list(dict.fromkeys(summary["formulation"]))
     with rc_context(STYLE):
         figure, axes = panel_grid(len(protocols), len(PANELS), 0.8 + 0.26 * len(classes))
         for row, protocol in zip(axes, protocols, strict=True):
             table = summary[summary["protocol"] == protocol]
             for axis, (measure, (_, target)) in zip(row, PANELS.items(), strict=True):
-                for number, name in enumerate(names):
-                    lines = table[table["formulation"] == name]
-                    shift = MOVED * (0.5 * (len(names) - 1) - number)
-                    heights = [len(classes) - 1 - classes.index(label) + shift for label in lines["class"]]
-                    values = (100 * lines[measure]).clip(SMALLEST_SHOWN if measure in RATIOS else 0.0, LARGEST_SHOWN)
-                    style: dict[str, Any] = {"color": COLORS[number % len(COLORS)], "label": name}
-                    axis.plot(values, heights, MARKERS[number % len(MARKERS)], markersize=5, **style)
-                if target is not None:
-                    axis.axvline(target, color=BASE, linewidth=1, zorder=0)
+                low = SMALLEST_SHOWN if measure in RATIOS else 0.0
+                series = {
+                    str(name): (lines["class"], (100 * lines[measure]).clip(low, LARGEST_SHOWN), None)
+                    for name, lines in table.groupby("formulation", sort=False, observed=True)
+                }
+                dots_by_row(axis, classes, series, target, is_named=axis is row[0])
                 if measure == "inside_95":
                     axis.set_xlim(-2, 102)
                 else:
@@ -137,8 +189,6 @@ def _figure(summary: pd.DataFrame) -> Figure:
                     axis.set_xlim(0.8 * SMALLEST_SHOWN, 1.2 * LARGEST_SHOWN)
                     axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
                     axis.xaxis.set_minor_formatter("")
-                axis.set_yticks(range(len(classes)), classes[::-1] if axis is row[0] else [""] * len(classes))
-                axis.set_ylim(-0.6, len(classes) - 0.4)
                 if ALL in classes and len(classes) > 1:
                     axis.axhline(0.5, color="#dddddd", linewidth=0.8, zorder=0)
             row[0].set_title(TESTS[protocol])

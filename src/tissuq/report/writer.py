@@ -7,11 +7,11 @@ import shlex
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints, is_typeddict
 
 from tissuq.errors import InputError
 from tissuq.report.answer import ANSWER
-from tissuq.report.result import RESULT, Result, few_and_others
+from tissuq.report.result import RESULT, Record, Result, few_and_others
 from tissuq.report.run_folder import RECIPE, write_data, write_figures, write_page, write_recipe
 from tissuq.report.tables import write_csv, write_json
 from tissuq.studies.settings import damage_reported
@@ -52,7 +52,7 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> None:
 
 
 def _write(path: Path, content: Any) -> None:
-    """Write what stands in a file: rows, text, bytes, a copy of a file, or what a function writes there."""
+    """Write what stands in a file: rows, a table of pandas, text, bytes, a copy, or what a function writes there."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if callable(content):
         content(path)
@@ -62,13 +62,15 @@ def _write(path: Path, content: Any) -> None:
         path.write_bytes(content)
     elif isinstance(content, str):
         path.write_text(content, encoding="utf-8", errors="surrogateescape")
+    elif hasattr(content, "to_csv"):
+        content.to_csv(path, index=False)
     elif path.suffix == ".csv":
         write_csv(path, content)
     else:
         write_json(path, content)
 
 
-def read_record(folder: Path) -> dict[str, Any] | None:
+def read_record(folder: Path) -> Record | None:
     """Return the record of a result in a run folder; None where it has none.
 
     Raises
@@ -80,10 +82,21 @@ def read_record(folder: Path) -> dict[str, Any] | None:
     if not path.exists():
         return None
     with damage_reported(path):
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if missing := {"title", "numbers", "warnings", "tables", "sections"} - set(record):
-            raise ValueError(f"{', '.join(sorted(missing))} is missing")
-    return record
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if not _is_of(content, Record):
+            raise ValueError("something else than a record")
+        record: Record = content
+        return record
+
+
+def _is_of(value: Any, kind: Any) -> bool:
+    """Return whether what was read has all that a type says."""
+    if is_typeddict(kind):
+        parts = get_type_hints(kind)
+        return isinstance(value, dict) and all(name in value and _is_of(value[name], parts[name]) for name in parts)
+    if get_origin(kind) is list:
+        return isinstance(value, list) and all(_is_of(item, get_args(kind)[0]) for item in value)
+    return isinstance(value, kind)
 
 
 def contents_for_programs(folder: Path) -> dict[str, Any]:

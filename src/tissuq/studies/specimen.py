@@ -44,6 +44,7 @@ __all__ = [
     "parameters_of",
     "priors_in_mpa",
     "run_specimen",
+    "steps_of",
     "warnings_of_files",
 ]
 
@@ -112,16 +113,23 @@ class SpecimenStudy:
         return [name for name, posterior in self.posteriors.items() if posterior.solution.is_approximate]
 
 
+def steps_of(settings: SpecimenSettings) -> int:
+    """Return the number of steps that `run_specimen` announces."""
+    return len(_names(settings)) * (2 if settings.held_out else 1) + 1
+
+
 def run_specimen(
     settings: SpecimenSettings,
     folder: Path = Path(),
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
     found: Sequence[Reading | None] = (),
+    early: Callable[[SpecimenStudy], None] = lambda study: None,
 ) -> SpecimenStudy:
     """Read the file, or those of several tests, and fit the material with every chosen discrepancy.
 
-    What has been read of every test may be given as ``found``.
+    What has been read of every test may be given as ``found``. ``early`` is given the study when all is fitted and
+    nothing is assessed yet: its answer is there.
 
     Settings may come from a file, so that a law of the user's own which they name is not run; it is given as ``law``.
 
@@ -135,8 +143,7 @@ def run_specimen(
     experiment = Experiment.of([reading.experiment for reading in readings])
     material = law or material_named(settings.material)
     unit = stress_unit(experiment.stress_unit)
-    is_all = settings.discrepancies == (ALL,)
-    names = _every() if is_all else list(dict.fromkeys(settings.discrepancies))
+    is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
     priors = priors_in_mpa(settings, symbols, unit)
     posteriors, seconds, skipped = {}, {}, {}
@@ -160,6 +167,8 @@ def run_specimen(
     if not posteriors:
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
+    read_warnings = warnings_of_files(readings)
+    early(SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {}, read_warnings))
     step("assessing")
     assessments = {
         name: posterior.assess()
@@ -185,7 +194,7 @@ def run_specimen(
         held_out += [
             {"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in predictions
         ]
-    results = settings, experiment, posteriors, seconds, skipped, assessments, warnings_of_files(readings)
+    results = settings, experiment, posteriors, seconds, skipped, assessments, read_warnings
     return SpecimenStudy(*results, tuple(held_out))
 
 
@@ -247,6 +256,11 @@ def _warning_of_file(text: str) -> ResultWarning:
     if is_doubtful(text):
         return ResultWarning(text, "doubtful-reading", Severity.PROBLEM)
     return ResultWarning(text, "stress-at-rest" if STRESS_AT_REST in text else "measurements")
+
+
+def _names(settings: SpecimenSettings) -> list[str]:
+    """Return the discrepancies that are asked for."""
+    return _every() if settings.discrepancies == (ALL,) else list(dict.fromkeys(settings.discrepancies))
 
 
 def _every() -> list[str]:

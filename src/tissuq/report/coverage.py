@@ -1,0 +1,186 @@
+"""The result of a campaign on coverage: how often intervals hold the truth, by formulation, and what they cost."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from tissuq.report.coverage_figures import campaign_figures, shares_figure
+from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
+from tissuq.report.tables import significant
+from tissuq.validation.coverage import CoverageSettings, summarise, summarise_unseen
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["coverage_result", "numbers_of_shares", "readable_coverage"]
+
+Rows = tuple[list[str], list[list[str]]]
+
+MIN_RELATIVE_ERROR = 1e-9
+"""Monte Carlo error, relative to its number, below which it is rounding and shown as zero."""
+SETTING_HEADERS = {
+    "design": "design",
+    "strength": "strength",
+    "noise": "noise",
+    "family": "family",
+    "mode": "loading mode",
+}
+MODES = (
+    "The true stress against the {percent} % band of the stress itself, at stretches above one up to where I1 or I2 "
+    "leaves the range that was measured. The error is the median over materials of the root mean square error of the "
+    "posterior mean, relative to the stress. A discrepancy that is an energy is part of the prediction; the others "
+    "(none, constant, linear, quadratic, gp) do not apply to another mode and are left out."
+)
+ERRORS = "Numbers after ± are Monte Carlo standard errors."
+BARS = "Bars are 95 % Monte Carlo intervals"
+
+
+def coverage_result(settings: CoverageSettings, results: list[dict[str, Any]]) -> Result:
+    """Return what a campaign says."""
+    summary, families = summarise(settings, results), summarise(settings, results, "family")
+    tables = {"summary": summary, "families": families}
+    if settings.unseen:
+        tables["unseen"] = summarise_unseen(settings, results)
+    percent = f"{100 * settings.prob:g}"
+    headers, rows = readable_coverage(summary)
+    families_word = "families or materials" if len(settings.families) > 1 else "family or material"
+    designs = f"{len(settings.designs)} designs" if len(settings.designs) > 1 else f"design {settings.designs[0].label}"
+    scale = f", C10 from {settings.scale[0]:g} to {settings.scale[1]:g} MPa" if settings.scale else ""
+    holding = f"intervals that hold the true C10 [%]; line: {percent} %"
+    return Result(
+        command="study coverage",
+        title="Do the intervals contain the truth?",
+        subject=f"coverage study, {len(settings.families)} {families_word}, {settings.replicates} replicates of each, "
+        f"{designs}, noise {' and '.join(settings.noise)}{scale}",
+        numbers=numbers_of_shares(summary, "coverage", settings.prob, "coverage of"),
+        finding="Every replicate is a member of its family, measured with independent noise and fitted as neo-Hookean. "
+        f"Coverage is the share of {percent} % intervals of C10 that contain half the true initial shear modulus of "
+        "the material.",
+        next_step="use the formulation whose coverage is nominal in all designs: tissuq fit FILE --discrepancy NAME",
+        picture=Picture(
+            "answer", lambda: shares_figure(summary, "coverage", 100 * settings.prob, holding),
+            "Coverage of every formulation", "Coverage, a mark for each design, strength and noise."
+        ),
+        tables=(Table(headers, rows, "Coverage of C10", _words(headers), ERRORS),),
+        sections=_sections(settings, tables, percent),
+        files={f"{name}.csv": table for name, table in tables.items()},
+    )  # fmt: skip
+
+
+def _words(headers: list[str]) -> tuple[int, ...]:
+    """Return the columns up to the formulation, which are no numbers."""
+    return tuple(range(1, headers.index("formulation") + 1))
+
+
+def numbers_of_shares(table: pd.DataFrame, column: str, prob: float, words: str) -> tuple[Number, ...]:
+    """Return the mean share of some formulations, the nearest to the nominal one first, with its range."""
+    shares = table.groupby("formulation", sort=False)[column].agg(["mean", "min", "max"]).dropna()
+    shares = shares.iloc[(shares["mean"] - prob).abs().argsort(kind="stable").to_numpy()]
+    numbers = []
+    for name, row in shares.head(MAX_NUMBERS).iterrows():
+        ends = f"; {row['min']:.0%} to {row['max']:.0%} by case" if row["max"] > row["min"] else ""
+        numbers.append(Number(f"{words} '{name}'", f"{row['mean']:.0%}", remark=f"nominal {prob:.0%}{ends}"))
+    return tuple(numbers)
+
+
+def _sections(settings: CoverageSettings, tables: dict[str, pd.DataFrame], percent: str) -> tuple[Section, ...]:
+    """Return what a page folds: coverage and price, other loading modes, families, how to read it."""
+    figures = cache(lambda: campaign_figures(tables, settings.prob))
+    is_series = len(settings.strengths) > 1
+    coverage = Picture(
+        "coverage", lambda: figures()["coverage"],
+        f"Coverage and price {'over the strength of the error of the model' if is_series else 'of every formulation'}",
+        f"Left: share of intervals that hold the truth. Right: interval score over the width of an oracle's. {BARS}."
+        if is_series
+        else f"Share of intervals that contain the truth, and their width and score. {BARS}; grey lines, the ideal.",
+    )  # fmt: skip
+    sections = [Section("Coverage and its price", (coverage,))]
+    if settings.unseen:
+        unseen = Picture("unseen", lambda: figures()["unseen"], "Coverage and error in unseen loading modes",
+                         f"Coverage and error of the stress in other loading modes. {BARS}.")  # fmt: skip
+        headers, rows = _readable_unseen(tables["unseen"])
+        table = Table(headers, rows, text_columns=_words(headers))
+        words = MODES.format(percent=percent)
+        sections.append(Section("Stress in loading modes that were not measured", (words, unseen, table)))
+    if tables["families"]["family"].nunique() > 1:
+        families = Picture("families", lambda: figures()["families"], "Coverage by family and design",
+                           "Share of intervals that hold the truth, in percent: white where it is nominal, orange "
+                           "where it is lower.")  # fmt: skip
+        headers, rows = readable_coverage(tables["families"])
+        table = Table(headers, rows, text_columns=_words(headers))
+        sections.append(Section("By family", (families, table)))
+    failed = int(tables["summary"]["failed"].sum())
+    unit = ", in units of C10" if settings.scale else ", MPa"
+    reading = [
+        f"A design is its range of stretches, number of measurements (n) and noise (sd{unit}).",
+        f"Coverage should be near {percent} %; the lower it is, the more often the interval misses the truth.",
+        "Score is the mean interval score: width, plus a penalty if it misses the truth. It is given over the true "
+        "C10, and over the width of the interval of an oracle that knows everything but C10 (mean, with its error, "
+        "then median). Lower is better.",
+        "Width is the median ratio to the oracle's. Bias is that of the posterior mean, relative to the truth.",
+    ]
+    if settings.predictive:
+        reading.append(
+            f"New data in band: share of new measurements at the same stretches inside the {percent} % predictive band."
+        )
+    reading.append(ERRORS)
+    reading += [f"{failed} fits failed, and are left out."] * bool(failed)
+    how: tuple[Block, ...] = (tuple(reading),)
+    return (*sections, Section("How to read it", how))
+
+
+def readable_coverage(summary: pd.DataFrame) -> Rows:
+    """Return headers and rows of a summary as text, with Monte Carlo errors; columns with one value are left out."""
+    headers = {
+        "fits": ("fits", "count"),
+        "coverage": ("coverage", "percent"),
+        "score": ("score / C10", "number"),
+        "price": ("score / oracle", "number"),
+        "price_median": ("(median)", "plain"),
+        "width": ("width / oracle", "number"),
+        "bias": ("bias", "percent"),
+        "predictive": ("new data in band", "percent"),
+    }
+    return _readable(summary, headers)
+
+
+def _readable_unseen(table: pd.DataFrame) -> Rows:
+    headers = {
+        "materials": ("materials", "count"),
+        "coverage": ("true stress in band", "percent"),
+        "error": ("error of the mean", "percent"),
+    }
+    return _readable(table, headers)
+
+
+def _readable(table: pd.DataFrame, headers: dict[str, tuple[str, str]]) -> Rows:
+    varying = [name for name in SETTING_HEADERS if name in table and table[name].nunique() > 1]
+    columns = {
+        name: header
+        for name, header in headers.items()
+        if name in table and (header[1] != "count" or table[name].nunique() > 1)
+    }
+    rows = [
+        [
+            *(f"{row[name]:g}" if name == "strength" else str(row[name]) for name in varying),
+            str(row["formulation"]),
+            *(_with_error(row, name, kind) for name, (_, kind) in columns.items()),
+        ]
+        for row in table.to_dict("records")
+    ]
+    return [*(SETTING_HEADERS[name] for name in varying), "formulation", *(text for text, _ in columns.values())], rows
+
+
+def _with_error(row: Any, name: str, kind: str) -> str:
+    """Return a number and its Monte Carlo standard error as text: a share in percent, or any other number."""
+    value, error = row[name], row.get(f"{name}_error")
+    if kind == "count":
+        return f"{value:.0f}"
+    if kind == "plain":
+        return significant(value)
+    if error != error:  # of one data set
+        return significant(100 * value) + " %" if kind == "percent" else significant(value)
+    if kind == "percent":
+        return f"{100 * value:.1f} ± {100 * error:.1f} %"
+    return f"{significant(value)} ± {significant(error if error > MIN_RELATIVE_ERROR * abs(value) else 0.0, 2)}"

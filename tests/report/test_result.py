@@ -1,0 +1,189 @@
+"""A result is written, read, printed and shown the same way, whatever command it comes from."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from pydantic import BaseModel
+
+from tissuq.assessment.answer import Use, Verdict
+from tissuq.errors import InputError
+from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table, few_and_others
+from tissuq.report.terminal import print_result
+from tissuq.report.writer import contents_for_programs, read_record, write_result
+from tissuq.result_warning import ResultWarning, Severity
+
+
+class Settings(BaseModel):
+    file: str = "a.csv"
+
+
+def warnings_of(*severities):
+    return tuple(ResultWarning(f"warning {n}", severity=severity) for n, severity in enumerate(severities))
+
+
+def result_of(**changes):
+    arguments = {
+        "command": "design --option",
+        "title": "Title <b>",
+        "subject": "subject & co",
+        "numbers": (Number("modulus", 81.34, 79.02, 83.71, "kPa"), Number("best test", "planar", remark="by far")),
+        "finding": "**Strong** and `code` and <i>.",
+        "uses": (Use("report it", Verdict.CARE, "known to ± 3 %"),),
+        "next_step": "type tissuq design {run}",
+        "picture": Picture("answer", Figure, "words", "caption"),
+        "tables": (Table(["name", "value"], [["a", "1"]], "Main table", note="Of `all`."),),
+        "sections": (
+            Section("Folded", ("A paragraph.", ("first", "second"), Picture("more", Figure, "alt", "caption 2"),
+                               Section("Deeper", (Preformatted("<pre>"), Table(["x"], [["deep"]]))))),
+        ),
+        "recipe": Settings(),
+    }  # fmt: skip
+    return Result(**arguments | changes)
+
+
+@pytest.mark.parametrize(
+    ("number", "text", "beside"),
+    [
+        (Number("x", 81.34, 79.02, 83.71, "kPa"), "81.3 kPa", "95 % interval 79.0 to 83.7"),
+        (Number("x", 0.5), "0.5", ""),
+        (Number("x", "planar", remark="by far"), "planar", "by far"),
+        (Number("x", 1.0, 1.0, 1.0, "MPa", "95 % band"), "1 MPa", "95 % band 1 to 1"),
+    ],
+)
+def test_a_number_is_rounded_by_the_width_of_its_interval(number, text, beside):
+    assert (number.text, number.beside) == (text, beside)
+
+
+def test_at_most_three_warnings_are_shown_the_severest_first_and_notes_are_folded():
+    caution, note, problem = Severity.CAUTION, Severity.NOTE, Severity.PROBLEM
+    record = result_of(warnings=warnings_of(note, caution, caution, problem, caution)).record()
+    shown, others = few_and_others(record["warnings"])
+    assert [warning["text"] for warning in shown] == ["warning 3", "warning 1", "warning 2"]
+    assert [warning["text"] for warning in others] == ["warning 4", "warning 0"]
+    assert few_and_others(result_of(warnings=warnings_of(note)).record()["warnings"])[0] == []
+
+
+def test_every_kind_of_content_is_written(tmp_path):
+    rows = [{"a": 1, "b": None}, {"a": 2.5, "b": "x"}]
+    (tmp_path / "source.txt").write_text("copied")
+    folder = tmp_path / "run"
+    folder.mkdir()
+    files = {
+        "rows.csv": rows,
+        "rows.json": rows,
+        "table.csv": pd.DataFrame({"a": [0.5]}, index=["left out"]),
+        "text.txt": "text",
+        "bytes.bin": b"\x00",
+        "input/copy.txt": tmp_path / "source.txt",
+        "deep/function.txt": lambda path: path.write_text("by function"),
+    }
+    write_result(result_of(files=files, picture=None, sections=()), folder)
+    with (folder / "rows.csv").open(newline="") as lines:
+        assert list(csv.DictReader(lines)) == [{"a": "1", "b": ""}, {"a": "2.5", "b": "x"}]
+    assert json.loads((folder / "rows.json").read_text()) == rows
+    texts = [(folder / name).read_bytes() for name in list(files)[2:]]
+    assert texts == [b"a\n0.5\n", b"text", b"\x00", b"copied", b"by function"]
+    assert not (folder / "figures").exists()
+
+
+def test_the_recipe_says_the_command_and_that_there_are_no_figures(tmp_path):
+    write_result(result_of(), tmp_path, figures=False)
+    assert "tissuq design --no-figures --option --config run.toml" in (tmp_path / "run.toml").read_text()
+    assert "tissuq design --no-figures --option --config run.toml" in (tmp_path / "report.html").read_text()
+    assert not (tmp_path / "figures").exists()
+    assert "<img" not in (tmp_path / "report.html").read_text()
+
+
+def test_figures_of_an_earlier_run_go(tmp_path):
+    write_result(result_of(), tmp_path)
+    assert {path.name for path in (tmp_path / "figures").glob("*.svg")} == {"answer.svg", "more.svg"}
+    write_result(result_of(sections=()), tmp_path)
+    assert {path.name for path in (tmp_path / "figures").glob("*.svg")} == {"answer.svg"}
+
+
+def test_the_page_begins_with_the_answer_and_escapes_what_it_is_given(tmp_path):
+    write_result(result_of(warnings=warnings_of(*[Severity.CAUTION] * 5)), tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    body = page[page.index("<main>") :]
+    assert body.index("81.3 kPa") < body.index("Next:") < body.index("<img") < body.index("warning 0")
+    assert len(re.sub(r"<[^>]*>", " ", body[: body.index("<img")]).split()) < 60
+    assert "Title &lt;b&gt;" in body
+    assert "<strong>Strong</strong> and <code>code</code> and &lt;i&gt;." in body
+    assert "&lt;pre&gt;" in body
+    unfolded = re.sub(r"<details.*?</details>", "", body, flags=re.DOTALL)
+    assert unfolded.count('class="warning') == 3
+    assert "Further warnings and notes: 2" in body
+
+
+def test_the_record_of_a_folder_is_that_of_the_result(tmp_path):
+    assert read_record(tmp_path) is None
+    result = result_of(warnings=warnings_of(Severity.NOTE))
+    write_result(result, tmp_path, figures=False)
+    assert read_record(tmp_path) == json.loads(json.dumps(result.record()))
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", "null", '{"title": 1}', "[" * 100_000, "9" * 5000])
+def test_a_damaged_record_is_one_message(tmp_path, content):
+    (tmp_path / "result.json").write_text(content)
+    with pytest.raises(InputError, match="damaged"):
+        read_record(tmp_path)
+
+
+@pytest.mark.parametrize("part", ["numbers", "tables", "sections", "warnings", "uses", "next"])
+def test_a_record_whose_parts_are_something_else_is_damaged(tmp_path, part):
+    record = result_of().record() | {part: [3]}
+    (tmp_path / "result.json").write_text(json.dumps(record))
+    with pytest.raises(InputError, match="damaged"):
+        read_record(tmp_path)
+
+
+def test_programs_get_every_json_file_with_the_folder_in_the_next_step(tmp_path):
+    with pytest.raises(InputError, match="not the folder of a complete run"):
+        contents_for_programs(tmp_path)
+    write_result(result_of(files={"rows.json": [{"a": 1}]}), tmp_path, figures=False)
+    contents = contents_for_programs(tmp_path)
+    assert contents["rows"] == [{"a": 1}]
+    assert contents["result"]["next"] == f"type tissuq design {tmp_path}"
+
+
+def test_the_terminal_says_the_answer_first_and_counts_the_rest(tmp_path, capsys):
+    record = result_of(warnings=warnings_of(*[Severity.CAUTION] * 5)).record()
+    print_result(record, tmp_path)
+    out = capsys.readouterr().out
+    words = [
+        "81.3 kPa, 95 % interval",
+        "Strong and code",
+        "WITH CARE",
+        "Next: type",
+        "Main table",
+        "Of all.",
+        "warning 2",
+    ]
+    assert [out.index(word) for word in words] == sorted(out.index(word) for word in words)
+    assert "warning 3" not in out
+    assert "A paragraph" not in out
+    joined = " ".join(out.split())
+    assert "Folded; further warnings and notes (2): tissuq show" in joined
+    assert out.endswith(f"Report: {tmp_path / 'report.html'}\n")
+
+
+def test_details_leave_nothing_out(tmp_path, capsys):
+    record = result_of(warnings=warnings_of(*[Severity.CAUTION] * 5)).record()
+    print_result(record, tmp_path, details=True)
+    out = capsys.readouterr().out
+    for word in ("warning 4", "A paragraph.", "- second", "Deeper", "deep"):
+        assert word in out
+    assert "--details" not in out
+
+
+def test_a_problem_stands_above_the_answer(capsys):
+    print_result(result_of(warnings=warnings_of(Severity.PROBLEM)).record())
+    out = capsys.readouterr().out
+    assert out.index("warning 0") < out.index("81.3 kPa")
+    assert "Report" not in out
