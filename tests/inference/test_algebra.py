@@ -76,3 +76,34 @@ def test_spectral_covariance_is_the_dense_one():
         np.testing.assert_allclose(own.solved(columns)[place], np.linalg.solve(dense, columns[place]), rtol=1e-10)
         np.testing.assert_allclose(own.precision[place], np.diag(np.linalg.inv(dense)), rtol=1e-11)
         assert own.log_determinant[place] == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-11)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+def test_linear_parameters_are_integrated_as_by_solving_and_a_determinant(count):
+    """Few parameters entry by entry, more by the library: both against another way, on matrices of condition 1e6."""
+    generator = np.random.default_rng(count)
+    columns = generator.standard_normal((3, 2, 12, count)) * np.logspace(0, -3, count)
+    precision, pull = columns.swapaxes(2, 3) @ columns, generator.standard_normal((3, 2, count, 4))
+    found = integrated(precision, pull, np.full((3, 2, 4), 50.0))
+    means = np.linalg.solve(precision, pull)
+    assert found.log_volume == pytest.approx(-0.5 * np.linalg.slogdet(precision)[1], rel=1e-9)
+    assert found.root @ found.scores == pytest.approx(means, rel=1e-8)
+    assert found.root @ found.root.swapaxes(2, 3) == pytest.approx(np.linalg.inv(precision), rel=1e-8)
+    assert found.misfit == pytest.approx(50.0 - (pull * means).sum(axis=2), rel=1e-8)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("entry", [0.0, -1.0])
+def test_a_precision_that_is_not_positive_is_refused(count, entry):
+    precision = np.stack([np.eye(count), np.diag([*[1.0] * (count - 1), entry])])
+    with pytest.raises(np.linalg.LinAlgError):
+        integrated(precision, np.ones((2, count, 1)), np.ones((2, 1)))
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_a_precision_that_is_no_number_spoils_no_other(count):
+    """A law that locks has no stress at some exponents, which the search leaves out."""
+    precision = np.stack([np.eye(count), np.full((count, count), np.nan)])
+    found = integrated(precision, np.ones((2, count, 1)), np.full((2, 1), 50.0))
+    assert found.misfit[0] == pytest.approx(50.0 - count)
+    assert np.isnan(found.misfit[1])

@@ -39,6 +39,8 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 
 
+MAX_FEW_PARAMETERS = 4
+"""Linear parameters up to which NumPy's functions for matrices cost more than the entries one by one."""
 MAX_VARIANCES_AT_ONCE = 4_000_000
 """Variances computed at once: what bounds the memory."""
 
@@ -158,8 +160,8 @@ def integrated(precision: Any, pull: Any, size: Any) -> Integrated:
         When A is not positive to working precision; JAX gives nan instead.
     """
     arrays = precision.__array_namespace__()
-    if arrays is np and precision.shape[-1] == 1:
-        return _one_integrated(precision, pull, size)
+    if arrays is np and 0 < precision.shape[-1] <= MAX_FEW_PARAMETERS:
+        return _few_integrated(precision, pull, size)
     triangle = arrays.linalg.cholesky(precision)
     root = arrays.linalg.inv(triangle).mT
     scores = root.mT @ pull
@@ -167,13 +169,26 @@ def integrated(precision: Any, pull: Any, size: Any) -> Integrated:
     return Integrated(log_volume, size - (scores**2).sum(axis=-2), root, scores)
 
 
-def _one_integrated(precision: FloatArray, pull: FloatArray, size: FloatArray) -> Integrated:
-    """Return `integrated` of a single parameter, where the library's overhead would be most of the work."""
-    if not (precision > 0).all():
-        raise np.linalg.LinAlgError("the precision of the linear parameter is not positive")
-    root = 1 / np.sqrt(precision)
-    scores = root * pull
-    return Integrated(np.log(root[..., 0, 0]), size - scores[..., 0, :] ** 2, root, scores)
+def _few_integrated(precision: FloatArray, pull: FloatArray, size: FloatArray) -> Integrated:
+    """Return `integrated` of few parameters, entry by entry: for small matrices the library's overhead is most."""
+    p = precision.shape[-1]
+    triangle: dict[tuple[int, int], FloatArray] = {}
+    inverse = np.zeros(precision.shape)
+    log_volume = np.zeros(precision.shape[:-2])
+    for i in range(p):
+        for j in range(i):
+            known = sum(triangle[i, k] * triangle[j, k] for k in range(j))
+            triangle[i, j] = (precision[..., i, j] - known) * inverse[..., j, j]
+        square = precision[..., i, i] - sum(triangle[i, k] ** 2 for k in range(i))
+        if (square <= 0).any():  # what is no number stays none, as with the library
+            raise np.linalg.LinAlgError("the precision of the linear parameters is not positive")
+        inverse[..., i, i] = 1 / np.sqrt(square)
+        log_volume -= 0.5 * np.log(square)
+        for j in range(i):
+            known = sum(triangle[i, k] * inverse[..., k, j] for k in range(j, i))
+            inverse[..., i, j] = -known * inverse[..., i, i]
+    scores = inverse @ pull
+    return Integrated(log_volume, size - (scores**2).sum(axis=-2), inverse.swapaxes(-1, -2), scores)
 
 
 def condition(
