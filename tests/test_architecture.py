@@ -19,7 +19,7 @@ ROOT = Path(tissuq.__file__).parent
 STAGES = [
     "errors", "registry", "result_warning", "parameters", "drawing", "experiments", "mechanics", "model", "inference",
     "prediction", "assessment", "next_test", "pictures", "posterior", "population", "export", "finite_elements",
-    "decks", "emulation", "studies", "validation", "report", "cli", "__main__",
+    "decks", "emulation", "studies", "validation", "report", "app", "cli", "__main__",
 ]  # fmt: skip
 
 

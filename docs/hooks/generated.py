@@ -51,6 +51,7 @@ GUIDES = {
     "discrepancies": ["what-it-computes.md", "energy.md"],
     "datasets": ["gallery.md"],
     "show": ["by-example.md"],
+    "app": ["app.md"],
     "schema": ["by-example.md"],
 }
 """The pages to read beside that of a command."""

@@ -100,7 +100,8 @@ def test_what_is_implausible_in_the_measurements_comes_first():
     offset = posterior.answer_with([ResultWarning("at stretch 1 the stress is already 4 kPa.", "stress-at-rest")])
     assert offset.uses[0].verdict is Verdict.NO
     assert "stress at rest" in offset.uses[0].reason
-    assert "first warning" in offset.next_step.shell
+    assert offset.uses[1].verdict is Verdict.CARE
+    assert "--load-zero first" in offset.next_step.shell
     slack = ResultWarning("the first 25 rows carry no load: give --preload auto.")
     assert "first warning" in vague.answer_with([slack]).next_step.shell
     assert "design" in vague.answer.next_step.shell

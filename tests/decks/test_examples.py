@@ -22,6 +22,7 @@ from tissuq.decks.model_run import ModelRun, carried_out
 from tissuq.decks.solver import CalculiXSolver
 from tissuq.export import CardSettings, card_format
 from tissuq.finite_elements import FElupeMaterial
+from tissuq.mechanics.laws import Rivlin
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 pytestmark = [
@@ -52,10 +53,10 @@ def draws():
     return draw
 
 
-def run(ensemble, deck, material, quantities, folder):
-    cards = card_format("calculix").cards(ensemble, CardSettings(bulk_modulus=BULK))
+def run(ensemble, deck, material, quantities, folder, source=EXAMPLES, card=None):
+    card = card or card_format("calculix").cards(ensemble, CardSettings(bulk_modulus=BULK)).blocks[0]
     task = ModelRun(
-        "complete", 0, EXAMPLES, deck, "abaqus", ((material, cards.blocks[0]),), CalculiXSolver(),
+        "complete", 0, source, deck, "abaqus", ((material, card),), CalculiXSolver(),
         tuple(parse_quantity(name, text) for name, text in quantities.items()),
         ((material.upper(), ensemble.most),), folder / "draw",
     )  # fmt: skip
@@ -78,24 +79,34 @@ def mesh_of(deck):
     return points, numbers[:, 1:] - 1, sets
 
 
-def plate_in_felupe(draw):
+def plate_in_felupe(material, travel=1.0):
     """Return the force on the plate's upper edge, and the displacements, from FElupe with the same reduced elements."""
     felupe = pytest.importorskip("felupe")
     points, cells, sets = mesh_of("plate.inp")
     mesh = felupe.Mesh(points, cells, "hexahedron20")
     region = felupe.RegionQuadraticHexahedron(mesh, quadrature=felupe.GaussLegendre(order=1, dim=3))
     field = felupe.FieldContainer([felupe.Field(region, dim=3)])
-    body = felupe.SolidBody(FElupeMaterial(draw, BULK, unit=1e-3), field)
+    body = felupe.SolidBody(material, field)
     fixed = {"LEFT": 0, "BOTTOM": 1, "BACK": 2, "TOP": 1}
     bounds = {
         name: felupe.Boundary(field[0], mask=sets[name], skip=[axis != own for axis in range(3)])
         for name, own in fixed.items()
     }
-    travel = np.linspace(0, 1.0, 6)[1:]
-    step = felupe.Step([body], ramp={bounds["TOP"]: travel}, boundaries=bounds)
+    steps = np.linspace(0, travel, 6)[1:]
+    step = felupe.Step([body], ramp={bounds["TOP"]: steps}, boundaries=bounds)
     felupe.CharacteristicCurve([step], boundary=bounds["TOP"]).evaluate(verbose=0, tol=1e-8)
     force = felupe.tools.force(field, body.results.force, bounds["TOP"])
     return 1e-3 * force[1], field
+
+
+def invariants_of(field):
+    """Return I1 - 3 and I2 - 3 (q, c) of the distortion, from the deformation gradients."""
+    gradient = np.moveaxis(field.extract()[0], (0, 1), (-2, -1))
+    right = np.swapaxes(gradient, -1, -2) @ gradient
+    volume = np.linalg.det(gradient)
+    first = np.trace(right, axis1=-2, axis2=-1) * volume ** (-2 / 3) - 3
+    inverse = np.trace(np.linalg.inv(right), axis1=-2, axis2=-1) * volume ** (2 / 3) - 3
+    return first, inverse
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -106,7 +117,7 @@ def test_the_plate_has_the_force_and_the_states_that_felupe_finds_on_its_mesh(dr
         ensemble, "plate.inp", "tissue", {"force": "RF2@TOP", "down": "RF2@BOTTOM", "pull": "U2@TOP"}, tmp_path
     )
     times, force = result["curves"]["force"]
-    wanted, field = plate_in_felupe(ensemble[0])
+    wanted, field = plate_in_felupe(FElupeMaterial(ensemble[0], BULK, unit=1e-3))
     assert times[-1] == 1.0
     assert force[-1] == pytest.approx(wanted, rel=1e-4)
     assert result["curves"]["down"][1][-1] == pytest.approx(-force[-1], rel=1e-4)
@@ -115,11 +126,7 @@ def test_the_plate_has_the_force_and_the_states_that_felupe_finds_on_its_mesh(dr
     frd = read_frd(tmp_path / "draw" / "plate.frd")
     fields = final_fields(frd)
     np.testing.assert_allclose(fields.displacement, field[0].values, atol=2e-5)
-    gradient = np.moveaxis(field.extract()[0], (0, 1), (-2, -1))
-    right = np.swapaxes(gradient, -1, -2) @ gradient
-    volume = np.linalg.det(gradient)
-    first = np.trace(right, axis1=-2, axis2=-1) * volume ** (-2 / 3) - 3
-    inverse = np.trace(np.linalg.inv(right), axis1=-2, axis2=-1) * volume ** (2 / 3) - 3
+    first, inverse = invariants_of(field)
     assert fields.materials.tolist() == ["TISSUE"] * 40
     ours = fields.invariants.T
     for found, theirs in zip(ours, (first, inverse), strict=True):  # nodes of an element against its points
@@ -131,6 +138,35 @@ def test_the_plate_has_the_force_and_the_states_that_felupe_finds_on_its_mesh(dr
     assert shares.values[0] == 0
     assert share_beyond(frd, {"FAT": median}) is None
     assert element_invariants(frd, 0).shape == (40, 2)
+
+
+@pytest.fixture(scope="module")
+def cortex():
+    """Two draws of a free energy, for which CalculiX has no law."""
+    return tq.fit(tq.datasets.load("brain-cortex-uniaxial")).ensemble(2)
+
+
+@pytest.mark.parametrize(("travel", "reach"), [(0.5, 1.0), (0.69, 1.5)])
+def test_a_projected_card_has_the_force_of_its_draw_within_the_error_that_it_states(cortex, tmp_path, travel, reach):
+    """The draw in FElupe, its card in FElupe and its card in CalculiX, inside of what was measured and beyond."""
+    pytest.importorskip("felupe")
+    deck = (EXAMPLES / "plate.inp").read_text(encoding="utf-8")
+    assert "\nTOP, 2, 2, 1.\n" in deck
+    (tmp_path / "plate.inp").write_text(deck.replace("\nTOP, 2, 2, 1.\n", f"\nTOP, 2, 2, {travel}\n"), encoding="utf-8")
+    cards = card_format("calculix").cards(cortex, CardSettings(bulk_modulus=BULK, law="polynomial", order=3))
+    for number, (draw, row) in enumerate(zip(cortex, cards.index, strict=True)):
+        wanted, field = plate_in_felupe(FElupeMaterial(draw, BULK, unit=1e-3), travel)
+        reached = max(each.max() / most for each, most in zip(invariants_of(field), cortex.most, strict=True))
+        assert reach - 0.25 < reached < reach
+        terms = {name.removeprefix("card_"): row[name] for name in row if name.startswith("card_C")}
+        card_material = FElupeMaterial(Rivlin(tuple(terms)), BULK, list(terms.values()), unit=1e-3)
+        by_card, _ = plate_in_felupe(card_material, travel)
+        result = run(
+            cortex, "plate.inp", "tissue", {"force": "RF2@TOP"}, tmp_path / str(number), tmp_path, cards.blocks[number]
+        )
+        force = result["curves"]["force"][1][-1]
+        assert force == pytest.approx(by_card, rel=1e-3)
+        assert force == pytest.approx(wanted, rel=row[f"error_within_{reach:g}_max"])
 
 
 def test_the_tube_opens_as_the_closed_form_says(draws, tmp_path):

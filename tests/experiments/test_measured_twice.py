@@ -78,3 +78,27 @@ def test_tabs_part_names_with_numbers_over_a_row_of_units(tmp_path, names):
     experiment = tq.read(path, columns={"displacement": names[1], "force": names[2]}, **SIZES)
     np.testing.assert_allclose(experiment.stretch, STRETCH, rtol=1e-5)
     np.testing.assert_allclose(experiment.stress, STRESS, rtol=1e-5, atol=1e-9)
+
+
+def test_of_a_load_and_an_extension_with_and_without_correction_the_corrected_ones_are_read_and_said(tmp_path):
+    extension, force = STRAIN * LENGTH, STRESS * AREA
+    columns = {
+        "Extension (mm)": 1.05 * extension,
+        "Corrected extension (mm)": extension,
+        "Load (N)": force + 0.1,
+        "Compliance corrected load (N)": force,
+    }
+    path = written(tmp_path / "test.csv", **columns)
+    with pytest.warns(UserWarning, match=r"'Corrected extension \(mm\)' is read, and not 'Extension \(mm\)' beside it"):
+        data = tq.read(path, dimensions=SIZES)
+    np.testing.assert_allclose(data.stretch, STRETCH, rtol=1e-6)
+    np.testing.assert_allclose(data.stress, STRESS, atol=1e-7)
+    with pytest.warns(UserWarning, match=r"'Load \(N\)' is read, and not 'Compliance corrected load \(N\)'"):
+        data = tq.read(path, dimensions=SIZES, force="Load (N)")
+    np.testing.assert_allclose(data.stress, STRESS + 0.1 / AREA, atol=1e-7)
+
+
+def test_a_corrected_column_alone_is_read_without_a_word(tmp_path, recwarn):
+    path = written(tmp_path / "test.csv", **{"Corrected extension (mm)": STRAIN * LENGTH, "Load (N)": STRESS * AREA})
+    np.testing.assert_allclose(tq.read(path, dimensions=SIZES).stretch, STRETCH, rtol=1e-6)
+    assert not list(recwarn)

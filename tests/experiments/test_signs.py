@@ -167,3 +167,34 @@ def test_the_zero_of_stresses_is_taken_off_and_inspect_proposes_it(tmp_path):
     for wrong in ("6", "six", "6 N", "6 mm"):
         with pytest.raises(InputError, match=r"load_zero \(--load-zero\) must be 'first', or a stress"):
             tq.read(path, load_zero=wrong)
+
+
+@pytest.mark.parametrize(
+    ("above", "names"),
+    [
+        ("", "Strain (compression) [%],Stress [kPa]"),
+        ("", "Axial compressive strain [%],Stress [kPa]"),
+        ("", "Compr. strain [%],Compr. stress [kPa]"),
+        ("Method: unconfined compression\nSample: 3\n", "Strain [%],Stress [kPa]"),
+        ("Art: Druckversuch\nProbe: 3\n", "Dehnung [%],Spannung [kPa]"),
+        ("Method: compr.\nSample: 3\n", "Strain [%],Stress [kPa]"),
+    ],
+)
+def test_compression_that_is_written_positive_is_asked_about_wherever_the_file_says_it(tmp_path, above, names):
+    path = tmp_path / "test.csv"
+    stretch = np.linspace(1, 0.7, 40)
+    rows = "".join(f"{100 * (1 - x):.9f},{-1e3 * neo_hookean(x):.9f}\n" for x in stretch)
+    path.write_text(f"{above}{names}\n{rows}")
+    with pytest.raises(InputError, match=r"compression.*--compression-positive"):
+        tq.read(path)
+    data = tq.read(path, compression_positive=True)
+    np.testing.assert_allclose(data.stretch, stretch, atol=1e-9)
+    np.testing.assert_allclose(data.stress, neo_hookean(stretch), atol=1e-9)
+
+
+@pytest.mark.parametrize("above", ["", "Frame: tension and compression\n", "Extension rate: 1 mm/min\n"])
+def test_where_nothing_says_compression_positive_strains_are_those_of_tension(tmp_path, above):
+    path = tmp_path / "test.csv"
+    rows = "".join(f"{x - 1:.9f},{1e3 * neo_hookean(x):.9f}\n" for x in TENSION)
+    path.write_text(f"{above}Strain,Stress [kPa]\n{rows}")
+    np.testing.assert_allclose(tq.read(path).stretch, TENSION, atol=1e-9)

@@ -206,3 +206,24 @@ def test_each_axis_of_a_sheet_is_counted_from_where_it_carries_load(tmp_path):
     np.testing.assert_allclose(data.stretch[-1], [1.4 / 1.05, 1.4 / 1.1], rtol=0.01)
     assert (data.stretch >= 0.999).all()
     assert 0 < data.least_errors["slack"] < 0.01
+
+
+@pytest.mark.parametrize(
+    ("moduli", "shortest"),
+    [((1.0, 0.3, 10.0), 0.5), ((1.0, 3.0, 10.0), 0.5), ((1.0, 3.0, 1.0), 0.4), ((1.0, 10.0, 0.0), 0.4)],
+)
+def test_the_stiffening_of_an_elastic_material_in_compression_is_no_slack(moduli, shortest):
+    # Yeoh: P = 2 (l - l^-2) (C10 + 2 C20 (I1 - 3) + 3 C30 (I1 - 3)^2); the same curve behind a fifth of the way is.
+    def stress(stretch):
+        c10, c20, c30 = moduli
+        away = stretch**2 + 2 / stretch - 3
+        return 2 * (stretch - stretch**-2) * (c10 + 2 * c20 * away + 3 * c30 * away**2)
+
+    stretch = np.linspace(1, shortest, 80)
+    assert find_slack(stretch, stress(stretch)) is None
+    trembling = stretch + np.where(np.arange(80) % 2, 1e-5, 0.0)
+    assert find_slack(trembling, stress(stretch)) is None
+    start = 1 - 0.2 * (1 - shortest)
+    slack = find_slack(stretch, stress(np.minimum(stretch / start, 1)))
+    assert slack is not None
+    assert slack.stretch == pytest.approx(start, abs=0.02 * (1 - shortest))

@@ -407,3 +407,56 @@ def test_shear_tests_beside_one_another_tell_their_mode(tmp_path):
         ("s1", "simple-shear", "a column of shear"), ("s2", "simple-shear", "a column of shear")
     ]  # fmt: skip
     assert tests[1].reading.experiment.stress == pytest.approx([0, 1.2e-3, 2.4e-3])
+
+
+def test_columns_that_r_names_by_specimen_and_quantity_are_tests_beside_one_another(tmp_path):
+    names = [f"{name}.{quantity}" for name in STIFFNESS for quantity in ("strain", "stress")]
+    path = written(tmp_path / "r.csv", pairs(names))
+    with pytest.warns(UserWarning, match="no unit of stress"):
+        tests = read_tests(path)
+    assert [test.name for test in tests] == ["s1", "s2", "s3"]
+    check(read_tests(path, stress_unit="kPa"), names=["s1", "s2", "s3"])
+
+
+def test_curves_that_a_digitizer_names_x_and_y_beneath_their_names_are_read_by_these(tmp_path):
+    stretch = ramp()
+    curves = [(stretch - 1, 1e3 * neo_hookean(stretch)), (stretch[:20] - 1, 1.5e3 * neo_hookean(stretch[:20]))]
+    rows = [["Longitudinal", "", "Circumferential", ""], ["X", "Y", "X", "Y"]]
+    for number in range(len(stretch)):
+        rows.append([cell(x[number]) if number < len(x) else "" for curve in curves for x in curve])
+    path = written(tmp_path / "wpd.csv", rows)
+    options = {"columns": {"strain": "X", "stress": "Y"}, "stress_unit": "kPa"}
+    tests = [test.reading.experiment for test in find_tests_in_file(path, **options)]
+    assert [(test.name, test.direction) for test in tests] == [
+        ("Longitudinal", "longitudinal"),
+        ("Circumferential", "circumferential"),
+    ]
+    for test, (strain, stress) in zip(tests, curves, strict=True):
+        np.testing.assert_allclose(test.stretch, 1 + strain, atol=2e-6)
+        np.testing.assert_allclose(test.stress, stress / 1e3, atol=2e-6)
+    with pytest.raises(InputError, match="several columns may be the stress"):
+        tq.read(path, **options)
+
+
+def test_sheets_named_after_directions_are_read_in_the_same_loading_mode(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for sheet, title in ((book.active, "Axial"), (book.create_sheet(), "Circ")):
+        sheet.title = title
+        sheet.append(["strain", "stress [kPa]"])
+        for stretch in ramp():
+            sheet.append([stretch - 1, 1e3 * neo_hookean(stretch)])
+    book.save(tmp_path / "aorta.xlsx")
+    tests = find_tests_in_file(tmp_path / "aorta.xlsx")
+    assert [(test.reading.experiment.direction, test.options["mode"]) for test in tests] == [
+        ("axial", "uniaxial"),
+        ("circ", "uniaxial"),
+    ]
+
+
+@pytest.mark.parametrize("line", ["Station Name: Biaxial.cfg", "Biaxial.cfg", "Machine: Biaxial", "Frame,Biaxial"])
+def test_the_name_of_a_machine_or_of_its_settings_is_no_loading_mode(tmp_path, line):
+    rows = "".join(f"{cell(x - 1)},{cell(1e3 * neo_hookean(x))}\n" for x in ramp())
+    (tmp_path / "test.txt").write_text(f"Test data\n{line}\n\nStrain,Stress (kPa)\n{rows}")
+    (test,) = find_tests_in_file(tmp_path / "test.txt")
+    assert (test.options["mode"], test.reading.mode_source) == ("uniaxial", "nothing says otherwise")

@@ -228,7 +228,11 @@ def test_an_unknown_format_is_refused_with_those_there_are():
 
 def test_the_modes_of_the_readers_are_those_of_the_index(auto):
     (row, *_) = card_format("abaqus").cards(auto, CardSettings()).index
-    assert {name[len("error_") : -len("_max")] for name in row if name.endswith("_max")} == {*PATHS, "states"}
+    assert {name[len("error_") : -len("_max")] for name in row if name.endswith("_max")} == {
+        *PATHS,
+        "states",
+        *(f"within_{reach}" for reach in ("1", "1.25", "1.5")),
+    }
 
 
 def test_a_bulk_modulus_near_zero_is_refused_and_a_small_one_is_warned_of(given):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.export.states import ANGLES, POINTS_PER_PATH, SeenStates, are_stable, differences, moduli
+from tissuq.export.draw_stresses import DrawStresses
+from tissuq.export.states import ANGLES, POINTS_PER_PATH, SeenStates, are_stable, moduli
 
 
 def test_states_keep_the_volume_and_end_where_an_invariant_was_largest(auto):
@@ -50,14 +51,14 @@ def test_a_discrepancy_adds_nothing_to_the_moduli(auto):
 
 def test_differences_are_relative_to_the_draws(given):
     wanted, found = given([("yeoh", [0.5, 0.1, 0.0])]), given([("yeoh", [0.6, 0.12, 0.0])])
-    for each in differences(found, wanted).values():
+    for each in DrawStresses(wanted).errors(found).values():
         assert np.abs(each) == pytest.approx(np.full_like(each, 0.2))
 
 
 def test_what_is_smaller_than_a_hundredth_of_a_neo_hookean_stress_counts_as_that(given):
     """A Yeoh material whose uniaxial stress vanishes where I1 - 3 = C10 / (2 |C20|) = 0.25."""
     wanted, found = given([("yeoh", [0.5, -1.0, 0.0])]), given([("yeoh", [0.5, -1.001, 0.0])])
-    apart = differences(found, wanted)["uniaxial"][0]
+    apart = DrawStresses(wanted).errors(found)["uniaxial"][0]
     low, high = wanted.ranges["uniaxial"]
     stretch = np.sort(np.concatenate([1 + (end - 1) * np.arange(1, 31) / 30 for end in (low, high)]))
     x = stretch**2 + 2 / stretch - 3

@@ -6,10 +6,15 @@ import re
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
+from matplotlib.figure import Figure
 
 import tissuq as tq
 from browser import FIRST_SCREEN, needs_chromium, opened
+from tissuq.assessment.answer import Use, Verdict
+from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table
 from tissuq.report.specimen import write_specimen_run
+from tissuq.report.writer import write_result
+from tissuq.result_warning import ResultWarning, Severity
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
 pytestmark = [needs_chromium, pytest.mark.slow]
@@ -41,6 +46,36 @@ def of_two_tests(tmp_path_factory):
     (folder / "run").mkdir()
     write_specimen_run(study, files, folder / "run")
     return folder / "run" / "report.html"
+
+
+@pytest.fixture(scope="module")
+def of_another_command(tmp_path_factory):
+    """The page of a result with every kind of block."""
+    table = Table(["name", "value"], [["a", "1"]], "Main table", note="Of `all`.")
+    deeper = Section("Deeper", (Preformatted("text"), Table(["x"], [["deep"]])))
+    result = Result(
+        command="design",
+        title="Which test to make next",
+        subject="two tests",
+        numbers=(Number("modulus", 81.34, 79.02, 83.71, "kPa"), Number("the best", "a test of a very long name " * 3)),
+        finding="**Strong** and `code`.",
+        uses=(Use("report it", Verdict.CARE, "known to ± 3 %"),),
+        next_step="type tissuq design {run}",
+        picture=Picture("answer", small_figure, "a line that rises", "A line."),
+        tables=(table,),
+        sections=(Section("Folded", ("A paragraph.", ("first", "second"), table, deeper)),),
+        warnings=(ResultWarning("a caution"), ResultWarning("a note", severity=Severity.NOTE)),
+        how_to_repeat="`tissuq design RUN`",
+    )
+    folder = tmp_path_factory.mktemp("other")
+    write_result(result, folder)
+    return folder / "report.html"
+
+
+def small_figure():
+    figure = Figure(figsize=(4, 3))
+    figure.subplots().plot([0, 1])
+    return figure
 
 
 def violations(page):
@@ -121,13 +156,21 @@ def test_number_verdicts_and_curve_begin_on_the_first_screen(of_one_test, width)
         assert reasons == ([True, False] if width > 820 else [False, True])
 
 
-@pytest.mark.parametrize("page_of", ["of_one_test", "of_two_tests"])
+@pytest.mark.parametrize("page_of", ["of_one_test", "of_two_tests", "of_another_command"])
 @pytest.mark.parametrize("width", [1200, 400])
 def test_axe_finds_nothing_that_shuts_someone_out(request, page_of, width):
     with opened(request.getfixturevalue(page_of), width, bypass_csp=True) as page:
         page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
         seen = violations(page)
         assert seen == {}, json.dumps(seen, indent=1)
+
+
+def test_the_page_of_any_command_has_verdicts_before_the_picture_on_a_small_screen(of_another_command):
+    with opened(of_another_command, 400) as page:
+        parts = (".numbers", ".uses", ".picture", ".reasons")
+        tops = [page.locator(part).first.bounding_box()["y"] for part in parts]
+        assert tops == sorted(tops)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
 
 
 def test_axe_finds_a_fault_that_is_planted(of_one_test):

@@ -211,8 +211,10 @@ def _own_tests(solution: Solution, inside: NDArray[np.bool_], codes: Collection[
     if held < MIN_INSIDE * count:
         return Verdict.NO, f"only {counts}"
     sentence = f"stress {width} on average where it was measured, {counts}"
-    if "unmodelled-curve" in codes:
-        return _worst(verdict, Verdict.CARE), f"{sentence}, but the fitted curve departs from the measured one"
+    for code, reason in (("unmodelled-curve", "the fitted curve departs from the measured one"),
+                         ("stress-at-rest", "there is stress at rest, where the material has none")):  # fmt: skip
+        if code in codes:
+            return _worst(verdict, Verdict.CARE), f"{sentence}, but {reason}"
     return verdict, sentence
 
 
@@ -306,6 +308,14 @@ STEPS: Mapping[str, Step] = {
         "act on the first warning: it concerns the measurements themselves.",
         "act on the first warning: it concerns the measurements themselves.",
     ),
+    "zero": Step(
+        "take off what the load cell shows at rest: fit again with --load-zero first, or as the first warning says.",
+        'take off what the load cell shows at rest: fit again with load_zero="first", or as the first warning says.',
+    ),
+    "few": Step(
+        "measure at more stretches, from near rest onward: tissuq design {run} says which.",
+        "measure at more stretches, from near rest onward: posterior.design() says which.",
+    ),
     "specimens": Step(
         "measure further specimens: how much they differ is assumed so far, and sets the width.",
         "measure further specimens: how much they differ is assumed so far, and sets the width.",
@@ -337,12 +347,16 @@ def _next_step(solution: Solution, uses: Sequence[Use], warnings: Sequence[Resul
     reporting, _, others, simulating = (use.verdict for use in uses)
     codes = {warning.code for warning in warnings}
     model = solution.model
-    if reporting is not Verdict.YES and not codes.isdisjoint({"measurements", "stress-at-rest"}):
+    if "stress-at-rest" in codes:
+        return STEPS["zero"]
+    if reporting is not Verdict.YES and "measurements" in codes:
         return STEPS["measurements"]
     if not solution.is_of_data:
         return STEPS["export"]
     if not model.energy_symbols and model.material.is_isotropic:
         return STEPS["auto"]
+    if "few-measurements" in codes and reporting is Verdict.NO:
+        return STEPS["few"]
     if "unstable" in codes:
         return STEPS["stable"]
     if reporting is not Verdict.YES:

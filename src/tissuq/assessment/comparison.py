@@ -21,7 +21,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.inference.marginal import Marginal, blended
 from tissuq.inference.solution import Marginals, Solution
-from tissuq.prediction.bands import predict_average, stress_ratio
+from tissuq.prediction.bands import predict_bands, stress_ratio
 from tissuq.prediction.densities import MAX_KHAT
 from tissuq.prediction.scores import judged
 
@@ -92,8 +92,9 @@ class Average:
         """Return the predicted engineering stress at new stretches, as a posterior does."""
         import pandas as pd
 
-        options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
-        table = pd.DataFrame(vars(predict_average(self._weighted_fits, stretch, **options)))
+        options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": mode}
+        (band,) = predict_bands(self._weighted_fits, stretch, (noise,), **options)
+        table = pd.DataFrame(vars(band))
         return in_unit(table, ["median", "low", "high"], self._unit.name)
 
     def _repr_html_(self) -> str:

@@ -208,6 +208,7 @@ def stable_draws(
     is_isotropic: Flags,
     data: Experiment,
     modes: Sequence[LoadingMode],
+    reach: float = 1.0,
 ) -> Flags:
     """Return whether draws (N,) are stable over the range that data measured, of all of some loading modes.
 
@@ -219,9 +220,11 @@ def stable_draws(
         Which draws have no preferred direction.
     data : Experiment
     modes : sequence of LoadingMode
+    reach : float
+        Beyond that range where it is above one: up to so many times the measured invariants.
     """
     stable = np.ones(len(is_isotropic), dtype=bool)
-    paths = [(mode, _measured(data, mode)) for mode in modes]
+    paths = [(mode, _measured(data, mode, reach)) for mode in modes]
     first_mode, first_stretch = paths[0]
     # The ends first, at little cost: most draws that are not stable fail there.
     at_ends = first_mode, np.unique([first_stretch[0], 1.0, first_stretch[-1]])

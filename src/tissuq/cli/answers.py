@@ -160,8 +160,7 @@ def _other_roles(text: str) -> list[str]:
 
 def _values(name: str) -> list[str]:
     from tissuq.experiments.modes import loading_modes
-    from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
-    from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+    from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 
     choices: dict[str, Iterable[str]] = {
         "mode": loading_modes(),

@@ -18,6 +18,7 @@ from tissuq.cli import (
     export,
     fit,
     inspect,
+    local_app,
     paper,
     population,
     predict,
@@ -77,7 +78,9 @@ def _tissuq(
 
 
 COMMANDS: dict[str, dict[str, Any]] = {
-    "Start here": {"init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show},
+    "Start here": {
+        "init": project.init, "inspect": inspect.inspect, "fit": fit.fit, "show": show.show, "app": local_app.app,
+    },
     "After a fit": {
         "predict": predict.predict, "compare": compare.compare, "design": design.design, "export": export.export,
         "structure": structure.structure, "ensemble": ensemble.ensemble,

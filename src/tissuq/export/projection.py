@@ -6,18 +6,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import SimpleShear
+from tissuq.export.draw_stresses import DrawStresses
 from tissuq.export.laws import Law
-from tissuq.export.states import MIN_RELATIVE_STRESS, SHEARS, SeenStates, initial_slope, moduli
+from tissuq.export.nearest_law import Candidate, NearestLaw, squared_distance
+from tissuq.export.stability_rows import StabilityRows
+from tissuq.export.states import SHEARS, PrincipalStates, initial_slope
 from tissuq.mechanics import Material, stress_basis
 from tissuq.mechanics.laws import Ogden, Rivlin
-from tissuq.posterior.ensemble import Ensemble
 
 __all__ = [
     "MixtureFit",
@@ -36,37 +38,24 @@ LADDER = (-4, -3, -2, -1, 1, 2, 3, 4)
 """Multiples of one step among which Ogden's exponents are chosen."""
 SINGLE_TERM_LADDER = tuple(step / 16 for step in range(-64, 65) if step)
 """The same for a single Ogden term, which needs a finer step."""
-REACHES = (2.0, 4.0, 8.0, 12.0)
+EXPONENT_REACHES = (2.0, 4.0, 8.0, 12.0)
 """The largest exponent of the ladder, times the largest logarithmic strain that was measured."""
 MAX_ORDER = 4
 """Order of a polynomial of both invariants, beyond which terms cancel to their last digits at small strains."""
 MAX_REDUCED_ORDER = 6
 """Order of a polynomial of I1, beyond which no code goes."""
 
-
-class Candidate(NamedTuple):
-    """Values of the parameters that are not linear, and what unit values of the k others give.
-
-    Attributes
-    ----------
-    setting : tuple of float
-    columns : (n, k) array
-        Stresses in the states.
-    unit_moduli : (k,) array
-        Initial shear moduli.
-    """
-
-    setting: tuple[float, ...]
-    columns: FloatArray
-    unit_moduli: FloatArray
+COMMON_WEIGHT_BEYOND = 0.1
+"""Weight of states beyond the measured ones where exponents are chosen, which all draws share."""
 
 
 @dataclass(frozen=True)
 class Projection(ABC):
     """A family of materials of some order, of which the one nearest to a draw is found by weighted least squares.
 
-    The stresses are those of `SeenStates`, each relative to the draw's own; the initial shear modulus is exactly the
-    draw's.
+    The stresses are those of the states that were measured and, with smaller weights, of those up to 1.5 times as large
+    invariants; each is relative to the draw's own. The initial shear modulus is exactly the draw's, and a law for a
+    stable draw is stable and its stresses rise up to there.
     """
 
     family: ClassVar[str]
@@ -78,33 +67,38 @@ class Projection(ABC):
 
     @property
     @abstractmethod
+    def order(self) -> int:
+        """The order, as a user gives it."""
+
+    @property
+    @abstractmethod
     def material(self) -> Material:
         """The material whose values are found."""
 
-    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+    def candidates(self, states: PrincipalStates) -> Iterator[Candidate]:
         """Return the values of the parameters that are not linear, among which the best are taken for all draws."""
         yield Candidate((), *_columns(self.material, states, ()))
 
-    def law(self, ensemble: Ensemble) -> Law:
+    def law(self, draws: DrawStresses) -> Law:
         """Return the nearest law to each draw.
 
         Candidates are compared with weights that all draws share; given the best, every draw has its own.
         """
-        states = SeenStates(ensemble.most)
-        stress, modulus = ensemble.stress(states, states.points), moduli(ensemble)
-        size = np.maximum(np.abs(stress), MIN_RELATIVE_STRESS * np.abs(modulus)[:, None] * states.of_unit_modulus)
-        common = 1 / size.mean(axis=0)
+        wanted, is_beyond = draws.of_states, draws.shell > 0
+        is_borne = np.isfinite(wanted.stress).all(axis=0)
+        common = np.where(
+            is_borne, np.where(is_beyond, COMMON_WEIGHT_BEYOND, 1.0) / draws.size_in_fits.mean(axis=0), 0.0
+        )
+        stress = np.where(is_borne, wanted.stress, 0.0)
 
         def loss(candidate: Candidate) -> float:
-            coefficients = _nearest(candidate, common, stress.T, modulus)
-            return float(((common[:, None] * (candidate.columns @ coefficients - stress.T)) ** 2).sum())
+            return squared_distance(candidate, common, stress.T, draws.modulus)
 
-        best = min(self.candidates(states), key=loss)
-        rows = [
-            _nearest(best, 1 / draw_size, draw_stress[:, None], np.array([draw_modulus]))[:, 0]
-            for draw_size, draw_stress, draw_modulus in zip(size, stress, modulus, strict=True)
-        ]
-        return Law(self.material, np.hstack([np.array(rows), np.tile(best.setting, (len(rows), 1))]))
+        best = min(self.candidates(draws.states), key=loss)
+        rows = StabilityRows.of(self.material, best.setting, draws.stability_states, draws.largest_invariants)
+        fits = (NearestLaw(best, rows, draws, number) for number in range(len(draws.ensemble)))
+        values = np.array([fit.values() for fit in fits])
+        return Law(self.material, np.hstack([values, np.tile(best.setting, (len(values), 1))]))
 
 
 @dataclass(frozen=True)
@@ -118,6 +112,10 @@ class PolynomialFit(Projection):
     @classmethod
     def of_order(cls, order: int) -> Self:
         return cls(full_terms(_checked(order, MAX_ORDER, "a polynomial")))
+
+    @property
+    def order(self) -> int:
+        return max(int(term[1]) + int(term[2]) for term in self.terms)
 
     @property
     def material(self) -> Material:
@@ -147,10 +145,14 @@ class OgdenFit(Projection):
         return cls(_checked(order, len(LADDER), "an Ogden projection"))
 
     @property
+    def order(self) -> int:
+        return self.terms
+
+    @property
     def material(self) -> Material:
         return Ogden(self.terms)
 
-    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+    def candidates(self, states: PrincipalStates) -> Iterator[Candidate]:
         return _on_ladders(self.terms, states)
 
 
@@ -167,10 +169,14 @@ class MixtureFit(Projection):
         return cls(_checked(order, MAX_REDUCED_ORDER, "a mixture"))
 
     @property
+    def order(self) -> int:
+        return self.terms
+
+    @property
     def material(self) -> Material:
         return Rivlin(reduced_terms(self.terms)) + Ogden(self.terms)
 
-    def candidates(self, states: SeenStates) -> Iterator[Candidate]:
+    def candidates(self, states: PrincipalStates) -> Iterator[Candidate]:
         polynomial, polynomial_moduli = _columns(Rivlin(reduced_terms(self.terms)), states, ())
         for ogden in _on_ladders(self.terms, states):
             unit_moduli = np.concatenate([polynomial_moduli, ogden.unit_moduli])
@@ -198,11 +204,11 @@ def _checked(order: int, max_order: int, kind: str) -> int:
     return order
 
 
-def _on_ladders(terms: int, states: SeenStates) -> Iterator[Candidate]:
+def _on_ladders(terms: int, states: PrincipalStates) -> Iterator[Candidate]:
     """Return Ogden sums of so many terms, with all choices of exponents from each ladder."""
     max_log_strain = float(np.abs(np.log(states.base)).max())
     ladder = np.array(SINGLE_TERM_LADDER if terms == 1 else LADDER, dtype=np.float64)
-    for reach in REACHES:
+    for reach in EXPONENT_REACHES:
         exponents = reach / (ladder[-1] * max_log_strain) * ladder
         blocks = [_columns(Ogden(len(LADDER)), states, block) for block in exponents.reshape(-1, len(LADDER))]
         columns, unit_moduli = (np.concatenate(arrays, axis=-1) for arrays in zip(*blocks, strict=True))
@@ -210,21 +216,7 @@ def _on_ladders(terms: int, states: SeenStates) -> Iterator[Candidate]:
             yield Candidate(tuple(exponents[selection]), columns[:, selection], unit_moduli[selection])
 
 
-def _columns(material: Material, states: SeenStates, setting: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _columns(material: Material, states: PrincipalStates, setting: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the stresses (n, k) and the initial shear moduli (k,), integers, of unit linear parameters."""
     shear_stress = stress_basis(material, SimpleShear().at(SHEARS), setting)
     return stress_basis(material, states.at(states.points), setting), np.round(initial_slope(shear_stress), 4)
-
-
-def _nearest(candidate: Candidate, weights: FloatArray, wanted: FloatArray, modulus: FloatArray) -> FloatArray:
-    """Return the linear parameters (k, N) nearest to stresses (n, N) by weights (n,) that have these moduli (N,)."""
-    unit_moduli = candidate.unit_moduli
-    pivot = int(np.argmax(np.abs(unit_moduli)))
-    start = np.zeros((len(unit_moduli), len(modulus)))
-    start[pivot] = modulus / unit_moduli[pivot]
-    free = np.delete(np.eye(len(unit_moduli)), pivot, axis=1)
-    free[pivot] = -np.delete(unit_moduli, pivot) / unit_moduli[pivot]
-    columns = weights[:, None] * (candidate.columns @ free)
-    size = np.abs(columns).max(axis=0, initial=0.0)
-    solution = np.linalg.lstsq(columns / size, weights[:, None] * (wanted - candidate.columns @ start), rcond=1e-12)[0]
-    return np.asarray(start + free @ (solution / size[:, None]))

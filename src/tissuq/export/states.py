@@ -1,4 +1,4 @@
-"""States of deformation that a calibration has seen, and how far the stresses of two ensembles are apart in them."""
+"""States of deformation that a calibration has seen, and those around them that a model may visit."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.stability import stable_draws
-from tissuq.experiments.modes import Deformation, LoadingMode, Path, SimpleShear, curve_modes
+from tissuq.experiments.modes import Deformation, Path, SimpleShear, curve_modes
 from tissuq.mechanics.arithmetic import exp, library
-from tissuq.mechanics.invariants import invariant_rates
 from tissuq.posterior.ensemble import Ensemble
 
 __all__ = [
     "ANGLES",
+    "PrincipalStates",
     "SeenStates",
     "are_stable",
-    "differences",
     "initial_slope",
     "mode_stretches",
     "moduli",
+    "states_between",
 ]
 
 FloatArray = NDArray[np.float64]
 
-ANGLES = (1.0, 15.0, 30.0, 45.0, 59.0)
+ANGLES = (1.0, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 59.0)
 """Lode angles in degrees: from uniaxial tension, 0, by planar tension, 30, to equibiaxial tension, 60.
 
 At 0 and 60 two stretches are equal, and the difference of their stresses carries no information; nearby it gives the
@@ -39,33 +39,27 @@ POINTS_PER_PATH = 30
 MAX_LOG_STRAIN = 5.0
 """Largest logarithmic strain of a state."""
 PAIRS = np.array([[1.0, -1.0, 0.0], [1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
-MIN_RELATIVE_STRESS = 0.01
-"""Smallest stress by which errors are divided, as a fraction of that of a neo-Hookean material of equal modulus."""
 SHEARS = np.array([1e-3, 2e-3])
 """Amounts of simple shear, from which the initial modulus follows."""
 
 
-class SeenStates(Path):
-    """All states between uniaxial and equibiaxial tension whose I1 and I2 were measured, each with three stresses.
+class PrincipalStates(Path):
+    """States of some principal stretches, each with three stresses.
 
-    Of an isotropic, incompressible material these are all states there are (compression along one axis is equibiaxial
-    tension). The stress at a point is a difference of two principal Cauchy stresses, the work per logarithmic strain of
-    one axis against the other; of the three of a state each is 2 (l_i^2 - l_j^2) (W1 + l_k^2 W2), so that relative
-    errors of these are relative errors of every stress in any test, and of the stiffness against leaving its path.
+    The stress at a point is a difference of two principal Cauchy stresses, the work per logarithmic strain of one axis
+    against the other; of the three of a state each is 2 (l_i^2 - l_j^2) (W1 + l_k^2 W2), so that relative errors of
+    these are relative errors of every stress in any test, and of the stiffness against leaving its path.
 
     Parameters
     ----------
-    most : (float, float)
-        The largest I1 - 3 and I2 - 3.
-    angles : sequence of float
-        Lode angles, degrees.
+    logs : (n, 3) array
+        Logarithmic strains, without change of volume.
     """
 
-    def __init__(self, max_invariants: tuple[float, float], angles: Sequence[float] = ANGLES) -> None:
-        rays = np.concatenate([_ray(max_invariants, np.radians(angle)) for angle in angles])
-        self.stretches = rays
-        self.base = np.tile(np.exp(rays.T), 3)
-        self.direction = np.repeat(PAIRS.T, len(rays), axis=1)
+    def __init__(self, logs: FloatArray) -> None:
+        self.logs = logs
+        self.base = np.tile(np.exp(logs.T), 3)
+        self.direction = np.repeat(PAIRS.T, len(logs), axis=1)
 
     @cached_property
     def points(self) -> FloatArray:
@@ -82,6 +76,34 @@ class SeenStates(Path):
         base, direction = arrays.asarray(self.base)[:, index], arrays.asarray(self.direction)[:, index]
         l1, l2, l3 = base * exp(direction * step)
         return Deformation.along_axes((l1, l2, l3))
+
+
+class SeenStates(PrincipalStates):
+    """All states between uniaxial and equibiaxial tension whose I1 and I2 were measured.
+
+    Of an isotropic, incompressible material these are all states there are (compression along one axis is equibiaxial
+    tension).
+
+    Parameters
+    ----------
+    max_invariants : (float, float)
+        The largest I1 - 3 and I2 - 3.
+    angles : sequence of float
+        Lode angles, degrees.
+    """
+
+    def __init__(self, max_invariants: tuple[float, float], angles: Sequence[float] = ANGLES) -> None:
+        super().__init__(np.concatenate([_ray(max_invariants, np.radians(angle)) for angle in angles]))
+
+
+def states_between(
+    max_invariants: tuple[float, float], factors: tuple[float, float], angles: Sequence[float] = ANGLES
+) -> PrincipalStates:
+    """Return states in which an invariant is between two factors, at least one, of the largest that were measured."""
+    low, high = factors
+    logs = SeenStates((high * max_invariants[0], high * max_invariants[1]), angles).logs
+    largest = np.stack([np.exp(sign * 2 * logs).sum(axis=1) - 3 for sign in (1, -1)], axis=1) / max_invariants
+    return PrincipalStates(logs[largest.max(axis=1) > low * (1 + 1e-9)])
 
 
 def mode_stretches(low: float, high: float) -> FloatArray:
@@ -102,34 +124,15 @@ def initial_slope(stress: FloatArray) -> FloatArray:
     return np.asarray((4 * near - far) / 3)
 
 
-def differences(draws: Ensemble, reference: Ensemble) -> dict[str, FloatArray]:
-    """Return the relative differences of stresses, (N, n) each, by loading mode and in the ``states`` that were seen.
-
-    A stress that is less than a hundredth of the neo-Hookean one with the draw's modulus counts as that.
-    """
-    modulus, states = moduli(reference)[:, None], SeenStates(reference.most)
-    paths: dict[str, tuple[LoadingMode | Path, FloatArray, FloatArray]] = {}
-    for mode in curve_modes():
-        stretch = mode_stretches(*reference.ranges[mode.name])
-        paths[mode.name] = mode, stretch, np.abs(0.5 * invariant_rates(mode.at(stretch))[0])
-    paths["states"] = states, states.points, states.of_unit_modulus
-    relative = {}
-    for name, (path, points, size) in paths.items():
-        truth = reference.stress(path, points)
-        floor = MIN_RELATIVE_STRESS * np.abs(modulus) * size
-        relative[name] = (draws.stress(path, points) - truth) / np.maximum(np.abs(truth), floor)
-    return relative
-
-
-def are_stable(ensemble: Ensemble) -> NDArray[np.bool_]:
-    """Return whether draws (N,) are stable over the range that was measured, in every mode of one stretch."""
+def are_stable(ensemble: Ensemble, reach: float = 1.0) -> NDArray[np.bool_]:
+    """Return whether draws (N,) are stable in every mode of one stretch, to so many times the measured invariants."""
 
     def curves_of(indices: NDArray[np.intp]) -> Any:
         selected = replace(ensemble, draws=tuple(ensemble[int(index)] for index in indices))
         return selected.stresses_at
 
     all_isotropic = np.ones(len(ensemble), dtype=bool)
-    return stable_draws(curves_of, all_isotropic, ensemble.model.experiment, curve_modes())
+    return stable_draws(curves_of, all_isotropic, ensemble.model.experiment, curve_modes(), reach)
 
 
 def _ray(max_invariants: tuple[float, float], angle: float) -> FloatArray:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
+from tissuq.finite_elements.energy_derivatives import gradient, gradient_and_hessian, is_arithmetic
 from tissuq.mechanics import Material
 from tissuq.mechanics.continuation import Continuation, sum_of_energies
 from tissuq.mechanics.pieces import PiecewiseEnergy
@@ -112,6 +113,8 @@ Numbers = tuple[Sequence[Sequence[Any]], PiecewiseEnergy | None, Continuation | 
 Slopes = Callable[[FloatArray], FloatArray]
 Derivatives = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
+ROUNDING = 1e-9
+"""Initial shear modulus over the sum of linear parameters that is nothing but rounding."""
 EQUAL_STRETCH_TOLERANCE = 1e-5
 """Relative difference of stretches below which a quotient of differences gives way to its limit: both have errors of
 about 1e-10 there, the quotient that of rounding and the limit that of its next term."""
@@ -194,7 +197,7 @@ def _volume(F: FloatArray) -> tuple[FloatArray, FloatArray]:
 class DistortionalEnergy:
     """W(J^(-1/3) l1, J^(-1/3) l2, J^(-1/3) l3) of an isotropic material, J = l1 l2 l3.
 
-    The compiled derivatives serve all draws of a posterior, because the parameters are arguments.
+    Where an energy must be compiled, its derivatives serve all draws of a posterior: the parameters are arguments.
 
     Attributes
     ----------
@@ -219,23 +222,40 @@ class DistortionalEnergy:
 
     def slopes(self, stretches: FloatArray) -> FloatArray:
         """Return the gradient (3, n), MPa, at principal stretches (3, n)."""
+        if self._is_arithmetic:
+            return gradient(self._of_isochoric, stretches)
         return np.asarray(_compiled(self.materials)[0](self._numbers, stretches))
 
     def derivatives(self, stretches: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the gradient (3, n) and the Hessian (3, 3, n), MPa, at principal stretches (3, n)."""
-        gradient, hessian = _compiled(self.materials)[1](self._numbers, stretches)
-        return np.asarray(gradient), np.asarray(hessian)
+        if self._is_arithmetic:
+            return gradient_and_hessian(self._of_isochoric, stretches)
+        slopes, curvature = _compiled(self.materials)[1](self._numbers, stretches)
+        return np.asarray(slopes), np.asarray(curvature)
 
     def __call__(self, stretches: FloatArray) -> FloatArray:
         """Return the energy (n,), MPa, at principal stretches (3, n)."""
-        isochoric = tuple(np.asarray(stretches) / np.prod(stretches, axis=0) ** (1 / 3))
-        return np.asarray(sum_of_energies(self.materials, self.values, isochoric, self.discrepancy, self.continuation))
+        return np.asarray(self._of_isochoric(tuple(np.asarray(stretches) / np.prod(stretches, axis=0) ** (1 / 3))))
+
+    def _of_isochoric(self, stretches: tuple[Any, Any, Any]) -> Any:
+        return sum_of_energies(self.materials, self.values, stretches, self.discrepancy, self.continuation)
+
+    @cached_property
+    def _is_arithmetic(self) -> bool:
+        return is_arithmetic(self._of_isochoric)
 
     @property
     def initial_shear_modulus(self) -> float:
         """Half of what the energy's second derivative along l1 - l2 is at the reference, in MPa."""
         _, hessian = self.derivatives(np.ones((3, 1)))
-        return float(hessian[0, 0, 0] - hessian[0, 1, 0]) / 2
+        modulus = float(hessian[0, 0, 0] - hessian[0, 1, 0]) / 2
+        terms = sum(
+            abs(value)
+            for material, numbers in zip(self.materials, self.values, strict=True)
+            for parameter, value in zip(material.parameters, numbers, strict=True)
+            if parameter.is_linear
+        )
+        return modulus if abs(modulus) > ROUNDING * terms else 0.0
 
 
 def distortional_energy(material: Material, values: ArrayLike | None = None) -> DistortionalEnergy:

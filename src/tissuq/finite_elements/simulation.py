@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements.case import Case
+from tissuq.finite_elements.first_order import controlled, draws_in_full, first_order_forces
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.response import BULK_RATIO, Run, Solve, run_in_turn
 from tissuq.finite_elements.spread import PROBABILITY, band_probability, force_table, shares_of
@@ -77,6 +78,10 @@ class Simulation:
         Relative change of the force of one draw on a mesh of twice the fineness, and the travel (mm) at which.
     seconds : float
         Computing time of all draws on one processor, s.
+    mesh_changes : tuple of (float, float)
+        The same at every travel at which there is one: the travel (mm), and the relative change of the force.
+    first_order_error : mapping of str to (s,) array
+        By family of which not all draws were computed in full: relative error of the force of one that was not.
     """
 
     case: Case
@@ -91,12 +96,35 @@ class Simulation:
     noise_sd: float
     mesh_change: tuple[float, float] | None
     seconds: float
+    mesh_changes: tuple[tuple[float, float], ...] = ()
+    first_order_error: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def mesh_factor(self) -> FloatArray:
+        """What forces (s,) are to be multiplied by for cells without size (Richardson): errors halve with the cells.
+
+        Strains are singular at the edge of a punch and at a clamp, so that errors are of first order in that size.
+        """
+        if not self.mesh_changes:
+            return np.ones(len(self.travel))
+        return np.asarray(1 + 2 * np.interp(self.travel, *np.transpose(self.mesh_changes)))
 
     def table(self) -> pd.DataFrame:
-        """Return band and shares of the variance at every step, N: see `tissuq.finite_elements.spread.force_table`."""
+        """Return band and shares of the variance at every step, N: see `tissuq.finite_elements.spread.force_table`.
+
+        Where a finer mesh was computed, also the band for cells without size (``mesh_free_...``); a quarter of that
+        correction is taken as the standard deviation of its error.
+        """
         complete = self.forces[COMPLETE]
         material_only, without = self.forces.get(MATERIAL_ONLY, complete), self.forces.get(WITHOUT)
-        return force_table(self.travel, complete, material_only, without, self.noise_sd, self.case.travel_name)
+        table = force_table(self.travel, complete, material_only, without, self.noise_sd, self.case.travel_name)
+        if self.mesh_changes:
+            middle, spread = table["mean"] * self.mesh_factor, table["mean"] * np.abs(self.mesh_factor - 1) / 4
+            table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * self.mesh_factor, spread)
+            for end in ("low", "high"):
+                apart = np.hypot((table[end] - table["mean"]) * self.mesh_factor, 2 * spread)
+                table[f"mesh_free_{end}"] = middle + (apart if end == "high" else -apart)
+        return table
 
     @property
     def median_draw(self) -> EnergyDraw:
@@ -118,6 +146,7 @@ def simulate(
     force_noise: float | None = None,
     bulk_ratio: float = BULK_RATIO,
     check_mesh: bool = True,
+    full_runs: int | None = None,
     run: Run = run_in_turn,
 ) -> Simulation:
     """Return the forces of draws of a posterior in a case, with the discrepancy and without it.
@@ -141,6 +170,9 @@ def simulate(
         Bulk modulus in initial shear moduli.
     check_mesh : bool
         Compute one draw on a mesh of twice the fineness, too, where the case has a fineness.
+    full_runs : int, optional
+        Draws of every family that are computed in full; the others follow from the deformation of the one in the middle
+        to first order, corrected by those (`tissuq.finite_elements.first_order`). Unless given, all.
     run : callable
         Carries out the tasks; `tissuq.studies.structure` has one that uses many processes.
 
@@ -174,26 +206,43 @@ def simulate(
         name: [Solve.of(case, draw, steps, bulk_ratio, max_invariants) for draw in members]
         for name, members in ensembles.items()
     }
+    followed = {
+        name: first_order_forces(case, ensembles[name], _median_draw(ensembles[name]), steps, bulk_ratio)
+        for name, members in tasks.items()
+        if full_runs is not None and full_runs < len({task.key for task in members})
+    }
+    in_full = {name: draws_in_full(first_order, full_runs or 0) for name, first_order in followed.items()}
+    wanted = [members[n] for name, members in tasks.items() for n in in_full.get(name, range(len(members)))]
     if check_mesh and hasattr(case, "fineness"):
         finer = replace(case, **{"fineness": 2 * case.fineness})
-        tasks[FINE_MESH] = [Solve.of(finer, _median_draw(ensembles[COMPLETE]), steps, bulk_ratio, max_invariants)]
-    results = _results_by_key([task for members in tasks.values() for task in members], run)
-    complete, fine = tasks[COMPLETE], tasks.pop(FINE_MESH, None)
-    forces = {name: _quantity(members, results, "force", steps) for name, members in tasks.items()}
+        fine_steps = 2 if steps % 2 == 0 else steps
+        tasks[FINE_MESH] = [Solve.of(finer, _median_draw(ensembles[COMPLETE]), fine_steps, bulk_ratio, max_invariants)]
+    results = _results_by_key([*tasks.get(FINE_MESH, []), *wanted], run)
+    fine = tasks.pop(FINE_MESH, None)
+    computed = {name: [task for task in members if task.key in results] for name, members in tasks.items()}
+    complete = computed[COMPLETE]
+    forces = {name: _quantity(tasks[name], results, "force", steps) for name in tasks}
+    errors = {}
+    for name, first_order in followed.items():
+        full = {number: forces[name][number] for number in in_full[name]}
+        forces[name], errors[name] = controlled(first_order, full)
+    mesh_changes = _mesh_changes(fine[0], results, forces[COMPLETE], case) if fine else ()
     _check_any(case, forces[COMPLETE], [results[task.key]["problem"] for task in complete])
     return Simulation(
         case=case,
         travel=case.steps(steps),
         forces=forces,
-        failures=tuple(_failures(tasks, results)),
+        failures=tuple(_failures(computed, results)),
         volume_beyond=_quantity(complete, results, "volume_beyond", steps, scaled=False),
         energy_beyond=_quantity(complete, results, "energy_beyond", steps, scaled=False),
         max_invariants=max_invariants,
         fields=_fields(complete, results),
         ensembles=ensembles,
         noise_sd=_noise_sd(posterior, forces[COMPLETE]) if force_noise is None else force_noise,
-        mesh_change=_mesh_change(case, fine[0], results, forces[COMPLETE]) if fine else None,
+        mesh_change=mesh_changes[-1][::-1] if mesh_changes else None,
         seconds=sum(result["seconds"] for result in results.values()),
+        mesh_changes=mesh_changes,
+        first_order_error=errors,
     )
 
 
@@ -220,7 +269,7 @@ def _quantity(
 ) -> FloatArray:
     """Return a quantity (N, s) of tasks, not a number where there is none."""
     missing = [None] * steps
-    rows = np.array([results[task.key].get(name, missing) for task in tasks], dtype=np.float64)
+    rows = np.array([results.get(task.key, {}).get(name, missing) for task in tasks], dtype=np.float64)
     return rows * np.array([task.modulus for task in tasks])[:, None] if scaled else rows
 
 
@@ -257,17 +306,15 @@ def _median_draw(ensemble: Ensemble) -> EnergyDraw:
     return ensemble[int(np.argsort(moduli)[len(moduli) // 2])]
 
 
-def _mesh_change(
-    case: Case, task: Solve, results: Mapping[str, dict[str, Any]], forces: FloatArray
-) -> tuple[float, float] | None:
-    """Return the relative change of the last force that both meshes reached, and its travel."""
-    coarse = forces[task.draw.number]
-    fine = _quantity([task], results, "force", len(coarse))
-    common_steps = np.flatnonzero(np.isfinite(fine[0]) & np.isfinite(coarse))
-    if not len(common_steps):
-        return None
-    last = common_steps[-1]
-    return float(fine[0, last] / coarse[last] - 1), float(case.steps(len(coarse))[last])
+def _mesh_changes(
+    task: Solve, results: Mapping[str, dict[str, Any]], forces: FloatArray, case: Case
+) -> tuple[tuple[float, float], ...]:
+    """Return the travels that both meshes reached, and the relative changes of the force on the finer one."""
+    stride = forces.shape[1] // task.steps
+    coarse, travel = forces[task.draw.number, stride - 1 :: stride], case.steps(task.steps)
+    (fine,) = _quantity([task], results, "force", task.steps)
+    steps = np.flatnonzero(np.isfinite(fine) & np.isfinite(coarse))
+    return tuple((float(travel[step]), float(fine[step] / coarse[step] - 1)) for step in steps)
 
 
 MAX_DRAWS_NAMED = 6

@@ -14,7 +14,7 @@ from tissuq.finite_elements.case import AXIAL, Case
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.mechanics import Material
 
-__all__ = ["CellFields", "Solver", "felupe"]
+__all__ = ["CellFields", "Solver", "StrainPath", "felupe"]
 
 FloatArray = NDArray[np.float64]
 State = tuple[FloatArray, FloatArray, FloatArray]
@@ -55,6 +55,26 @@ class CellFields:
     von_mises: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class StrainPath:
+    """How a body deforms while what moves it goes on by a unit: the power on it is the force.
+
+    Attributes
+    ----------
+    logs, rates : (n, 3) arrays
+        Principal logarithmic strains of the distortion at the points of quadrature, and their rates, 1/mm.
+    volumes : (n,) array, mm^3
+        Of the points, over the part of a unit by which the points move.
+    volumetric_power : float
+        The power on the change of volume, for an initial shear modulus of one.
+    """
+
+    logs: FloatArray
+    rates: FloatArray
+    volumes: FloatArray
+    volumetric_power: float
+
+
 class Solver:
     """The mesh, its supports and the equilibria so far; inside, stresses are in initial shear moduli.
 
@@ -69,6 +89,7 @@ class Solver:
     def __init__(self, case: Case, material: Material, values: ArrayLike | None, bulk_ratio: float) -> None:
         fem, mesh = felupe(), case.mesh()
         supports = case.supports(mesh.points)
+        self._bulk_ratio = bulk_ratio
         self._umat = FElupeMaterial(material, values=values)
         self._modulus = self._umat.unit = _stiffness(material, self._umat.energy.initial_shear_modulus)
         region = fem.RegionQuad(fem.Mesh(*mesh, "quad"))
@@ -132,6 +153,33 @@ class Solver:
         energies = self._umat.function([F, None])[0] * self._volumes
         fractions = (float((weights * is_beyond).sum() / weights.sum()) for weights in (self._volumes, energies))
         return next(fractions), next(fractions)
+
+    def strain_path(self) -> StrainPath:
+        """Return how the body deforms around the last equilibrium."""
+        from scipy.sparse.linalg import spsolve
+
+        u, rates = self._path[-1][1], self._rate.ravel().copy()
+        self._residual(u)
+        tangent = self._solid.assemble.matrix().tocsr()[self._free]
+        rates[self._free] = spsolve(tangent[:, self._free].tocsc(), -tangent[:, self._held] @ rates[self._held])
+        F, J, _ = self._strains()
+        self._field[0].values[:] = rates.reshape(u.shape)
+        F_rate = self._field.extract()[0] - np.eye(3)[:, :, None, None]
+        self._field[0].values[:] = u
+        matrices, matrix_rates = (np.moveaxis(each, (0, 1), (-2, -1)).reshape(-1, 3, 3) for each in (F, F_rate))
+        left, stretches, right = np.linalg.svd(matrices)
+        log_rates = np.einsum("nia,nij,naj->na", left, matrix_rates, right) / stretches
+        share = np.abs(self._rate).max()
+        cells = self._volumes.sum(axis=0)
+        J_rate = J * log_rates.sum(axis=1).reshape(J.shape)
+        J_mean, J_mean_rate = ((values * self._volumes).sum(axis=0) / cells for values in (J, J_rate))
+        logs = np.log(stretches)
+        return StrainPath(
+            logs - logs.mean(axis=1, keepdims=True),
+            log_rates - log_rates.mean(axis=1, keepdims=True),
+            self._volumes.ravel() / share,
+            float(self._bulk_ratio * ((J_mean - 1) * J_mean_rate * cells).sum() / share),
+        )
 
     def _strains(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return F (3, 3, q, c), J (q, c), and the squared principal stretches (q, c, 3) of the distortion."""

@@ -158,17 +158,22 @@ def integrated(precision: Any, pull: Any, size: Any) -> Integrated:
         When A is not positive to working precision; JAX gives nan instead.
     """
     arrays = precision.__array_namespace__()
-    if arrays is np and precision.shape[-1] == 1:  # where the library's overhead would be most of the work
-        if not (precision > 0).all():
-            raise np.linalg.LinAlgError("the matrix is not positive")
-        triangle = np.sqrt(precision)
-        root = 1 / triangle
-    else:
-        triangle = arrays.linalg.cholesky(precision)
-        root = arrays.linalg.inv(triangle).mT
+    if arrays is np and precision.shape[-1] == 1:
+        return _one_integrated(precision, pull, size)
+    triangle = arrays.linalg.cholesky(precision)
+    root = arrays.linalg.inv(triangle).mT
     scores = root.mT @ pull
     log_volume = -arrays.log(triangle.diagonal(0, -2, -1)).sum(axis=-1)
     return Integrated(log_volume, size - (scores**2).sum(axis=-2), root, scores)
+
+
+def _one_integrated(precision: FloatArray, pull: FloatArray, size: FloatArray) -> Integrated:
+    """Return `integrated` of a single parameter, where the library's overhead would be most of the work."""
+    if not (precision > 0).all():
+        raise np.linalg.LinAlgError("the precision of the linear parameter is not positive")
+    root = 1 / np.sqrt(precision)
+    scores = root * pull
+    return Integrated(np.log(root[..., 0, 0]), size - scores[..., 0, :] ** 2, root, scores)
 
 
 def condition(

@@ -43,17 +43,17 @@ class Continuation(NamedTuple):
         arrays = library(stretches[0])
         invariant, direction = _invariant_and_direction(stretches)
         is_beyond = invariant.real > exp(self._functions(direction)[0]).real
-        within = tuple(arrays.where(is_beyond, 1.0, stretch) for stretch in stretches)
+        inside = tuple(arrays.where(is_beyond, 1.0, stretch) for stretch in stretches)
         pairs = zip(stretches, ANY_STRETCHES, strict=True)
-        beyond = tuple(arrays.where(is_beyond, stretch, any_stretch) for stretch, any_stretch in pairs)
-        return arrays.where(is_beyond, self._beyond(*_invariant_and_direction(beyond)), energy(within))
+        outside = tuple(arrays.where(is_beyond, stretch, any_stretch) for stretch, any_stretch in pairs)
+        return arrays.where(is_beyond, self._beyond(*_invariant_and_direction(outside)), energy(inside))
 
     def stress(self, logs: FloatArray, rates: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
         """Return which states (n, 3) lie beyond, and their stresses, which are the work on the rates (n, 3)."""
         invariant, direction = _invariant_and_direction(np.exp(logs).T)
-        (beyond,) = np.nonzero(invariant > np.exp(self._functions(direction)[0]))
-        stretches = np.exp(logs[beyond] + 1j * STEP * rates[beyond]).T
-        return beyond, np.asarray(self._beyond(*_invariant_and_direction(stretches)).imag / STEP)
+        (outside,) = np.nonzero(invariant > np.exp(self._functions(direction)[0]))
+        stretches = np.exp(logs[outside] + 1j * STEP * rates[outside]).T
+        return outside, np.asarray(self._beyond(*_invariant_and_direction(stretches)).imag / STEP)
 
     def _beyond(self, invariant: Any, direction: Any) -> Any:
         log_end, energy, slope, exponent, error = self._functions(direction)

@@ -128,9 +128,9 @@ def _share_along_axes(logs: FloatArray, tilt: FloatArray, limits: Range) -> Floa
         change = turned * (strains[:, 1] - strains[:, 0])
         along = np.stack([strains[:, 0] + change, strains[:, 1] - change], axis=1)
         is_within = np.ones(len(logs), dtype=bool)
-        for dispersion, least, largest in limits.along_axes:
+        for dispersion, smallest, largest in limits.along_axes:
             z = dispersed(strains.sum(axis=1), along, dispersion)
-            is_within &= (np.maximum(z / largest, z / least) <= 1 + ROUNDING).all(axis=1)
+            is_within &= (np.maximum(z / largest, z / smallest) <= 1 + ROUNDING).all(axis=1)
         low, high = np.where(is_within, share, low), np.where(is_within, high, share)
         share = 0.5 * (low + high)
     return low
@@ -246,9 +246,9 @@ class Rays:
         """Return which states (g,) lie beyond a range, the rays to these, and all states drawn back to the range."""
         (logs, _), (tilt, _) = states.log_stretches, states.tilt
         share = share_to_end(logs, limits, tilt)
-        (beyond,) = np.nonzero(share < 1)
-        rays = cls(share[beyond, None] * logs[beyond], logs[beyond], tilt[beyond])
-        return beyond, rays, drawn_back(states, share) if len(beyond) else states
+        (outside,) = np.nonzero(share < 1)
+        rays = cls(share[outside, None] * logs[outside], logs[outside], tilt[outside])
+        return outside, rays, drawn_back(states, share) if len(outside) else states
 
     @property
     def last_states(self) -> States:

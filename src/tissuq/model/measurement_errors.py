@@ -229,14 +229,14 @@ def _distance(points: ErrorPoints) -> FloatArray:
     return np.asarray(strain if strain.ndim == 1 else np.linalg.norm(strain, axis=1))
 
 
-def _process_root(places: FloatArray, length: float) -> FloatArray:
+def _process_root(points: FloatArray, length: float) -> FloatArray:
     """Return a root (n, q) of the squared-exponential correlation of places (n,), from a few places among them."""
     if length <= 0:
-        return np.ones((len(places), 1))
-    nodes = np.linspace(places.min(), places.max(), PROCESS_NODES)
+        return np.ones((len(points), 1))
+    nodes = np.linspace(points.min(), points.max(), PROCESS_NODES)
     values, vectors = np.linalg.eigh(np.exp(-0.5 * ((nodes[:, None] - nodes) / length) ** 2))
     is_significant = values > MIN_NODE_EIGENVALUE * values[-1]
-    across = np.exp(-0.5 * ((places[:, None] - nodes) / length) ** 2)
+    across = np.exp(-0.5 * ((points[:, None] - nodes) / length) ** 2)
     return np.asarray(across @ vectors[:, is_significant] / np.sqrt(values[is_significant]))
 
 

@@ -332,10 +332,10 @@ class FittedErrors:
             return []
         points, start = [], 0
         for test in experiment.tests:
-            part = slice(start, start + test.size)
-            slope = 0.0 if self.slopes is None else self.slopes[part, : len(test.mode.controls)]
+            span = slice(start, start + test.size)
+            slope = 0.0 if self.slopes is None else self.slopes[span, : len(test.mode.controls)]
             error = test.standard_error
-            points.append(ErrorPoints(test.mode, test.stretch, self.curve[part], slope, standard_error=error))
+            points.append(ErrorPoints(test.mode, test.stretch, self.curve[span], slope, standard_error=error))
             start += test.size
         return points
 

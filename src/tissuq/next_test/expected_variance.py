@@ -63,13 +63,13 @@ def joint_stresses(
     p = components.root.shape[2]
     mean, root = np.empty((len(components), len(states))), np.zeros((len(components), len(states), p + 1))
     for limits, rows in ranges:
-        beyond, rays, within = Rays.leaving(states, limits)
-        wanted = States.joined([within, rays.last_states]) if len(beyond) else states
+        outside, rays, inside = Rays.leaving(states, limits)
+        wanted = States.joined([inside, rays.last_states]) if len(outside) else states
         means, roots = _within(model, components[rows], wanted)
         mean[rows], root[rows, :, :p] = means[:, :count], roots[:, :count]
-        if len(beyond):
-            at, last = np.ix_(rows, beyond), (means[:, count:], roots[:, count:])
-            mean[at], root[at] = _beyond(rays, (mean[at], root[at]), last)
+        if len(outside):
+            index, last = np.ix_(rows, outside), (means[:, count:], roots[:, count:])
+            mean[index], root[index] = _beyond(rays, (mean[index], root[index]), last)
     return mean, root
 
 
@@ -81,7 +81,7 @@ def _beyond(
     From those at its end (`ends`) and at the `Rays.last_states` (M, 2 g). The last column is the error of the exponent.
     """
     (mean, root), count = ends, len(rays.logs)
-    stresses, roots = ((part[:, :count], part[:, count:]) for part in last)
+    stresses, roots = ((block[:, :count], block[:, count:]) for block in last)
     exponent = rays.last_exponents(*stresses)
 
     def log_of_growth(change: float, score: float) -> FloatArray:
@@ -90,8 +90,8 @@ def _beyond(
 
     is_positive = (stresses[0] > 0) & (stresses[1] > 0)
     at_end, farther_in = (
-        part[..., : root.shape[2] - 1] / np.where(is_positive, stress, np.inf)[..., None]
-        for part, stress in zip(roots, stresses, strict=True)
+        block[..., : root.shape[2] - 1] / np.where(is_positive, stress, np.inf)[..., None]
+        for block, stress in zip(roots, stresses, strict=True)
     )
     slope = (log_of_growth(STEP, 0.0) - log_of_growth(-STEP, 0.0)) / (2 * STEP * rays.distance)
     relative = np.zeros_like(root)

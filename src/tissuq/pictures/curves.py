@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -48,11 +49,14 @@ class Described:
     curve : Curve
     prob : float
         Probability of the bands, equal tails.
+    known_inside : (n,) array of bool, optional
+        What `inside` is, where it has been computed.
     """
 
     solution: Solution
     curve: Curve
     prob: float = 0.95
+    known_inside: NDArray[np.bool_] | None = None
 
     @cached_property
     def points(self) -> FloatArray:
@@ -92,6 +96,8 @@ class Described:
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
         """Which measurements are inside the band of new ones, with the discrepancy."""
+        if self.known_inside is not None:
+            return self.known_inside
         return inside_band(self.solution, self.curve, discrepancy=True, prob=self.prob)
 
     @cached_property
@@ -107,9 +113,13 @@ class Described:
         return predict_bands([(1.0, self.solution)], self.points, (True, False), discrepancy=discrepancy, **options)
 
 
-def described(solution: Solution, prob: float = 0.95) -> list[Described]:
-    """Return what a posterior says of every measured curve."""
-    return [Described(solution, curve, prob) for curve in solution.model.experiment.curves]
+def described(
+    solution: Solution, prob: float = 0.95, inside: Sequence[NDArray[np.bool_] | None] | None = None
+) -> list[Described]:
+    """Return what a posterior says of every measured curve, of which it may be known what is inside its band."""
+    curves = solution.model.experiment.curves
+    pairs = zip(curves, inside or [None] * len(curves), strict=True)
+    return [Described(solution, curve, prob, known) for curve, known in pairs]
 
 
 def ways_of(mode: LoadingMode, points: FloatArray, abscissa: FloatArray) -> list[Way]:

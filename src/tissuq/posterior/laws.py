@@ -29,7 +29,7 @@ from tissuq.pictures.rows import intervals
 from tissuq.posterior.fitting import OPTIONS, fit
 from tissuq.posterior.plots import ROW
 from tissuq.posterior.posterior import Posterior
-from tissuq.prediction.bands import predict_average, predict_band
+from tissuq.prediction.bands import predict_band, predict_bands
 from tissuq.prediction.densities import leave_one_out
 
 if TYPE_CHECKING:
@@ -161,7 +161,8 @@ class LawComparison:
         import pandas as pd
 
         weighted = [(weight, self.fits[name].solution) for name, weight in self._likely.items()]
-        table = pd.DataFrame(vars(predict_average(weighted, stretch, mode=mode, prob=prob, noise=noise)))
+        (band,) = predict_bands(weighted, stretch, (noise,), mode=mode, prob=prob)
+        table = pd.DataFrame(vars(band))
         return in_unit(table, ["median", "low", "high"], self._unit)
 
     def plot(self, ax: Any = None, *, unit: str | None = None) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +61,9 @@ class ErrorEstimates:
         Returns whether a model is solved with its evidence, without sampling.
     sums_noise : callable
         Returns whether a model is solved as a sum over values of its noise.
+    similar_solver : callable
+        Returns a function that gives the solution of a model with known noise, roughly, and learns from one for the
+        next.
     """
 
     def __init__(
@@ -69,8 +71,10 @@ class ErrorEstimates:
         solve: Callable[[StatisticalModel], Solution],
         has_evidence: Callable[[StatisticalModel], bool],
         sums_noise: Callable[[StatisticalModel], bool],
+        similar_solver: Callable[[], Callable[[StatisticalModel], Solution]],
     ) -> None:
         self._solve, self._has_evidence, self._sums_noise, self._fits = solve, has_evidence, sums_noise, 0
+        self._similar_solver = similar_solver
 
     def of(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with every estimate that its errors need: curve and level, and lag."""
@@ -124,9 +128,9 @@ class ErrorEstimates:
         autoregressive = replace(_sketch(model), noise=AutoregressiveNoise())
         longest = np.exp(-1 / (LONGEST_CORRELATION * fewest))
         lags, evidences = np.linspace(0, np.arctanh(longest), LAG_COUNT), list[float]()
-        level = model.fitted_errors.level or model.noise_of_tests[1]
+        level, solve = model.fitted_errors.level or model.noise_of_tests[1], self._similar_solver()
         for lag in np.tanh(lags):
-            level, evidence = self._best_level(autoregressive.with_errors(lag=float(lag)), level)
+            level, evidence = self._best_level(autoregressive.with_errors(lag=float(lag)), level, solve)
             evidences.append(evidence)
             if evidence < max(evidences) - MIN_LOG_EVIDENCE_GAIN:
                 break
@@ -136,23 +140,21 @@ class ErrorEstimates:
         lag = float(np.tanh(_peak(lags[: len(evidences)], np.array(evidences))))
         return replace(model, noise=autoregressive.noise).with_errors(lag=lag, fits=fits)
 
-    def _best_level(self, model: StatisticalModel, level: float) -> tuple[float, float]:
+    def _best_level(
+        self, model: StatisticalModel, level: float, solve: Callable[[StatisticalModel], Solution]
+    ) -> tuple[float, float]:
         """Return the level of the noise with the largest log evidence, searched from another one, and that.
 
         The levels that are tried count as one fit.
         """
         self._fits += 1
-        log_level, log_evidence = highest(
-            partial(self._log_evidence_at, model),
-            float(np.log(level)),
-            LEVEL_STEP,
-            float(np.log(MAX_LEVEL_FACTOR)),
-            LEVEL_ACCURACY,
-        )
-        return float(np.exp(log_level)), log_evidence
 
-    def _log_evidence_at(self, model: StatisticalModel, log_level: float) -> float:
-        return self._solve(at_noise(model, float(np.exp(log_level)))).log_evidence or 0.0
+        def log_evidence(log_level: float) -> float:
+            return solve(at_noise(model, float(np.exp(log_level)))).log_evidence or 0.0
+
+        reach = float(np.log(MAX_LEVEL_FACTOR))
+        log_level, largest = highest(log_evidence, float(np.log(level)), LEVEL_STEP, reach, LEVEL_ACCURACY)
+        return float(np.exp(log_level)), largest
 
     def _with_factor(self, model: StatisticalModel, level: float | None) -> StatisticalModel:
         """Return a model with its spreads times the factor that its tests tell, at a level of errors if noise needs it.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 from tissuq.assessment.stable_posterior import stable_part
 from tissuq.errors import ConvergenceError, ModelError
 from tissuq.inference.enumerators.adaptive_cells import AdaptiveCells
 from tissuq.inference.enumerators.amplitude_lattice import AmplitudeLattice
-from tissuq.inference.enumerators.line import Accuracy
+from tissuq.inference.enumerators.line import ROUGH, Accuracy
 from tissuq.inference.enumerators.noise_grid import NoiseGrid
 from tissuq.inference.enumerators.outer import Guide
 from tissuq.inference.solution import Enumerator, Solution
@@ -61,7 +62,10 @@ class Solver:
         return self._error_estimates().with_probable_noise(model)
 
     def _error_estimates(self) -> ErrorEstimates:
-        return ErrorEstimates(lambda model: self._solve([model])[0], self._is_integrated, self._sums_noise)
+        similar_solver = partial(self._known_solver, ROUGH)
+        return ErrorEstimates(
+            lambda model: self._solve([model])[0], self._is_integrated, self._sums_noise, similar_solver
+        )
 
     def _is_integrated(self, model: StatisticalModel) -> bool:
         """Return whether there is an evidence without sampling."""

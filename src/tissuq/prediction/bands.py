@@ -30,7 +30,6 @@ __all__ = [
     "centre_and_ends",
     "extrapolation_share",
     "inside_band",
-    "predict_average",
     "predict_band",
     "predict_bands",
     "predictive_mixtures",
@@ -184,26 +183,8 @@ def predict_band(
     InputError
         When a stretch is not positive, prob is not between 0 and 1, or the discrepancy says nothing about the mode.
     """
-    options: dict[str, Any] = {"discrepancy": discrepancy, "noise": noise, "prob": prob, "mode": mode}
-    return predict_average([(1.0, solution)], stretch, **options, channel=channel)
-
-
-def predict_average(
-    weighted_solutions: Sequence[tuple[float, Solution]],
-    stretch: ArrayLike,
-    *,
-    discrepancy: bool = True,
-    noise: bool = True,
-    prob: float = 0.95,
-    mode: str | LoadingMode | None = None,
-    channel: int = 0,
-) -> Band:
-    """Return the band of a mixture of posteriors of the same data, with weights that sum to one.
-
-    All else is as for `predict_band`.
-    """
     options: dict[str, Any] = {"discrepancy": discrepancy, "prob": prob, "mode": mode, "channel": channel}
-    return predict_bands(weighted_solutions, stretch, (noise,), **options)[0]
+    return predict_bands([(1.0, solution)], stretch, (noise,), **options)[0]
 
 
 def predict_bands(
@@ -217,9 +198,10 @@ def predict_bands(
     channel: int = 0,
     errs_beyond: bool = True,
 ) -> list[Band]:
-    """Return the bands of `predict_average` for new measurements, for the stress itself, or for both at once.
+    """Return bands of a mixture of posteriors of the same data, with weights that sum to one.
 
-    Without the errors of the energy beyond the range of the data, if asked for.
+    They are for new measurements, for the stress itself, or for both at once; without the errors of the energy beyond
+    the range of the data, if asked for. All else is as for `predict_band`.
     """
     solutions = [solution for _, solution in weighted_solutions]
     loading, points = asked_for(solutions, stretch, discrepancy=discrepancy, prob=prob, mode=mode, channel=channel)

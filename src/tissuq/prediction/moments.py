@@ -227,7 +227,9 @@ def stress_slopes(
 ) -> FloatArray:
     """Return the slopes (M, g, c) of mean stresses (M, g) along the controls of their paths, MPa; zero beyond these."""
     displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
-    moved = [stress_moments(model, components, there, discrepancy=discrepancy, noise=False)[0] for there in displaced]
+    moved = [
+        stress_moments(model, components, shifted, discrepancy=discrepancy, noise=False)[0] for shifted in displaced
+    ]
     return (np.stack(moved, axis=-1) - mean[:, :, None]) / STRETCH_STEP
 
 
@@ -253,8 +255,8 @@ def drawn_curves(
     drawn = replace(components, mean=linear)
     material_stress, discrepancy_stress = _drawn_within(model, drawn, states)
     if components.member is not None:
-        for at, stress in stresses_beyond(model, drawn, states, generator.random(len(linear))):
-            discrepancy_stress[at] = stress - material_stress[at]
+        for index, stress in stresses_beyond(model, drawn, states, generator.random(len(linear))):
+            discrepancy_stress[index] = stress - material_stress[index]
     if model.is_correlated and states.is_measured:
         coefficients_drawn, _ = coefficients(model, drawn)
         for group in correlated_groups(model, components.settings):
@@ -273,8 +275,8 @@ def drawn_stress(
     """Return the stress (M, g) of draws, within the range of the data and beyond (`stresses_beyond`)."""
     with np.errstate(over="ignore", invalid="ignore"):  # of what is replaced
         total = np.sum(_drawn_within(model, drawn, states), axis=0)
-    for at, stress in stresses_beyond(model, drawn, states, probability):
-        total[at] = stress
+    for index, stress in stresses_beyond(model, drawn, states, probability):
+        total[index] = stress
     return np.asarray(total)
 
 
@@ -289,13 +291,13 @@ def stresses_beyond(
     assert drawn.member is not None  # noqa: S101 (the caller has looked)
     score = scores(probability)
     for limits, rows in model.by_limits(drawn.member):
-        beyond, rays, within = Rays.leaving(states, limits)
-        if len(beyond):
-            last = States.joined([within.among(beyond), rays.last_states])
+        outside, rays, inside = Rays.leaving(states, limits)
+        if len(outside):
+            last = States.joined([inside.among(outside), rays.last_states])
             material_stress, discrepancy_stress = _drawn_within(model, drawn[rows], last)
             stress, at_end, farther_in = np.split(material_stress + discrepancy_stress, 3, axis=1)
             exponents = with_errors(rays.last_exponents(at_end, farther_in), score[rows, None])
-            yield np.ix_(rows, beyond), stress * rays.growth(*exponents)
+            yield np.ix_(rows, outside), stress * rays.growth(*exponents)
 
 
 def _drawn_within(model: StatisticalModel, drawn: GaussianMixture, states: States) -> tuple[FloatArray, FloatArray]:

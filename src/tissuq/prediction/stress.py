@@ -52,16 +52,16 @@ class Stress:
         logs, tilt = states.log_stretches[0], states.tilt[0]
         shares = np.array([share_to_end(logs, limits, tilt) for limits in self._limits or [Range()]])
         farthest = shares.max(axis=0)
-        within = drawn_back(states, farthest) if (farthest < 1).any() else states
+        inside = drawn_back(states, farthest) if (farthest < 1).any() else states
         mean, variance = stress_moments(
-            self.model, self.components, within, discrepancy=self.with_discrepancy, noise=False
+            self.model, self.components, inside, discrepancy=self.with_discrepancy, noise=False
         )
         if (shares == 1).all():
             return self.components, mean, variance
         drawn, probability = self._drawn
         mean, variance = (np.repeat(moment, len(drawn) // len(mean), axis=0) for moment in (mean, variance))
-        for at, stress in stresses_beyond(self.model, drawn, states, probability):
-            mean[at], variance[at] = stress, 0.0
+        for index, stress in stresses_beyond(self.model, drawn, states, probability):
+            mean[index], variance[index] = stress, 0.0
         return drawn, mean, variance
 
     def slopes(self, states: States, mean: FloatArray) -> FloatArray:
@@ -69,8 +69,10 @@ class Stress:
         if len(mean) == len(self.components):
             return stress_slopes(self.model, self.components, states, mean, discrepancy=self.with_discrepancy)
         displaced = (states.displaced(control, STRETCH_STEP) for control in range(states.controls))
-        here, *there = (drawn_stress(self.model, self._drawn[0], at, self._drawn[1]) for at in (states, *displaced))
-        return (np.stack(there, axis=-1) - here[:, :, None]) / STRETCH_STEP
+        undisplaced, *stresses = (
+            drawn_stress(self.model, self._drawn[0], shifted, self._drawn[1]) for shifted in (states, *displaced)
+        )
+        return (np.stack(stresses, axis=-1) - undisplaced[:, :, None]) / STRETCH_STEP
 
     @cached_property
     def _limits(self) -> list[Range]:

@@ -16,9 +16,10 @@ from tissuq.errors import TissuqError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import stress_basis
-from tissuq.pictures.curves import Described, described
+from tissuq.pictures.curves import Described
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import Band, predict_bands
+from tissuq.report.figures import described_curves
 
 __all__ = ["chart_data"]
 
@@ -88,7 +89,7 @@ def chart_data(
         sliders, the linear ones first; ``nodes`` of an exponent that has a slider; ``fixed``, the parameters that stay
         at their medians; and ``unit``.
     """
-    known = found or {name: described(posterior.solution) for name, posterior in posteriors.items()}
+    known = found or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     first = posteriors[main]
     tests = [*_measured(known[main]), *_others(first)]
     sliders = _Sliders(first, unit)

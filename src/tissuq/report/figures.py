@@ -30,6 +30,7 @@ __all__ = [
     "STYLE",
     "TRUTH",
     "answer_figure",
+    "described_curves",
     "legend_above",
     "marginal_figure",
     "new_figure",
@@ -43,6 +44,12 @@ WIDTHS = {1: 6.0, 2: 9.2, 3: 11.5}
 """Of figures with so many panels side by side, inches."""
 
 
+def described_curves(posterior: Posterior) -> list[Described]:
+    """Return what a posterior says of its curves; what is inside the bands it knows already."""
+    inside = posterior.inside_bands() if posterior.solution.is_of_data else None
+    return described(posterior.solution, inside=inside)
+
+
 def answer_figure(
     posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False, found: Sequence[Described] | None = None
 ) -> Figure:
@@ -51,7 +58,7 @@ def answer_figure(
     Further rows of panels make it taller. Its SVG has these sizes at 96 px an inch; a page embeds both, and shows the
     narrow one on screens of up to 600 px. What ``found`` has computed of the posterior's curves is not computed anew.
     """
-    return answer_on_new_figure(found or described(posterior.solution), unit, is_narrow=is_narrow)
+    return answer_on_new_figure(found or described_curves(posterior), unit, is_narrow=is_narrow)
 
 
 def predictive_figure(
@@ -82,7 +89,7 @@ def predictive_figure(
     found : mapping of str to sequence of Described, optional
         What the posteriors say of their curves, of which nothing is computed anew.
     """
-    known = found or {name: described(posterior.solution) for name, posterior in posteriors.items()}
+    known = found or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     curves = next(iter(posteriors.values())).model.experiment.curves
     panels = [(name, of) for name in posteriors for of in known[name]]
     columns = columns_of(len(panels))

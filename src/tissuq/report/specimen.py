@@ -15,11 +15,11 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.reading.inspection import Inspection
 from tissuq.experiments.units import StressUnit, stress_unit
-from tissuq.pictures.curves import Described, described
+from tissuq.pictures.curves import Described
 from tissuq.posterior.posterior import Posterior
 from tissuq.report.answer import ANSWER, answer_record, readable_estimates, shown_and_folded
 from tissuq.report.chart import chart_data
-from tissuq.report.figures import BAND, BASE, INK, new_figure
+from tissuq.report.figures import BAND, BASE, INK, described_curves, new_figure
 from tissuq.report.inputs import inputs_of
 from tissuq.report.run_folder import (
     ASSESSMENT,
@@ -110,7 +110,7 @@ def write_specimen_run(study: SpecimenStudy, sources: Sequence[Path], folder: Pa
     write_json(folder / ASSESSMENT, [_assessment_row(*item) for item in study.assessments.items()])
     record = answer_record(_title(study), study.main, study.answer, study.unit, study.warnings)
     write_json(folder / ANSWER, record)
-    found = {name: described(posterior.solution) for name, posterior in study.posteriors.items()}
+    found = {name: described_curves(posterior) for name, posterior in study.posteriors.items()}
     if figures:
         write_figures(folder, _figures(study, found))
     context = _context(study, summary, record)

@@ -11,6 +11,7 @@ from importlib import metadata
 __all__ = ["DEVELOPER_EXTRAS", "EXTRAS", "PROGRAMS", "Extra", "Package", "Program", "extras", "needed", "programs"]
 
 EXTRAS = {
+    "app": "opens the local page in the browser (tissuq app)",
     "cluster": "spreads campaigns and finite elements over a Dask cluster (--scheduler)",
     "excel": "reads workbooks (.xlsx, .xls, .xlsb, .ods)",
     "fe": "computes indentations and bars (tissuq structure), and materials for FElupe",

@@ -42,6 +42,9 @@ class SimulationSettings(RunSettings):
     draws: int = option(64, "Draws of the posterior.", ge=2)
     steps: int = option(8, "Steps at which the force is computed.", ge=1)
     seed: int = seed()
+    full_runs: int | None = option(
+        None, "Draws computed in full; the others follow to first order, much faster [all].", ge=4
+    )
     force_noise: float | None = option(
         None,
         "Sd of a new measurement of the force, N [same share of the force as in the test].",

@@ -124,10 +124,12 @@ def run_specimen(
     step: Callable[[str], None] = lambda text: None,
     law: Material | None = None,
     found: Sequence[Reading | None] = (),
+    early: Callable[[SpecimenStudy], None] = lambda study: None,
 ) -> SpecimenStudy:
     """Read the file, or those of several tests, and fit the material with every chosen discrepancy.
 
-    What has been read of every test may be given as ``found``.
+    What has been read of every test may be given as ``found``. ``early`` is given the study when all is fitted and
+    nothing is assessed yet: its answer is there.
 
     Settings may come from a file, so that a law of the user's own which they name is not run; it is given as ``law``.
 
@@ -165,6 +167,8 @@ def run_specimen(
     if not posteriors:
         simplest, reason = next(iter(skipped.items()))
         raise ModelError(f"no discrepancy can be fitted, not even '{simplest}': {reason}")
+    read_warnings = warnings_of_files(readings)
+    early(SpecimenStudy(settings, experiment, posteriors, seconds, skipped, {}, read_warnings))
     step("assessing")
     assessments = {
         name: posterior.assess()
@@ -190,7 +194,7 @@ def run_specimen(
         held_out += [
             {"formulation": name} | {str(key): _known(value) for key, value in row.items()} for row in predictions
         ]
-    results = settings, experiment, posteriors, seconds, skipped, assessments, warnings_of_files(readings)
+    results = settings, experiment, posteriors, seconds, skipped, assessments, read_warnings
     return SpecimenStudy(*results, tuple(held_out))
 
 

@@ -134,6 +134,7 @@ def run_simulation(
         without=posteriors.without,
         steps=settings.steps,
         seed=settings.seed,
+        full_runs=settings.full_runs,
         force_noise=settings.force_noise,
         bulk_ratio=settings.bulk_ratio,
         run=carried_out,

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from tissuq.experiments.reading.column_units import MPA_ASSUMED
+from tissuq.experiments.reading.headings import without_correction
 from tissuq.experiments.reading.measured_rows import MeasuredRows, labelled
+from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.plausibility import RATIO_ASSUMED, ZERO_ASSUMED
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.stated_mode import is_torque
 from tissuq.experiments.reading.stated_sizes import UNIT_ASSUMED
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.table import Table
 
 __all__ = ["assumptions", "is_doubtful"]
 
@@ -53,11 +55,24 @@ def assumptions(measured: MeasuredRows, choices: Sequence[ColumnChoice], stress_
     for choice in choices:
         roles = {choice.deformation: choice.measure, choice.stress: choice.load}
         sentences += [_about_name(measured, column, role) for column, role in roles.items() if column in choice.by_unit]
+        corrections = (_about_correction(measured.table, column, role) for column, role in roles.items())
+        sentences += filter(None, corrections)
     if choices[0].measure == "shear" and choices[0].load == "stress" and stress_type is None:
         sentences += [_about_rim(name) for name in measured.table.names if is_torque(name)]
     if ZERO_ASSUMED in source:
         sentences += labelled(measured.labels, [_about_zero(measured, choice) for choice in choices])
     return tuple(sentences)
+
+
+def _about_correction(table: Table, column: int, role: str) -> str:
+    """Return that a column was read which is the corrected one of two, or of which there is a corrected one."""
+    quantity = table.quantities[column]
+    name = without_correction(quantity)
+    beside = [k for k, same in enumerate(table.quantities) if same != quantity and without_correction(same) == name]
+    if not beside:
+        return ""
+    text = f"{table.label(column)} is read, and not {table.label(beside[0])} beside it"
+    return f"{text}; if that one is meant, give --column {role}={table.label(beside[0])}."
 
 
 def _about_name(measured: MeasuredRows, column: int, role: str) -> str:

@@ -26,6 +26,7 @@ from tissuq.experiments.reading.headings import (
     plain,
     role_names,
     stretches_less_one,
+    without_correction,
     without_gradient,
     without_mean,
 )
@@ -159,12 +160,23 @@ def _names(table: Table) -> list[tuple[str, str]]:
     quantities = table.quantities
     is_less_one = stretches_less_one(table.names)
     quantities = ["strain" if less_one else name for name, less_one in zip(quantities, is_less_one, strict=True)]
+    quantities = _corrected_alone(quantities)
     is_ratio = [not unit or measured_in(unit) == "strain" for unit in map(table.unit, range(len(quantities)))]
     quantities = [without_gradient(name) if ratio else name for name, ratio in zip(quantities, is_ratio, strict=True)]
     is_spread = [bool(of_spread(quantity)[0]) for quantity in quantities]
     if any(is_spread):
         quantities = [without_mean(quantity) or quantity for quantity in quantities]
     return [("", "") if of_spread else measure_in(name) for name, of_spread in zip(quantities, is_spread, strict=True)]
+
+
+def _corrected_alone(quantities: Sequence[str]) -> list[str]:
+    """Return what columns hold, of those that stand there with and without a correction only the corrected ones."""
+    plain_names = [without_correction(quantity) for quantity in quantities]
+    corrected = {name for name, quantity in zip(plain_names, quantities, strict=True) if name != quantity}
+    return [
+        "" if name == quantity and quantity in corrected else name
+        for name, quantity in zip(plain_names, quantities, strict=True)
+    ]
 
 
 def mapping_of_each_stress(mode: LoadingMode, mapping: Mapping[str, str | int] | None) -> list[dict[str, str | int]]:

@@ -18,23 +18,21 @@ from tissuq.experiments.reading.dimensions_of_table import dimensions_of, dimens
 from tissuq.experiments.reading.height_of_block import of_block
 from tissuq.experiments.reading.labels import columns_only
 from tissuq.experiments.reading.loads import Load, force_in, stress_of, without_zero
-from tissuq.experiments.reading.measured_rows import MeasuredRows, preload_stress
+from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.recognition import ColumnChoice
 from tissuq.experiments.reading.repeated_sizes import test_beside
 from tissuq.experiments.reading.several_specimens import check_one_specimen
 from tissuq.experiments.reading.spread import Spread, spread_of
 from tissuq.experiments.reading.stated_sizes import names_of_specimen
-from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.units import FORCE
 
 __all__ = [
-    "columns_of_stresses",
+    "as_columns",
     "measured_rows",
-    "points_of",
     "stress_measure_of",
-    "threshold_of",
     "with_engineering_stress",
 ]
 
@@ -93,16 +91,6 @@ def measured_rows(
     return measured, loads, tuple(spreads), dimensions
 
 
-def threshold_of(preload: str, load: Load) -> float:
-    """Return a preload as a stress in MPa."""
-    if load.measure is not None:
-        raise InputError(
-            f"preload '{preload}' (--preload) does not go with the pressure in a tube. Give the outer diameter that it "
-            "has without pressure as --diameter, and leave rows out with --stretch or --leave-out."
-        )
-    return preload_stress(preload, load.divided, load.by)
-
-
 def with_engineering_stress(
     mode: LoadingMode, measure: StressMeasure, measured: MeasuredRows, points: Column
 ) -> MeasuredRows:
@@ -129,11 +117,6 @@ def stress_measure_of(table: Table, choices: Sequence[ColumnChoice]) -> StressMe
     return STRESS_MEASURES[types[0]]
 
 
-def points_of(mode: LoadingMode, stretch: Column) -> Column:
-    """Return the points of the mode for stretches (k, n): the stretch, or a column for each control."""
-    return np.ascontiguousarray(stretch.T) if len(mode.controls) > 1 else stretch[0]
-
-
-def columns_of_stresses(columns: Column) -> Column:
-    """Return columns (k, n) of the stresses as an experiment takes them."""
-    return np.ascontiguousarray(columns.T) if len(columns) > 1 else columns[0]
+def as_columns(rows: Column) -> Column:
+    """Return stretches or stresses (k, n) as an experiment takes them: a column for each, or the only one (n,)."""
+    return np.ascontiguousarray(rows.T) if len(rows) > 1 else rows[0]

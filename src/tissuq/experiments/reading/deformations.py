@@ -10,6 +10,7 @@ from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import UnitOption, declared_unit, factor_of, strain_factor_of
 from tissuq.experiments.reading.dimensions import Dimension, Dimensions, in_words, tube_of
 from tissuq.experiments.reading.dimensions_of_table import initial_size
+from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import (
     DOUBTFUL_STRAIN,
@@ -22,7 +23,6 @@ from tissuq.experiments.reading.plausibility import (
     check_strain,
 )
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS
 from tissuq.experiments.units import ANGLE, FORCE, LENGTH, PIXELS, RATE, TIME, Quantity, measured_in

@@ -18,11 +18,9 @@ from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
 from tissuq.experiments.reading.conversion import (
-    columns_of_stresses,
+    as_columns,
     measured_rows,
-    points_of,
     stress_measure_of,
-    threshold_of,
     with_engineering_stress,
 )
 from tissuq.experiments.reading.cycles import Cycle, find_cycles, of_cycle
@@ -314,7 +312,9 @@ def read_rows(
         absent, table = set(table.lines) - set(readable.lines), readable
         measured, loads, spreads, dimensions = measured_rows(table, mode, labelled_choices, options)
     names = Path(path).stem, comment_on_mode(Path(path)), table.sheet, table.title, name or ""
-    recorded = with_signs(measured, choices, is_positive, options.get("turn"), direction_of(*names))
+    recorded = with_signs(
+        measured, choices, is_positive, options.get("turn"), direction_of(*(text for _, text in table.head), *names)
+    )
     cycles = find_cycles(table, recorded.course)
     used = of_cycle(recorded, cycles, options.get("cycle"), options.get("branch"))
     if (lines := options.get("leave_out")) is not None:
@@ -325,7 +325,7 @@ def read_rows(
         used = used.loaded(slacks, reference)
         errors = {"slack": slack_error(slacks, reference)} if any(slacks) else errors
     elif preload is not None:
-        thresholds = [threshold_of(preload, load) for load in loads]
+        thresholds = [load.stress_in(preload) for load in loads]
         used = used.taut(preload, thresholds, find_cycles(used.table, used.course)[0].peak, reference)
     if (stretch_range := options.get("stretch_range")) is not None:
         used = used.within(*stretch_range)
@@ -336,7 +336,7 @@ def read_rows(
     if stress_measure.engineering:
         of_file = recorded.stretch[:, used.rows] if stress_measure.is_of_file else used.stretch
         recorded, used = (
-            with_engineering_stress(mode, stress_measure, measured, points_of(mode, stretch))
+            with_engineering_stress(mode, stress_measure, measured, as_columns(stretch[: len(mode.controls)]))
             for measured, stretch in ((recorded, recorded.stretch), (used, of_file))
         )
         if mode.controls != (SHEAR,) or stress_measure.name != "cauchy":
@@ -349,9 +349,9 @@ def read_rows(
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(
         mode=mode,
-        stretch=points_of(mode, used.stretch),
-        stress=columns_of_stresses(used.stress),
-        standard_error=columns_of_stresses(used.standard_error),
+        stretch=as_columns(used.stretch[: len(mode.controls)]),
+        stress=as_columns(used.stress),
+        standard_error=as_columns(used.standard_error),
         name=Path(path).stem if name is None else name,
         source=f"{Path(path).name}{sheet}: {'; '.join(used.steps)}",
         least_errors=errors | least_errors(tested),

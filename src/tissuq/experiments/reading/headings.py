@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES, StrainMeasure
-from tissuq.experiments.reading.stress_measures import STRESS_MEASURES, StressMeasure
+from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES, StrainMeasure, StressMeasure
 from tissuq.experiments.reading.vocabulary import (
     COUNT_NAMES,
     DIMENSION_NAMES,
@@ -43,6 +42,7 @@ __all__ = [
     "plain",
     "role_names",
     "stretches_less_one",
+    "without_correction",
     "without_gradient",
     "without_mean",
 ]
@@ -54,6 +54,13 @@ MEASURES: dict[str, list[StrainMeasure] | list[StressMeasure]] = {
     "stress": list(STRESS_MEASURES.values()),
 }
 """Measures of what columns of a role hold."""
+CORRECTED = re.compile(
+    r"\b((machine )?compliance )?(corrected|compensated|korrigierte?[rs]?|corrigée?|corregid[oa]|corrett[oa])\b|"
+    r"исправленн\w+|скорректированн\w+|校正後?|補正後?"
+)
+"""Words beside the name of what was corrected."""
+DIRECTION_IN_BRACKETS = re.compile(r"\s*[\[(](compress\w*|tens\w*|druck|zug)[\])]", re.IGNORECASE)
+"""Of a load, as in ``Strain (compression) [%]``: it tells the sign alone."""
 LINK = re.compile(r"\(\)|\b(de|di|of|nach|selon|according to)\b")
 """What may stand between such a word and the noun."""
 SAYS_ALONE = re.compile(r"hencky|almansi|green .+|cauchy|.*(pk|piola).*|.*(angl|ngulo|ngolo|winkel|hoek|角).*")
@@ -130,7 +137,7 @@ class Heading:
 @lru_cache(maxsize=REMEMBERED)
 def heading(name: str) -> Heading:
     """Take a column name apart into its quantity, in lower case, and its unit."""
-    name = CHANNEL.sub("", name)
+    name = DIRECTION_IN_BRACKETS.sub("", CHANNEL.sub("", name))
     if formula := FORMULA.fullmatch(name.strip()):
         quantity = FORMULAS.get(re.sub(r"[\s_]", "", formula["quantity"]).lower())
         if quantity:
@@ -180,6 +187,17 @@ def without_gradient(quantity: str) -> str:
     ('stretch 11', 'stretch yy', 'f1')
     """
     return DEFORMATION_GRADIENT.sub(r"stretch \1", quantity) if DEFORMATION_GRADIENT.fullmatch(quantity) else quantity
+
+
+def without_correction(quantity: str) -> str:
+    """Return what a column holds without words that it was corrected, as for the machine's compliance.
+
+    Examples
+    --------
+    >>> without_correction("corrected load"), without_correction("compliance corrected extension")
+    ('load', 'extension')
+    """
+    return plain(CORRECTED.sub(" ", quantity))
 
 
 def stretches_less_one(names: Sequence[str]) -> list[bool]:

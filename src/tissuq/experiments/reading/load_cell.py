@@ -33,13 +33,13 @@ and by which it has been away."""
 DRIFT, DRIFT_SCATTERS, END_ROWS, FEWEST_END_ROWS = 0.03, 4.5, 0.03, 4
 """Share of the largest load, and standard errors, of a drift; share of the rows at an end, or number."""
 ROWS_OF_OUTLIER, BLOCK = 12, 32
-"""Rows that are needed, and rows over which the scatter is told."""
+"""Rows in which outliers show at least, and rows over which the scatter beside them is told."""
 SCATTERS, LEAST_JUMP = 7.0, 0.03
-"""Standard deviations of the scatter, and share of the range, by which a row is off at least."""
+"""Standard deviations of the scatter, and share of the range, by which an outlier is off at least."""
 STEPS = 1.5
 """Steps of the resolution by which it is."""
 LARGEST_SHARE, SINGLE_ROWS = 0.02, 3
-"""Share of the rows, and number of them, up to which they are single ones, and not how these rows scatter."""
+"""Share of the rows, and number of them, up to which outliers are single ones, and not how these rows scatter."""
 
 
 def averaged(most_points: int, *columns: Column) -> tuple[NDArray[np.intp], list[Column]]:

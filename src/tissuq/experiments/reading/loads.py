@@ -11,10 +11,10 @@ from tissuq.experiments import units
 from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.column_units import factor_of, stress_unit_of
 from tissuq.experiments.reading.dimensions import Dimensions, in_words, tube_of
+from tissuq.experiments.reading.measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.options import ReadingOptions
 from tissuq.experiments.reading.plausibility import FIRST_ROW
 from tissuq.experiments.reading.recognition import ColumnChoice
-from tissuq.experiments.reading.stress_measures import StressMeasure, measure_of_tube
 from tissuq.experiments.reading.table import Column, Table
 from tissuq.experiments.reading.uneven_stress import apparent_stress
 from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, PRESSURE, TORQUE, Quantity, measured_in
@@ -42,6 +42,37 @@ class Load:
     scale: float = 1.0
     measure: StressMeasure | None = None
     note: str = ""
+
+    def stress_in(self, preload: str) -> float:
+        """Return a preload, a force or a stress with its unit, as a stress in MPa.
+
+        Raises
+        ------
+        InputError
+            When it is no positive number with a unit of force or stress, or a force where the file gives stresses.
+
+        Examples
+        --------
+        >>> forces = Load(np.array([0.1]), units.stress_unit("kPa"), "", divided=FORCE, by=10.0)
+        >>> forces.stress_in("0.05 N"), forces.stress_in("2 kPa")
+        (0.005, 0.002)
+        """
+        if self.measure is not None:
+            raise InputError(
+                f"preload '{preload}' (--preload) does not go with the pressure in a tube. Give the outer diameter "
+                "that it has without pressure as --diameter, and leave rows out with --stretch or --leave-out."
+            )
+        number, unit = number_and_unit(str(preload))
+        if number is None or number <= 0 or not unit:
+            raise InputError(
+                f"preload must be a positive force or stress with its unit, such as '0.05 N', not '{preload}'."
+            )
+        quantities = [self.divided] if self.divided else [FORCE, FORCE_PER_WIDTH]
+        if unit not in units.MASSES and all(quantity.factor_or_none(unit) is None for quantity in quantities):
+            return number * units.stress_unit(unit).to_mpa
+        if self.divided is None:
+            raise InputError(f"preload '{preload}' is a force, but the file gives stresses; give it as a stress.")
+        return number * self.divided.factor(unit) / self.by
 
 
 def stress_of(

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import InputError
-from tissuq.experiments.numbers import number_and_unit
 from tissuq.experiments.reading.slack import Slack
 from tissuq.experiments.reading.table import Column, Table, rows_in
-from tissuq.experiments.units import FORCE, FORCE_PER_WIDTH, MASSES, Quantity, stress_unit
 
-__all__ = ["COUNTED_FROM", "Dropped", "MeasuredRows", "labelled", "preload_stress"]
+__all__ = ["COUNTED_FROM", "Dropped", "MeasuredRows", "labelled"]
 
 COUNTED_FROM = "stretch counted from"
 """How the step begins that says where the specimen is undeformed."""
@@ -212,34 +210,6 @@ def labelled(labels: Sequence[str], texts: Sequence[str]) -> list[str]:
     if len(set(texts)) == 1:
         return [texts[0]]
     return [f"{label}: {text}" for label, text in zip(labels, texts, strict=True) if text]
-
-
-def preload_stress(preload: str, divided: Quantity | None, by: float) -> float:
-    """Return a preload, a force or a stress with its unit, as a stress in MPa.
-
-    Forces, or those per width, are divided by a size of the specimen (mm² or mm), where the file's are.
-
-    Raises
-    ------
-    InputError
-        When it is no positive number with a unit of force or stress, or a force where the file gives stresses.
-
-    Examples
-    --------
-    >>> preload_stress("0.05 N", FORCE, 10.0), preload_stress("2 kPa", None, 1.0)
-    (0.005, 0.002)
-    """
-    number, unit = number_and_unit(str(preload))
-    if number is None or number <= 0 or not unit:
-        raise InputError(
-            f"preload must be a positive force or stress with its unit, such as '0.05 N', not '{preload}'."
-        )
-    quantities = [divided] if divided else [FORCE, FORCE_PER_WIDTH]
-    if unit not in MASSES and all(quantity.factor_or_none(unit) is None for quantity in quantities):
-        return number * stress_unit(unit).to_mpa
-    if divided is None:
-        raise InputError(f"preload '{preload}' is a force, but the file gives stresses; give it as a stress.")
-    return number * divided.factor(unit) / by
 
 
 @dataclass(frozen=True)

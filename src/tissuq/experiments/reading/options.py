@@ -11,8 +11,7 @@ import numpy as np
 from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.experiments.pint_units import is_quantity, unit_of
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
-from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
+from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.vocabulary import DIMENSION_NAMES, ROLES_OF_TUBE
 
 __all__ = ["READING_OPTIONS", "TURNS", "PythonOptions", "ReadingOptions", "checked_mode", "spelled_out"]

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.headings import COMPONENTS, STRESS_NOUNS, dimensions_named, role_names
+from tissuq.experiments.reading.measures import STRAIN_MEASURES, STRESS_MEASURES
 from tissuq.experiments.reading.other_quantities import other_quantity
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
-from tissuq.experiments.reading.stress_measures import STRESS_MEASURES
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import DIAMETERS, PRESSURE
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES

@@ -22,10 +22,12 @@ from tissuq.experiments.reading.recognition import LENGTHENINGS, LOADS
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.units import measured_in
 
-__all__ = ["ColumnsOfTest", "columns_side_by_side"]
+__all__ = ["ColumnsOfTest", "columns_named_again", "columns_side_by_side"]
 
 PART_OF_MACHINE = re.compile(r"\b(cell|sensor|channel|kanal|aufnehmer|transducer|\d+ ?k?n)\b")
 """Words and capacities that tell one load cell from another, and not tests."""
+BETWEEN_WORDS = re.compile(r"\s+|(?<=\w)\.(?=[^\W\d]{2})")
+"""Blanks, or the points of R, as in ``S1.strain``."""
 TENSOR = frozenset(["11", "22", "33", "12", "13", "23", "21", "31", "32"])
 """Components, which are not numbers of tests."""
 LETTERS_OF_STRESS = "spt "
@@ -82,6 +84,24 @@ def columns_side_by_side(table: Table, stress_type: str | None, *, is_shear: boo
     ]
 
 
+def columns_named_again(table: Table, columns: Mapping[str, str | int]) -> list[ColumnsOfTest]:
+    """Return the columns of every test where names that are given stand over several columns; nothing elsewhere.
+
+    WebPlotDigitizer names all of a picture's curves X and Y, beneath the name of each. A column that stands there once
+    is of all tests.
+    """
+    by_role = {role: [k for k, name in enumerate(table.names, 1) if name == wanted] for role, wanted in columns.items()}
+    counts = {len(numbers) for numbers in by_role.values()} - {1}
+    loads = [number - 1 for role in LOADS for number in by_role.get(role, [])]
+    if len(counts) != 1 or 0 in counts or len(loads) not in counts:
+        return []
+    names = names_above(table, loads) or [str(number) for number in range(1, len(loads) + 1)]
+    return [
+        ColumnsOfTest(name, {role: numbers[k % len(numbers)] for role, numbers in by_role.items()})
+        for k, name in enumerate(names)
+    ]
+
+
 def _columns_of_first(candidates: Sequence[str], roles: Sequence[_Role]) -> tuple[str, list[int]]:
     """Return the first of some roles that columns have, and these."""
     for candidate in candidates:
@@ -115,7 +135,7 @@ def _told_by_unit(table: Table, column: int) -> _Role:
 def _parts(quantity: str) -> Iterator[tuple[str, str]]:
     """Yield the name of a quantity and the test that stands after or before it: first the whole, and no test."""
     yield quantity, ""
-    words = [word.strip(".:,()#") for word in quantity.split()]
+    words = [word.strip(".:,()#") for word in BETWEEN_WORDS.split(quantity)]
     for count in range(1, len(words)):
         head, tail = " ".join(words[:count]), " ".join(words[count:])
         for name, test in ((head, tail), (tail, head)):

@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 
 from tissuq.errors import InputError
 from tissuq.experiments.reading.measured_rows import MeasuredRows
+from tissuq.experiments.reading.measures import STRAIN_MEASURES
 from tissuq.experiments.reading.options import TURNS
 from tissuq.experiments.reading.recognition import SHEARS, ColumnChoice
-from tissuq.experiments.reading.strain_measures import STRAIN_MEASURES
+from tissuq.experiments.reading.stated_mode import direction_of
 from tissuq.experiments.reading.table import Column, Table
 
 __all__ = ["check_signs", "with_signs"]
 
 SIGNED = ("strain", "displacement", *SHEARS)
 """Deformations that may be counted the other way round."""
-COMPRESSION_WORDS = ("compressive", "compression", "stauchung", "druck", "сжима")
-"""How names of columns begin whose numbers may be positive in compression."""
 NEGLIGIBLE_STRAIN = 0.1
 """Share of the largest strain up to which strains of the other sign are noise or slack."""
 TURN_ALL = (
@@ -139,7 +138,7 @@ def _check_names(measured: MeasuredRows, choices: Sequence[ColumnChoice], direct
     for choice, stretch, stress in zip(choices, measured.stretch, measured.stress, strict=True):
         furthest = int(np.argmax(np.abs(stretch - 1)))
         for column, value in ((choice.deformation, stretch[furthest] - 1), (choice.stress, stress[furthest])):
-            if measured.table.quantities[column].startswith(COMPRESSION_WORDS) and value > 0:
+            if direction_of(measured.table.names[column]) == "compression" and value > 0:
                 raise InputError(
                     f"{measured.table.place(column, furthest)}: the name says compression and the value is positive. "
                     "If the machine counts compression as positive, give compression_positive=True "

@@ -44,6 +44,12 @@ MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "axial": "uniaxi
 """Words for loading modes beside their names."""
 NAMES_OF_MODES = {"pure-shear": "planar"}
 """Further names of loading modes."""
+OF_MACHINE = re.compile(
+    r"^\W*(test(ing)? )?(station|machine|frame|system|device|rig|instrument|configuration|(prüf)?maschine)\b[^:=]*[:=]|"
+    r"\w\.(?!csv|tsv|txt|dat|xls|ods|mat)[a-z]\w{1,3}\W*$",
+    re.IGNORECASE,
+)
+"""Lines that name a machine or a file of its settings, such as ``Biaxial.cfg``, and not what was done with it."""
 CONFINED = re.compile(r"(^|-)confined($|-)")
 """Words for compression between walls, which no loading mode is."""
 RHEOMETER = re.compile(
@@ -56,8 +62,12 @@ OF_RHEOMETER = re.compile(
 )
 """Names of columns that a rheometer writes beside strain and stress."""
 DIRECTIONS_OF_LOAD = {
-    "compression": re.compile(r"compress|compresi|compressão|druckversuch|stauch|压缩|圧縮|압축|сжати"),
-    "tension": re.compile(r"tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени"),
+    "compression": re.compile(
+        r"compress|(?<![a-z])compr(?![a-z])|compresi|(?<![^\W_])druck|stauch|压缩|压应|圧縮|압축|сжати|сжим"
+    ),
+    "tension": re.compile(
+        r"(?<![a-z])tension|tensile|zugversuch|traction|tracci|trazione|tração|拉伸|引張|인장|растяжени"
+    ),
 }
 """Words for the direction of a load."""
 HEAD_LINES = 20
@@ -78,7 +88,7 @@ def find_mode(file: str | os.PathLike[str], words: Sequence[str] = ()) -> tuple[
     path = Path(file)
     if mode := mode_in_comment(path):
         return mode, "a comment in the file"
-    for word in reversed(words):
+    for word in reversed([word for word in words if not OF_MACHINE.search(word)]):
         if mode := _mode_of_words(word):
             return mode, f"'{word}'"
     mode = _mode_of_words(path.stem)

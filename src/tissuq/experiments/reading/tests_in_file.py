@@ -14,6 +14,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.columns import choose_columns, find_column
 from tissuq.experiments.reading.data_frame import is_data_frame
@@ -23,7 +24,7 @@ from tissuq.experiments.reading.layout import LENGTH_RATIO, SHORT_TABLE
 from tissuq.experiments.reading.notes import concerned
 from tissuq.experiments.reading.options import READING_OPTIONS, PythonOptions, ReadingOptions, checked_mode, spelled_out
 from tissuq.experiments.reading.several_specimens import SeveralSpecimens, only_rows, row_names
-from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_side_by_side
+from tissuq.experiments.reading.side_by_side import ColumnsOfTest, columns_named_again, columns_side_by_side
 from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE, about_mode, direction_of, mode_of
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_tables
@@ -218,7 +219,10 @@ def _side_by_side(
     stated, source = mode_of(path, table, options, names)
     mode = checked_mode(stated, options)
     stress_type, columns = options.get("stress_type"), options.get("columns")
-    tests = [] if columns else columns_side_by_side(table, stress_type, is_shear=mode.controls == (SHEAR,))
+    is_shear = mode.controls == (SHEAR,)
+    tests = (
+        columns_named_again(table, columns) if columns else columns_side_by_side(table, stress_type, is_shear=is_shear)
+    )
     if not tests or len(mode.stresses) > 1:
         with about_mode(mode.name, source):
             choose_columns(table, mode, columns, options.get("strain_type"), stress_type, options.get("axis"))
@@ -281,9 +285,14 @@ def _without_what_others_need(
 
 
 def _check_modes(path: str | os.PathLike[str], tests: Sequence[TestInFile]) -> None:
-    """Refuse tests of which some say their loading mode, and others do not."""
+    """Refuse tests of which some say their loading mode, and others do not, unless these are directions alone.
+
+    Sheets named Axial and Circ are of the same uniaxial test in two of them.
+    """
     silent = [test.name for test in tests if test.reading.mode_source == DEFAULT_SOURCE]
-    if silent and len(silent) < len(tests):
+    experiments = [test.reading.experiment for test in tests]
+    are_directions = all(test.direction and isinstance(test.mode, Uniaxial) for test in experiments)
+    if silent and len(silent) < len(tests) and not are_directions:
         raise InputError(
             f"{path}: '{silent[0]}' does not say in which loading mode it was measured, as other tests in the file do. "
             f"Rename it, or give --mode once for all {len(tests)} tests, or once for each."

@@ -61,7 +61,7 @@ def _without_percent_signs(table: Table) -> Table:
 
     Workbooks show ratios so.
     """
-    if not any("%" in row for row in table.rows):
+    if not [row for row in table.rows if "%" in row]:  # a generator is called for every row
         return table
     rows = table.cells()
     columns = [

@@ -52,8 +52,8 @@ MARGINAL_POINTS, MARGINAL_NOISES = 1000, 400
 """Points, and values of the noise for each, from which the marginal of the noise is computed."""
 PULLED_DIVISOR = 5
 """So many times fewer, where priors of linear parameters depend on the noise, too."""
-MAX_CHEAP_BOUNDS, MAX_BOUNDED = 2, 8000
-"""Linear parameters up to which the masses within bounds cost little; points for which they are computed, of more."""
+MAX_CHEAP_BOUNDS = 2
+"""Linear parameters up to which the masses within bounds cost little."""
 TAILS_POWER = 0.25
 """Power of the weights by which components are taken that must represent the tails, too."""
 
@@ -107,12 +107,16 @@ class AmplitudeLattice:
                 f"discrepancy '{models[0].discrepancy.name}' needs wide positive priors on its amplitudes. Here "
                 f"{reason}: choose otherwise, or another discrepancy."
             )
+        bounded_points = self.guide.accuracy.bounded_points
         with one_thread():
             if Outer(models[0]).symbols:
-                sums = (_EnergySums(model, *weighted_nodes(model, self.guide)) for model in models)
+                sums = (_EnergySums(model, *weighted_nodes(model, self.guide), bounded_points) for model in models)
                 return [energy_sums.solution(self.components, seed) for energy_sums in sums]
             nodes = single_nodes(models)
-            sums = (_EnergySums(model, [node], np.zeros(1), 0.0) for model, node in zip(models, nodes, strict=True))
+            sums = (
+                _EnergySums(model, [node], np.zeros(1), 0.0, bounded_points)
+                for model, node in zip(models, nodes, strict=True)
+            )
             return [energy_sums.solution(self.components, seed) for energy_sums in sums]
 
 
@@ -139,9 +143,18 @@ class _EnergySums:
         Of the nodes: priors of the outer parameters over the density of the values taken.
     error : float
         Relative error of the nodes' sum.
+    bounded_points : int
+        Points, at most, of which masses are computed within bounds of more parameters than two.
     """
 
-    def __init__(self, model: StatisticalModel, nodes: Sequence[Node], log_weights: FloatArray, error: float) -> None:
+    def __init__(
+        self,
+        model: StatisticalModel,
+        nodes: Sequence[Node],
+        log_weights: FloatArray,
+        error: float,
+        bounded_points: int,
+    ) -> None:
         self.model, self._nodes = model, nodes
         self._outer = Outer(model)
         self._step = LOG_RATIO_STEP if len(nodes) == 1 else OUTER_STEP
@@ -153,13 +166,13 @@ class _EnergySums:
         mean, root, _ = self._priors.times(self._bare[0], self._bare[1] * points.noise_sd[:, None, None])
         mass_outside, log_weight = self._box.beyond(mean, root), points.log_weight + log_weights[self._node]
         is_near = mass_outside.sum(axis=1) > TOUCHED_MASS
-        if mean.shape[1] > MAX_CHEAP_BOUNDS and is_near.sum() > MAX_BOUNDED:
+        if mean.shape[1] > MAX_CHEAP_BOUNDS and is_near.sum() > bounded_points:
             at_most = log_weight + points.log_inside
             total = np.logaddexp.reduce(at_most)
-            rows = systematic(np.exp(at_most - total)[None], MAX_BOUNDED)[0]
+            rows = systematic(np.exp(at_most - total)[None], bounded_points)[0]
             points, self._node, self._bare = points[rows], self._node[rows], (self._bare[0][rows], self._bare[1][rows])
             mean, root, mass_outside, is_near = mean[rows], root[rows], mass_outside[rows], is_near[rows]
-            log_weight = total - np.log(MAX_BOUNDED) - points.log_inside
+            log_weight = total - np.log(bounded_points) - points.log_inside
         near = np.flatnonzero(is_near)
         log_mass, error_of_mass = np.zeros(len(mean)), np.zeros(len(mean))
         boxes = self._box.repeated(len(near))

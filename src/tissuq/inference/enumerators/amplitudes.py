@@ -16,7 +16,15 @@ from tissuq.inference.linear import LinearPriors
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
 
-__all__ = ["NEGLIGIBLE_SHARE", "Points", "Weighing", "log_prior_of_amplitude", "log_prior_of_noise", "noise_grid"]
+__all__ = [
+    "NEGLIGIBLE_SHARE",
+    "Points",
+    "Weighing",
+    "linear_at",
+    "log_prior_of_amplitude",
+    "log_prior_of_noise",
+    "noise_grid",
+]
 
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -117,33 +125,62 @@ class Weighing:
             ]
         points = Points.joined(points_of_members)
         mass = _masses([points])[0]
-        coarse, last = 0.0, 0.0
-        for member, lattice in enumerate(self._lattices):
-            of_member_mask = at_even = points.lattice == member
-            for grid, indices in zip(lattice.ratios, (points.first_index, points.second_index), strict=True):
-                at_even = at_even & ((indices % 2 == 0) | (len(grid) == 1))
-                last += mass[of_member_mask & (indices == len(grid) - 1) & (len(grid) > 1)].sum()
-            coarse += 2 ** sum(len(grid) > 1 for grid in lattice.ratios) * mass[at_even].sum()
+        at_even, last, counts = (
+            np.ones(len(mass)),
+            0.0,
+            np.array([lattice.misfit.shape[:2] for lattice in self._lattices]),
+        )
+        for count, indices in zip(counts[points.lattice].T, (points.second_index, points.first_index), strict=True):
+            at_even *= np.where(count == 1, 1.0, 2.0 * (indices % 2 == 0))
+            last += mass[(count > 1) & (indices == count - 1)].sum()
+        coarse = at_even @ mass
         error = np.inf if last > MAX_LAST_SHARE * mass.sum() else float(abs(coarse / mass.sum() - 1) ** 1.5)
         return points[mass >= _least_that_matters(mass)], error
 
     def _roughly(self) -> list[Points]:
         """Return the points that matter of every lattice, each at one noise."""
+        if not self._model.noise.parameters and not self._is_pulled:
+            return self._at_known_noise()
         points_of_members = [self._best_noise(member) for member in range(len(self._lattices))]
         masses = _masses(points_of_members)
         least_mass = max(_least_that_matters(np.concatenate(masses)), np.exp(-IRRELEVANT_LOG_DROP))
         return [points[mass >= least_mass] for points, mass in zip(points_of_members, masses, strict=True)]
 
+    def _at_known_noise(self) -> list[Points]:
+        """Return the points that matter of every lattice at the known noise, of which only these are made."""
+        noise_sd = float(self._model.noise.sd({}, 0.0))
+        logs = [self._log_weights(lattice, noise_sd) for lattice in self._lattices]
+        top = max(log_weights.max() for log_weights in logs)
+        masses = [np.exp(log_weights - top) for log_weights in logs]
+        least_mass = max(
+            _least_that_matters(np.concatenate([mass.ravel() for mass in masses])), np.exp(-IRRELEVANT_LOG_DROP)
+        )
+        points_of_members = []
+        for member, (lattice, mass) in enumerate(zip(self._lattices, masses, strict=True)):
+            second_index, first_index = np.nonzero(mass >= least_mass)
+            misfit = lattice.misfit[second_index, first_index, self._index]
+            noise = np.full(len(misfit), noise_sd)
+            points_of_members.append(self._weighed(member, second_index, first_index, misfit, noise))
+        return points_of_members
+
+    def _log_weights(self, lattice: Lattice, noise_sd: float) -> FloatArray:
+        """Return the log weights (G2, G1) of all points of a lattice at one noise, where nothing pulls."""
+        log_weights = lattice.log_likelihoods(self._index, noise_sd) + np.log(lattice.member.probability)
+        for amplitude, grid, axis in zip(lattice.member.amplitude_indices, lattice.ratios, (1, 0), strict=False):
+            prior = self._model.priors[self._model.energy_symbols[amplitude]]
+            of_grid = log_prior_of_amplitude(prior, grid * noise_sd) + _log_cells(np.arange(len(grid)), lattice.step)
+            log_weights += np.expand_dims(of_grid, 1 - axis)
+        return np.asarray(log_weights)
+
     def _are_cut(self, point_sets: Sequence[Points]) -> bool:
         """Return whether the bounds of linear parameters take away much."""
-        inside, total = 0.0, 0.0
-        for points, mass in zip(point_sets, _masses(point_sets), strict=True):
-            if len(points.lattice):
-                lattice = self._lattices[int(points.lattice[0])]
-                mean, root = lattice.linear(self._index, points.second_index, points.first_index)
-                ceiling = self._priors.box.ceiling(mean, root * points.noise_sd[:, None, None])
-                inside, total = inside + float(mass @ np.exp(ceiling)), total + float(mass.sum())
-        return inside < HARDLY_CUT_SHARE * total
+        box = self._priors.box
+        if not (np.isfinite(box.lower).any() or np.isfinite(box.upper).any()):
+            return False
+        points, mass = Points.joined(point_sets), np.concatenate(_masses(point_sets))
+        mean, root = linear_at(self._lattices, self._index, points)
+        ceiling = box.ceiling(mean, root * points.noise_sd[:, None, None])
+        return float(mass @ np.exp(ceiling)) < HARDLY_CUT_SHARE * float(mass.sum())
 
     def _best_noise(self, member: int) -> Points:
         """Return all points of a lattice at the known noise, or at the noise that each thinks best."""
@@ -215,12 +252,41 @@ class Weighing:
         for amplitude, (grid, place_on_grid) in zip(lattice.member.amplitude_indices, grids_and_indices, strict=False):
             amplitudes[:, amplitude] = grid[place_on_grid] * noise_sd
             log_weight += log_prior_of_amplitude(self._model.priors[symbols[amplitude]], amplitudes[:, amplitude])
-            # The first point stands for all smaller amplitudes, too, among which the density is constant.
-            log_weight += np.log(np.where(place_on_grid == 0, lattice.step / -np.expm1(-lattice.step), lattice.step))
+            log_weight += _log_cells(place_on_grid, lattice.step)
         member_of_point = np.full(len(first_index), member)
         return Points(
             member_of_point, second_index, first_index, noise_sd, amplitudes, log_weight, misfit, strain, log_inside
         )
+
+
+def linear_at(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[FloatArray, FloatArray]:
+    """Return means (M, p) of the linear parameters without priors at points, and roots (M, p, p) for unit noise.
+
+    Parameters
+    ----------
+    lattices : sequence of Lattice
+        Those of which the points say the place.
+    index : int
+        Of the data set in the lattices.
+    points : Points
+    """
+    p = lattices[0].parameters
+    mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
+    order = np.argsort(points.lattice, kind="stable")
+    ends = np.searchsorted(points.lattice[order], np.arange(len(lattices) + 1))
+    for lattice, start, end in zip(lattices, ends[:-1], ends[1:], strict=True):
+        if end > start:
+            rows = order[start:end]
+            mean[rows], root[rows] = lattice.linear(index, points.second_index[rows], points.first_index[rows])
+    return mean, root
+
+
+def _log_cells(place_on_grid: Places, step: float) -> FloatArray:
+    """Return the logarithms of the cells of places on a grid.
+
+    The first one stands for all smaller amplitudes, too, among which the density is constant.
+    """
+    return np.asarray(np.log(np.where(place_on_grid == 0, step / -np.expm1(-step), step)))
 
 
 def log_prior_of_amplitude(prior: Prior, amplitude: FloatArray) -> FloatArray:

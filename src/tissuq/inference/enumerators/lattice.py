@@ -7,7 +7,9 @@ sets and all exponents of the material. The ratio of the first block and the noi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import log, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +50,36 @@ class Rows:
     stresses: FloatArray
     scale: FloatArray
     count: int
+
+    @cached_property
+    def fit(self) -> LeastSquares:
+        """The least-squares fit of the linear parameters, the same for all members."""
+        basis, triangle = np.linalg.qr(self.design)
+        centre = basis.T @ self.stresses
+        log_size = np.log(np.abs(np.diag(triangle))).sum() + np.log(self.scale).sum()
+        columns = np.hstack([basis, self.stresses - basis @ centre])
+        return LeastSquares(np.linalg.inv(triangle), centre, columns, float(log_size))
+
+
+class LeastSquares(NamedTuple):
+    """A fit of p linear parameters to B data sets, in an orthonormal basis of their stresses.
+
+    Attributes
+    ----------
+    inverse : (p, p) array
+        Inverse of the triangle that turns the basis into the stresses of unit parameters.
+    centre : (p, B) array
+        The fit, in that basis.
+    columns : (n, p + B) array
+        The basis, and what the fit leaves of the data.
+    log_size : float
+        Log of the determinants of the triangle and of the scale of the noise.
+    """
+
+    inverse: FloatArray
+    centre: FloatArray
+    columns: FloatArray
+    log_size: float
 
 
 class Reduced:
@@ -175,23 +207,22 @@ class Lattice:
         self.parameters = rows.design.shape[1]
         self.freedom = rows.count - self.parameters
         # The material's part of the data and what it leaves, within the span of the features and outside.
-        basis, triangle = np.linalg.qr(rows.design)
-        self._inverse, self._fit = np.linalg.inv(triangle), basis.T @ rows.stresses
-        columns = np.hstack([basis, rows.stresses - basis @ self._fit])
-        inside = directions.basis.T @ columns
-        outside = columns - directions.basis @ inside
-        along, p = directions.along(inside), self.parameters
-        products = along[..., None] * along[:, :, None]
-        weighted = (1 / directions.variance) @ products.reshape(*along.shape[:2], -1)
-        moments = weighted.reshape(*weighted.shape[:2], *products.shape[2:]) + outside.T @ outside
-        precision, pull = moments[:, :, :p, :p], moments[:, :, :p, p:]
-        size = np.diagonal(moments[:, :, p:, p:], axis1=2, axis2=3)
-        tiny = 1e-15 * np.trace(precision, axis1=2, axis2=3)[:, :, None, None] * np.eye(self.parameters)
+        fit = rows.fit
+        self._inverse, self._centre = fit.inverse, fit.centre
+        inside = directions.basis.T @ fit.columns
+        outside = fit.columns - directions.basis @ inside
+        inside, p = directions.along(inside), self.parameters
+        # A sum along the directions, for each of their variances, of every product that is needed.
+        products = _products(inside, p)
+        sums = (1 / directions.variance) @ products + _products(outside[None], p).sum(axis=1)
+        of_design, size = np.split(sums, [p * inside.shape[2]], axis=2)
+        of_design = of_design.reshape(*of_design.shape[:2], p, inside.shape[2])
+        precision, pull = np.split(of_design, [p], axis=3)
+        tiny = 1e-15 * np.trace(precision, axis1=2, axis2=3)[:, :, None, None] * np.eye(p)
         gaussian = integrated(precision + tiny, pull, size)
         self._root, self._scores = gaussian.root, gaussian.scores
         self.misfit = np.maximum(gaussian.misfit, 0.0)
-        self.log_size = directions.log_size - gaussian.log_volume
-        self.log_size += np.log(np.abs(np.diag(triangle))).sum() + np.log(rows.scale).sum()
+        self.log_size = directions.log_size - gaussian.log_volume + fit.log_size
 
     def log_likelihood(
         self, data_set: int, second_index: Places, first_index: Places, noise_sd: FloatArray
@@ -201,11 +232,23 @@ class Lattice:
         log_noise = np.log(noise_sd) + 0.5 * log(2 * pi)
         return np.asarray(-self.freedom * log_noise - exponent - self.log_size[second_index, first_index])
 
+    def log_likelihoods(self, data_set: int, noise_sd: float) -> FloatArray:
+        """Return `log_likelihood` (G2, G1) at all points of the lattice, at one noise."""
+        log_noise = log(noise_sd) + 0.5 * log(2 * pi)
+        return np.asarray(-self.freedom * log_noise - 0.5 / noise_sd**2 * self.misfit[:, :, data_set] - self.log_size)
+
     def linear(self, data_set: int, second_index: Places, first_index: Places) -> tuple[FloatArray, FloatArray]:
         """Return means (M, p) of the material's parameters, and roots (M, p, p) of their covariance for unit noise."""
         root = self._root[second_index, first_index]
         shift = (root @ self._scores[second_index, first_index, :, data_set][:, :, None])[:, :, 0]
-        return (self._fit[:, data_set] + shift) @ self._inverse.T, self._inverse @ root
+        return (self._centre[:, data_set] + shift) @ self._inverse.T, self._inverse @ root
+
+
+def _products(columns: FloatArray, count: int) -> FloatArray:
+    """Return products of p columns with all p + B of (..., m, p + B), and squares of the last B, one after another."""
+    with_design = columns[..., :count, None] * columns[..., None, :]
+    shape = *columns.shape[:-1], count * columns.shape[-1]
+    return np.concatenate([with_design.reshape(shape), columns[..., count:] ** 2], axis=-1)
 
 
 def _log_product(variance: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.errors import ConvergenceError
-from tissuq.inference.enumerators.amplitudes import Points, Weighing
+from tissuq.inference.enumerators.amplitudes import Points, Weighing, linear_at
 from tissuq.inference.enumerators.lattice import LOG_RATIO_STEP, Directions, Lattice, Rows
 from tissuq.inference.enumerators.line import FINE, Accuracy, Line, first_places, known_along, peaks
 from tissuq.inference.marginal import Marginal, marginal_of_table
@@ -186,7 +186,7 @@ def single_nodes(models: Sequence[StatisticalModel]) -> list[Node]:
     for index, model in enumerate(models):
         points, error = Weighing(model, lattices, index).points()
         points = _thinned(points, MAX_POINTS, 0.5)
-        nodes.append(Node(points, *_linear(lattices, index, points), error))
+        nodes.append(Node(points, *linear_at(lattices, index, points), error))
     return nodes
 
 
@@ -344,7 +344,7 @@ class _Sums:
         lattices, ratios = self._lattices(settings, members), self._outer.ratios(settings)
         points, error = Weighing(self.model, lattices, 0, ratios).points()
         points = _thinned(points, MAX_POINTS_OF_NODE, GOLDEN_RATIO * self._calls % 1)
-        mean, root = _linear(lattices, 0, points)
+        mean, root = linear_at(lattices, 0, points)
         return Node(replace(points, lattice=members[points.lattice]), mean, root, error, settings, ratios)
 
     def _lattices(self, settings: FloatArray, members: Places) -> list[Lattice]:
@@ -375,15 +375,3 @@ def _most_noise(model: StatisticalModel) -> float:
     if not model.noise.parameters:
         return float(model.noise.sd({}, 0.0))
     return float(np.sqrt((model.stress**2).sum() / model.experiment.size))
-
-
-def _linear(lattices: Sequence[Lattice], index: int, points: Points) -> tuple[FloatArray, FloatArray]:
-    """Return means (M, p) of the linear parameters without priors, and roots (M, p, p) for unit noise."""
-    p = lattices[0].parameters
-    mean, root = np.empty((len(points.lattice), p)), np.empty((len(points.lattice), p, p))
-    for member in np.unique(points.lattice):
-        of_member = np.flatnonzero(points.lattice == member)
-        mean[of_member], root[of_member] = lattices[member].linear(
-            index, points.second_index[of_member], points.first_index[of_member]
-        )
-    return mean, root

@@ -356,8 +356,8 @@ class DirectionBlock(ProcessBlock):
         return _taylor(z, z_prime, length)
 
     def limits(self, reach: tuple[float, float]) -> Range:
-        least = SIGN_SHARE * max(map(abs, reach))  # what one sign tells of the other
-        return Range(along_axes=((self.dispersion, min(reach[0], -least), max(reach[1], least)),))
+        smallest = SIGN_SHARE * max(map(abs, reach))  # what one sign tells of the other
+        return Range(along_axes=((self.dispersion, min(reach[0], -smallest), max(reach[1], smallest)),))
 
     def stress_features(self, states: States, reach: tuple[float, float], length: float) -> FloatArray:
         (z, v), (isotropic, _) = self.coordinates(states), invariant_rates(states)

@@ -235,9 +235,9 @@ class Sketch(EnergyDiscrepancy):
 
     def members(self, states: States) -> list[Member]:
         members = self.whole.members(states)
-        few = members[:: 1 + len(members) // MEMBERS_OF_SKETCH]
-        total = sum(member.probability for member in few)
-        return [replace(member, probability=member.probability / total) for member in few]
+        sketch = members[:: 1 + len(members) // MEMBERS_OF_SKETCH]
+        total = sum(member.probability for member in sketch)
+        return [replace(member, probability=member.probability / total) for member in sketch]
 
 
 FIRST_BLOCKS = {TaylorBlock(): 1.0, LogBlock(): 1.0, SmallStrainBlock(): 0.05}
@@ -256,7 +256,7 @@ DISPERSIONS = 0.0, 0.2
 def _pairs(second_blocks: Iterable[EnergyBlock], odds: float = 1.0) -> tuple[Sum, ...]:
     """Return every energy of I1 with each of some others, such odds times those of the first."""
     pairs = product(FIRST_BLOCKS.items(), second_blocks)
-    return tuple(Sum((first, second), odds * odds_of_first) for (first, odds_of_first), second in pairs)
+    return tuple(Sum((block, second_block), odds * odds_of_block) for (block, odds_of_block), second_block in pairs)
 
 
 def _pairs_and_singles(odds_of_single: float) -> tuple[Sum, ...]:

@@ -195,8 +195,8 @@ def summarise_tissues(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
     low, modulus, high = (table[f"modulus_{name}"] for name in ("low", "of_predicted", "high"))
     table["modulus_inside"] = ((low <= modulus) & (modulus <= high)).where(modulus.notna()).astype(float)
     table["modulus_ratio"] = high / low.clip(lower=0)
-    parts = [table, table.assign(**{"class": ALL})] if table["class"].nunique() > 1 else [table]
-    rows = pd.concat(parts)
+    pieces = [table, table.assign(**{"class": ALL})] if table["class"].nunique() > 1 else [table]
+    rows = pd.concat(pieces)
     for name in ("protocol", "class", "formulation"):  # in the order of the results
         rows[name] = pd.Categorical(rows[name], list(dict.fromkeys(rows[name])))
     groups = rows.groupby(["protocol", "class", "formulation"], observed=True)
@@ -217,9 +217,9 @@ def _splits(folder: str | None, tissue: str, protocol: str) -> tuple[Split, ...]
     return tuple(PROTOCOLS[protocol](_corpus(folder)[tissue].tests))
 
 
-def _taken(count: int, most: int) -> list[int]:
+def _taken(count: int, limit: int) -> list[int]:
     """Return numbers below a count, evenly among all where these are too many."""
-    return sorted({int(number) for number in np.linspace(0, count - 1, min(count, most)).round()}) if count else []
+    return sorted({int(number) for number in np.linspace(0, count - 1, min(count, limit)).round()}) if count else []
 
 
 def _thinned(test: Experiment, points: int) -> Experiment:

@@ -58,7 +58,7 @@ class TissueSettings(TissueOptions):
     @field_validator("tolerances")
     @classmethod
     def _known_errors(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        looked_up(lambda given: Tolerances(**given), sizes or {})
+        looked_up(lambda errors: Tolerances(**errors), sizes or {})
         return sizes
 
     @field_validator("material")

@@ -1,0 +1,259 @@
+"""What was understood of files, for the page: tests with their curves, findings, and questions with their answers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.app.shell_forms import Proposal, ShellForms
+from tissuq.errors import TissuqError
+from tissuq.experiments.modes import loading_modes
+from tissuq.experiments.reading.inspection import Inspection, overview
+from tissuq.experiments.reading.stated_mode import DEFAULT_SOURCE
+from tissuq.experiments.reading.tables import read_tables
+from tissuq.experiments.units import stress_unit
+
+if TYPE_CHECKING:
+    from tissuq.experiments.reading.experiment_file import Reading
+    from tissuq.experiments.reading.table import Column, Table
+
+__all__ = ["account"]
+
+MAX_POINTS = 1500
+"""Points of a curve that are drawn."""
+MAX_ANSWERS, MAX_SHOWN = 12, 6
+"""Answers to one question, and how many of them are not folded."""
+MIN_LETTERS = 25
+"""Below which what is left of a message without its options says too little."""
+SECONDS_TO_TRY = 2.0
+"""After which no more answers to a question are tried to see what they would give."""
+EXAMPLE_ROWS = 4
+MODE = "Nothing says in which loading mode this was measured, so uniaxial was assumed. Which is it?"
+WORDS = {
+    "mode": "it was loaded in mode {}", "stress-unit": "stresses are in {}", "strain-unit": "strains are in {}",
+    "force-unit": "forces are in {}", "displacement-unit": "displacements are in {}", "sheet": "take sheet {}",
+    "table": "take table {}", "only": "take the rows where {}", "cycle": "take cycle {}", "branch": "take only {}",
+    "zero": "displacement counts from {}", "load-zero": "the load counts from {}", "turn": "change the sign of: {}",
+    "preload": "the specimen is taut at {}", "strain-type": "it is {} strain", "stress-type": "it is {} stress",
+    "until-peak": "leave out what follows the largest stress", "leave-out": "leave out line {}",
+    "compression-positive": "compression is positive in the file", "axis": "take axis {}",
+    "every": "take every {}th row",
+    "tension-positive": "tension is positive in the file", "stretch": "take stretches {}",
+}  # fmt: skip
+"""What options mean, for a person who clicks on them."""
+
+
+def account(
+    forms: ShellForms, files: Sequence[str], reading: Mapping[str, Any], modes: Sequence[str | None]
+) -> dict[str, Any]:
+    """Return what was understood of files, or why they are not, in plain data.
+
+    Parameters
+    ----------
+    forms : ShellForms
+    files : sequence of str
+        In the current folder.
+    reading : mapping
+        Settings of how all are read.
+    modes : sequence of str or None
+        The loading mode of each; None where it is to say itself.
+    """
+    paths = list(map(Path, files))
+    tables = {file: list(map(_table, _tables(file, reading))) for file in files}
+    columns = list(dict.fromkeys(column["name"] for of_file in tables.values() for table in of_file
+                                 for column in table["columns"]))  # fmt: skip
+    found: dict[str, Any] = {"tables": tables, "text": "", "tests": [], "findings": [], "questions": [], "error": None}
+    tests: list[tuple[dict[str, Any], Reading]] = []
+    for path, mode in zip(paths, modes, strict=True):
+        try:
+            tests += forms.find_tests(path, {**reading, "mode": mode}, is_only_file=len(files) == 1)
+        except TissuqError as refusal:
+            settings, start = {**reading, "mode": mode}, perf_counter()
+            asked = _question(forms, path, str(refusal), columns, settings, len(files), start, refused=True)
+            found["error"] = asked | {"file": str(path)}
+            break
+    start = perf_counter()
+    if tests and not found["error"]:
+        inspections = [Inspection.of(of_test) for _, of_test in tests]
+        found["text"] = str(inspections[0]) if len(tests) == 1 else overview(inspections)
+        pairs = zip(tests, inspections, strict=True)
+        found["tests"] = [_test(settings, inspection) for (settings, _), inspection in pairs]
+        texts = dict.fromkeys(text for inspection in inspections for text in inspection.warnings)
+        found["findings"] = [_finding(forms, text, columns, reading) for text in texts]
+        for (settings, of_test), mode in zip(tests, _modes_of(tests, files, modes), strict=True):
+            path = Path(settings["file"])
+            for text in of_test.doubts:
+                if text not in [question["text"] for question in found["questions"]]:
+                    asked = _question(forms, path, text, columns, {**reading, "mode": mode}, len(files), start)
+                    found["questions"] += [asked | {"file": str(path)}] if asked["answers"] else []
+        silent = [str(settings["file"]) for settings, of_test in tests if of_test.mode_source == DEFAULT_SOURCE]
+        if silent:
+            answers = [_plain_mode(name, kind.description) for name, kind in loading_modes().items()]
+            found["questions"].append({"text": MODE, "plain": MODE, "answers": answers, "shown": 1, "file": silent[0]})
+    return found
+
+
+def _modes_of(
+    tests: Sequence[tuple[dict[str, Any], Reading]], files: Sequence[str], modes: Sequence[str | None]
+) -> Iterator[str | None]:
+    stated = dict(zip(files, modes, strict=True))
+    return (stated.get(str(settings["file"])) for settings, _ in tests)
+
+
+def _plain_mode(name: str, description: str) -> dict[str, Any]:
+    return {"label": name, "gives": description, "settings": {"mode": name}, "asked_for": []}
+
+
+def _tables(file: str, reading: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of a file, or nothing where it has none that can be read."""
+    path = Path(file) if Path(file).exists() else Path(file.partition("#")[0])
+    try:
+        return list(read_tables(path, reading.get("skip_rows") or 0, reading.get("sheet"), reading.get("table")))
+    except TissuqError:
+        return []
+
+
+def _table(table: Table) -> dict[str, Any]:
+    units = [*table.units, *[""] * (len(table.names) - len(table.units))]
+    names = [{"name": table.key(column), "unit": units[column]} for column in range(len(table.names))]
+    return {"sheet": table.sheet, "number": table.number, "columns": names, "rows": table.rows[:EXAMPLE_ROWS]}
+
+
+def _test(settings: Mapping[str, Any], inspection: Inspection) -> dict[str, Any]:
+    reading = inspection.reading
+    experiment = reading.experiment
+    roles: dict[str, str] = {}
+    for number, choice in enumerate(reading.choices, start=1):
+        suffix = "2" if number > 1 else ""
+        roles[reading.table.key(choice.deformation)] = choice.measure + suffix
+        roles[reading.table.key(choice.stress)] = choice.load + suffix
+    return {
+        "name": experiment.name,
+        "file": str(settings["file"]),
+        "mode": experiment.mode.name,
+        "mode_source": reading.mode_source,
+        "is_mode_assumed": reading.mode_source == DEFAULT_SOURCE,
+        "unit": experiment.stress_unit,
+        "roles": roles,
+        "rows": len(reading.used),
+        "all_rows": len(reading.table.rows),
+        "line": inspection.line,
+        "steps": list(inspection.steps),
+        "cycles": [cycle.label for cycle in reading.cycles],
+        "range": [float(reading.used.stretch.min()), float(reading.used.stretch.max())],
+        "curves": [_curve(reading, number) for number in range(len(reading.used.labels))],
+    }
+
+
+def _curve(reading: Reading, number: int) -> dict[str, Any]:
+    """Return what is drawn of a stress: all rows, those that are used, and where something happened."""
+    used, unit = reading.used, stress_unit(reading.experiment.stress_unit)
+    controls = reading.experiment.mode.controls
+    regions = [
+        {"kind": region.kind, **_points(used.stretch[number][region.rows], used.stress[number][region.rows], unit)}
+        for region in reading.regions[number]
+        if len(region.rows)
+    ]
+    return {
+        "label": used.labels[number],
+        "x": controls[0].name if len(controls) == 1 else "stretch",
+        "y": f"engineering stress [{unit.name}]",
+        "recorded": _points(reading.recorded.stretch[number], reading.recorded.stress[number], unit),
+        "used": _points(used.stretch[number], used.stress[number], unit),
+        "regions": regions,
+    }
+
+
+def _points(stretch: Column, stress: Column, unit: Any) -> dict[str, list[float]]:
+    """Return points, of many some that are spread over them, in a unit; those that are no numbers left out."""
+    rows = np.unique(np.linspace(0, len(stretch) - 1, min(len(stretch), MAX_POINTS)).round().astype(int))
+    x, y = stretch[rows], stress[rows] / unit.to_mpa
+    is_number = np.isfinite(x) & np.isfinite(y)
+    return {"x": [float(f"{value:.6g}") for value in x[is_number]], "y": [float(f"{v:.6g}") for v in y[is_number]]}
+
+
+def _finding(forms: ShellForms, text: str, columns: Sequence[str], reading: Mapping[str, Any]) -> dict[str, Any]:
+    """Return something strange about measurements with what it proposes, which a person may take or not."""
+    answers = [
+        {"label": _in_words(proposal), "settings": _changes(reading, forms.with_proposal(reading, proposal))}
+        for proposal in forms.proposals_in(text, columns, reading)
+        if not proposal.asked_for and not proposal.leaves_out
+    ]
+    is_open = len(answers) <= MAX_SHOWN
+    return {"text": text, "plain": _without_options(text) if answers and is_open else text,
+            "answers": answers if is_open else []}  # fmt: skip
+
+
+def _question(
+    forms: ShellForms,
+    file: Path,
+    text: str,
+    columns: Sequence[str],
+    settings: Mapping[str, Any],
+    count: int,
+    start: float,
+    *,
+    refused: bool = False,
+) -> dict[str, Any]:
+    """Return a message with the answers that it proposes, and what each of them would give."""
+    answers: list[dict[str, Any]] = []
+    later: list[dict[str, Any]] = []
+    for proposal in forms.proposals_in(text, columns, settings):
+        answer: dict[str, Any] = {"label": _in_words(proposal), "gives": "", "asked_for": list(proposal.asked_for)}
+        answer["settings"] = _changes(settings, forms.with_proposal(settings, proposal))
+        if proposal.asked_for:
+            answers.append(answer)
+            continue
+        if perf_counter() - start < SECONDS_TO_TRY:
+            try:
+                tests = forms.find_tests(file, forms.with_proposal(settings, proposal), is_only_file=count == 1)
+                more = f", and {len(tests) - 1} more tests" if len(tests) > 1 else ""
+                answer["gives"] = Inspection.of(tests[0][1]).line + more
+            except TissuqError as refusal:
+                if str(refusal) == text or not refused:
+                    continue
+                later.append(answer | {"gives": "more is then asked"})
+                continue
+        answers.append(answer)
+    listed = [*answers, *later][:MAX_ANSWERS]
+    return {"text": text, "plain": _without_options(text) if listed else text, "answers": listed, "shown": MAX_SHOWN}
+
+
+def _without_options(text: str) -> str:
+    """Return a message without the clauses that say what to type, for which there are buttons.
+
+    Examples
+    --------
+    >>> _without_options("the file states no unit of stress, so MPa was assumed; say which it is: --stress-unit kPa.")
+    'the file states no unit of stress, so MPa was assumed.'
+    """
+    text = re.sub(r" \([^()]*--[^()]*\)", "", text)
+    clauses = re.split(r"(?<=[;.:]) ", text)
+    first = next((number for number, clause in enumerate(clauses) if "--" in clause), len(clauses))
+    while first and clauses[first - 1].endswith(":") and first < len(clauses):
+        first -= 1
+    plain = " ".join(clauses[:first]).rstrip(";: ")
+    return text if len(plain) < MIN_LETTERS else plain if plain.endswith(".") else f"{plain}."
+
+
+def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in after.items() if before.get(name) != value}
+
+
+def _in_words(proposal: Proposal) -> str:
+    if proposal.leaves_out:
+        return proposal.text
+    return ", ".join(_one_in_words(*option) for option in proposal.options)
+
+
+def _one_in_words(name: str, value: str) -> str:
+    if name == "column":
+        role, _, column = value.partition("=")
+        return f"{role} is in column '{column}'"
+    words = WORDS.get(name, name.replace("-", " ") + " {}")
+    return words.format(value) if value else words.replace(" {}", "")

@@ -1,0 +1,109 @@
+"""The server of the page: on this computer alone, under an address that nobody can guess."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import tempfile
+import webbrowser
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+from secrets import token_urlsafe
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.routing import Mount
+
+from tissuq.app.guard import Guard
+from tissuq.app.routes import routes
+from tissuq.app.sessions import GRACE, Sessions
+from tissuq.app.shell_forms import ShellForms
+from tissuq.app.workers import Workers
+from tissuq.errors import InputError
+
+__all__ = ["LOOPBACK", "serve"]
+
+LOOPBACK = "127.0.0.1"
+
+
+class _Server(uvicorn.Server):
+    """A server that Ctrl-C and requests to terminate end without more, so that files are deleted after it."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """End on signals; Uvicorn would raise them anew, and so end the process at once."""
+        before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def serve(
+    forms: ShellForms,
+    port: int = 0,
+    *,
+    open_browser: bool = True,
+    grace: float = GRACE,
+    say: Callable[[str], None] = _say,
+) -> None:
+    """Serve the page until Ctrl-C.
+
+    Parameters
+    ----------
+    forms : ShellForms
+    port : int
+        0 for one that is free.
+    open_browser : bool
+    grace : float
+        Seconds after which the files of a page that was closed are deleted.
+    say : callable
+        Is told the address.
+
+    Raises
+    ------
+    InputError
+        When the port is in use.
+    """
+    listening = _socket(port)
+    port, token = listening.getsockname()[1], token_urlsafe(24)
+    address = f"http://{LOOPBACK}:{port}/{token}/"
+    with tempfile.TemporaryDirectory(prefix="tissuq-app-", ignore_cleanup_errors=True) as folder:
+        sessions = Sessions(Path(folder), Workers(forms), grace)
+
+        @asynccontextmanager
+        async def lifespan(_: Starlette) -> AsyncIterator[None]:
+            await sessions.workers.start()
+            say(f"The page is at {address}\nIt is for this computer alone. Ctrl-C ends it and deletes its files.")
+            if open_browser:
+                webbrowser.open(address)
+            try:
+                yield
+            finally:
+                await sessions.close()
+
+        app = Starlette(routes=[Mount(f"/{token}", routes=routes(sessions))], lifespan=lifespan)
+        guarded = Guard(app, token, [f"{host}:{port}" for host in (LOOPBACK, "localhost")])
+        config = uvicorn.Config(
+            guarded, log_level="warning", access_log=False, ws="none", timeout_graceful_shutdown=1, server_header=False
+        )
+        _Server(config).run(sockets=[listening])
+
+
+def _socket(port: int) -> socket.socket:
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((LOOPBACK, port))
+    except OSError as error:
+        listening.close()
+        raise InputError(
+            f"port {port} cannot be used ({error.strerror}): leave --port out, and a free one is taken."
+        ) from error
+    return listening

@@ -1,0 +1,187 @@
+"""Sessions of the page, one a tab: its files, its work, its news; when the tab is closed, all of it goes."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import AsyncIterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from secrets import token_urlsafe
+from typing import Any
+
+from tissuq.app.workers import News, Workers
+from tissuq.errors import InputError
+
+__all__ = ["GRACE", "Session", "Sessions"]
+
+GRACE = 15.0
+"""Seconds after which a session ends whose page has gone."""
+MAX_SESSIONS = 50
+FIRST_SIGN = 60.0
+"""Seconds within which a new session's page must listen."""
+
+
+class Session:
+    """What one tab has: a folder, tasks that go on, and news of them that it has not heard.
+
+    Parameters
+    ----------
+    name : str
+        Random, so that no tab knows that of another.
+    folder : Path
+        With the files of its user.
+    """
+
+    def __init__(self, name: str, folder: Path) -> None:
+        self.name, self.folder = name, folder
+        self.news: list[dict[str, Any]] = []
+        self.tasks: dict[int, asyncio.Task[None]] = {}
+        self.listeners = 0
+        self.end: asyncio.TimerHandle | None = None
+        self._changed = asyncio.Event()
+        self._count = 0
+
+    @property
+    def files(self) -> list[str]:
+        """The names of the files that were dropped."""
+        return sorted(path.name for path in self.folder.iterdir() if path.is_file() and not path.name.startswith("."))
+
+    def path_of(self, name: str) -> Path:
+        """Return a file in the folder, by its path there.
+
+        Raises
+        ------
+        InputError
+            When there is no such file, or it lies elsewhere.
+        """
+        path = (self.folder / name).resolve()
+        if not path.is_relative_to(self.folder.resolve()) or not path.exists():
+            raise InputError(f"there is no '{name}' in this session.")
+        return path
+
+    def begin(self, workers: Workers, task: str, request: Mapping[str, Any]) -> int:
+        """Begin a task and return its number, under which its news are."""
+        self._count += 1
+        number = self._count
+
+        def say(news: News) -> None:
+            self.news.append({"task": number, "kind": news.kind, "data": news.data})
+            self._changed.set()
+
+        async def work() -> None:
+            try:
+                await workers.run(task, request, self.folder, say)
+            except asyncio.CancelledError:
+                say(News("stopped", None))
+                raise
+            finally:
+                self.tasks.pop(number, None)
+
+        self.tasks[number] = asyncio.get_running_loop().create_task(work())
+        return number
+
+    def stop(self, number: int) -> None:
+        """Stop a task, if it still goes on."""
+        if task := self.tasks.get(number):
+            task.cancel()
+
+    async def heard(self, start: int) -> AsyncIterator[tuple[int, dict[str, Any]]]:
+        """Iterate over the news from a number on, as they come."""
+        position = start
+        while True:
+            while position < len(self.news):
+                yield position, self.news[position]
+                position += 1
+            self._changed.clear()
+            await self._changed.wait()
+
+
+class Sessions:
+    """All sessions, by their names, and the processes that work for them.
+
+    Parameters
+    ----------
+    folder : Path
+        In which every session has its own.
+    workers : Workers
+    grace : float
+        Seconds after which a session ends whose page has gone.
+    """
+
+    def __init__(self, folder: Path, workers: Workers, grace: float = GRACE) -> None:
+        self.folder, self.workers, self.grace = folder, workers, grace
+        self._by_name: dict[str, Session] = {}
+
+    def __len__(self) -> int:
+        return len(self._by_name)
+
+    def new(self) -> Session:
+        """Begin a session.
+
+        Raises
+        ------
+        InputError
+            When there are too many.
+        """
+        if len(self) >= MAX_SESSIONS:
+            raise InputError(f"{MAX_SESSIONS} pages are open already: close some.")
+        name = token_urlsafe(12)
+        folder = self.folder / name
+        folder.mkdir(mode=0o700)
+        session = self._by_name[name] = Session(name, folder)
+        self._end_in(session, FIRST_SIGN)
+        return session
+
+    def named(self, name: str) -> Session:
+        """Return a session.
+
+        Raises
+        ------
+        InputError
+            When it has ended.
+        """
+        if name not in self._by_name:
+            raise InputError("this page was away for too long, and its files are deleted. Load it again.")
+        return self._by_name[name]
+
+    def listen(self, session: Session) -> None:
+        """Count a page that listens to a session's news."""
+        session.listeners += 1
+        if session.end is not None:
+            session.end.cancel()
+            session.end = None
+
+    def leave(self, session: Session) -> None:
+        """Count that page no more; the last one's session ends soon unless it comes back."""
+        session.listeners -= 1
+        if not session.listeners and session.name in self._by_name:
+            self._end_in(session, self.grace)
+
+    def end(self, session: Session) -> None:
+        """Stop the work of a session and delete its files."""
+        self._by_name.pop(session.name, None)
+        if session.end is not None:
+            session.end.cancel()
+        tasks = list(session.tasks.values())
+        for task in tasks:
+            task.cancel()
+        self._delete(session, tasks)
+
+    def _delete(self, session: Session, tasks: list[asyncio.Task[None]]) -> None:
+        if any(not task.done() for task in tasks):  # its process may still write
+            asyncio.get_running_loop().call_later(0.05, self._delete, session, tasks)
+        else:
+            shutil.rmtree(session.folder, ignore_errors=True)
+
+    def _end_in(self, session: Session, seconds: float) -> None:
+        if session.end is not None:
+            session.end.cancel()
+        session.end = asyncio.get_running_loop().call_later(seconds, self.end, session)
+
+    async def close(self) -> None:
+        """End all sessions and all processes."""
+        for session in list(self._by_name.values()):
+            with suppress(OSError):
+                self.end(session)
+        await self.workers.stop()

@@ -1,0 +1,39 @@
+// The answer, and what comes of going on from it.
+import { byId, fill, make, repeatOf, tableOf, warningsOf } from "./dom.js";
+
+export const showAnswer = answer => {
+  const [first, ...others] = answer.readable;
+  fill(byId("answer-body"),
+    ...warningsOf(answer.shown.filter(warning => warning.severity === "problem")),
+    make("div", { className: "numbers" },
+      make("p", { className: "soft", textContent: answer.title }),
+      make("p", { className: "first" }, `${first.name} `, make("strong", { textContent: first.value }), make("span", { textContent: ` 95 % interval ${first.interval}` })),
+      ...others.map(item => make("p", {}, `${item.name} `, make("strong", { textContent: item.value }), make("span", { textContent: ` 95 % interval ${item.interval}` }))),
+      make("p", { className: "soft", textContent: `The intervals are of ${answer.meaning}.` })),
+    make("ul", { className: "uses" }, ...answer.uses.map(use => make("li", { className: use.verdict.split(" ")[0] },
+      make("strong", { textContent: `${use.verdict.toUpperCase()}: ` }), use.purpose, make("span", { textContent: use.reason })))),
+    make("p", {}, make("strong", { textContent: "Next: " }), answer.next),
+    ...warningsOf(answer.shown.filter(warning => warning.severity !== "problem")),
+    answer.folded.length ? make("details", {}, make("summary", { textContent: `${answer.folded.length} further warnings and notes` }), ...warningsOf(answer.folded)) : null,
+    repeatOf(answer.repeat));
+};
+
+export const reportOf = (address, title) => make("div", {},
+  make("p", {}, make("a", { href: address, target: "_blank", rel: "noopener", textContent: "Open the report in a tab of its own" })),
+  make("iframe", { src: address, title }));
+
+export const showLaws = (found, address, zip) => fill(byId("laws-result"),
+  make("p", { textContent: found.lead }), tableOf(found.headers, found.rows, "Laws"),
+  ...Object.entries(found.skipped).map(([name, reason]) => make("p", { className: "soft", textContent: `Not fitted: ${name}: ${reason}` })),
+  found.warnings.length ? make("details", {}, make("summary", { textContent: `${found.warnings.length} warnings and notes` }), ...warningsOf(found.warnings)) : null,
+  repeatOf(found.repeat), make("p", {}, make("a", { className: "button", href: zip, textContent: "Download the comparison (zip)" })), reportOf(address, "Report of the comparison"));
+
+export const showPrediction = (found, address, zip) => fill(byId("predict-result"),
+  ...warningsOf(found.warnings), make("h3", { textContent: found.title }), tableOf(found.headers, found.rows, found.title), repeatOf(found.repeat),
+  make("p", {}, make("a", { className: "button", href: zip, textContent: "Download the prediction (zip)" })), reportOf(address, "Report of the prediction"));
+
+export const showCards = (found, zip) => fill(byId("export-result"),
+  make("ul", {}, ...found.explanations.map(text => make("li", { textContent: text }))),
+  make("p", {}, make("a", { className: "button", href: zip, textContent: `Download ${found.files.length} cards (zip)` })),
+  make("details", {}, make("summary", { textContent: `The first card, ${found.files[0]}` }), make("pre", { textContent: found.example, tabIndex: 0 })),
+  repeatOf(found.repeat));

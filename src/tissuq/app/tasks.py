@@ -1,0 +1,301 @@
+"""What a process beside the page does when it is asked: read, fit, compare laws, predict, write cards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from tissuq.app.repeat import command, fit_lines, reading_words
+from tissuq.app.shell_forms import ShellForms
+
+if TYPE_CHECKING:
+    from tissuq.studies.specimen import SpecimenStudy
+
+__all__ = ["TASKS", "Say", "warm_up"]
+
+Say = Callable[[str, Any], None]
+"""Is told what has come of a task so far: the kind of news, and plain data."""
+RUNS, CARDS = Path("runs"), Path("cards")
+SHOWN_OPTIONS = ("material", "laws", "discrepancies", "noise_sd", "estimand", "stable_in")
+"""Options of a fit that the page has."""
+
+
+def choices(_: ShellForms, __: Mapping[str, Any], say: Say) -> None:
+    """Say what there is to choose from."""
+    from tissuq.experiments.modes import loading_modes
+    from tissuq.export import card_formats
+    from tissuq.mechanics.material import materials
+    from tissuq.model.discrepancy import discrepancies
+    from tissuq.model.tolerances import ESTIMANDS
+
+    say(
+        "done",
+        {
+            "materials": [
+                {"name": name, "words": kind.formula, "is_isotropic": kind.is_isotropic}
+                for name, kind in materials().items()
+            ],
+            "modes": [
+                {"name": name, "words": kind.description, "controls": [control.name for control in kind.controls]}
+                for name, kind in loading_modes().items()
+            ],
+            "discrepancies": [{"name": name, "words": kind.formula} for name, kind in discrepancies().items()],
+            "estimands": [{"name": name, "words": kind.description} for name, kind in ESTIMANDS.items()],
+            "formats": sorted(card_formats(), key=lambda name: name == "table"),
+        },
+    )
+
+
+def inspect(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+    """Say what is understood of files, and what repeats it."""
+    from tissuq.app.account import account
+
+    files, modes, reading = _files(request)
+    found = account(forms, files, reading, [mode or None for mode in modes or [""] * len(files)])
+    options = f", {', '.join(f'{name}={value!r}' for name, value in reading.items())}" if reading else ""
+    options += f", mode={modes[0]!r}" if modes else ""
+    lines = "\n".join(["import tissuq as tq", "", *(f"print(tq.inspect({file!r}{options}))" for file in files)])
+    say("done", found | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
+
+
+def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+    """Fit a material; say the answer as soon as it is there, then write the run."""
+    from tissuq.report.answer import answer_record, readable_estimates, shown_and_folded
+    from tissuq.report.run_folder import run_folder
+    from tissuq.report.specimen import write_specimen_run
+    from tissuq.studies.specimen import run_specimen
+    from tissuq.studies.specimen_settings import SpecimenSettings
+
+    say("step", "reading")
+    values, found, name = _measured(forms, request)
+    options = _options(request, ("material", "discrepancies", "noise_sd", "estimand", "stable_in"))
+    settings = _settings(SpecimenSettings, values | options)
+    shell = _shell("fit", *_files(request), options)
+
+    def say_answer(study: SpecimenStudy) -> None:
+        title = f"{study.experiment.name}: {settings.material} with the discrepancy '{study.main}'"
+        record = answer_record(title, study.main, study.answer, study.unit, study.warnings)
+        shown, folded = shown_and_folded(record)
+        of_page = {
+            "readable": readable_estimates(record),
+            "next": record["next"].replace("{run}", f"runs/{name}"),
+            "shown": shown,
+            "folded": folded,
+            "run": name,
+            "modes": [mode.name for mode in study.experiment.modes],
+            "not_converged": study.not_converged,
+            "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
+        }
+        say("answer", record | of_page)
+
+    study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=found, early=say_answer)
+    say("step", "writing the report")
+    with run_folder(RUNS / name, force=True) as folder:
+        write_specimen_run(study, _sources(settings), folder)
+    say("done", {"run": name, "report": f"runs/{name}/report.html"})
+
+
+def laws(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+    """Compare laws; say their table, and write the run."""
+    from tissuq.report.laws import HEADERS, law_lead, law_result, readable_laws
+    from tissuq.report.run_folder import run_folder
+    from tissuq.report.writer import write_result
+    from tissuq.result_warning import in_shell
+    from tissuq.studies.laws import run_laws
+    from tissuq.studies.specimen_settings import LawSettings
+
+    say("step", "reading")
+    values, found, name = _measured(forms, request)
+    options = _options(request, ("laws", "discrepancies", "noise_sd", "estimand"))
+    settings = _settings(LawSettings, values | options)
+    study = run_laws(settings, Path(), lambda text: say("step", text), found=found)
+    folder_name = f"{name}-laws"
+    say("step", "writing the report")
+    with run_folder(RUNS / folder_name, force=True) as folder:
+        write_result(law_result(study, _sources(settings)), folder)
+    shell = _shell("fit", *_files(request), options | {"out": f"runs/{folder_name}"})
+    say(
+        "done",
+        {
+            "lead": law_lead(study),
+            "headers": [HEADERS[0], f"modulus [{study.unit.name}]", *HEADERS[2:]],
+            "rows": readable_laws(study),
+            "skipped": dict(study.skipped),
+            "warnings": [{"severity": w.severity, "text": in_shell(w)} for w in study.warnings],
+            "run": folder_name,
+            "report": f"runs/{folder_name}/report.html",
+            "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
+        },
+    )
+
+
+def predict(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+    """Predict another loading mode from a run; say the bands, and write the folder."""
+    from tissuq.report.prediction import band_headers, prediction_result, readable_bands
+    from tissuq.report.run_folder import run_folder
+    from tissuq.report.writer import write_result
+    from tissuq.result_warning import in_shell
+    from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
+
+    options = _options(request, ("mode", "stretch", "stretch2"))
+    run = RUNS / _run_name(request)
+    settings = _settings(PredictionSettings, {"run": run.as_posix(), **options})
+    prediction = run_prediction(settings, Path(), lambda text: say("step", text))
+    target = RUNS / f"{run.name}-{prediction.mode.name}"
+    say("step", "writing the report")
+    with run_folder(target, force=True) as folder:
+        write_result(prediction_result(prediction, settings, target), folder)
+    points = settings.points_of(prediction.mode.name)
+    python = [*_imports(points), f'prediction = tq.predict_run("{run.as_posix()}", mode={prediction.mode.name!r}'
+              f"{_points_in_python(settings, points)})", "print(prediction.table)"]  # fmt: skip
+    say(
+        "done",
+        {
+            "headers": band_headers(prediction),
+            "rows": readable_bands(prediction),
+            "title": f"Stress in mode {prediction.mode.name}, {prediction.unit.name}",
+            "warnings": list(map(in_shell, prediction.warnings)),
+            "run": target.name,
+            "report": f"{target.as_posix()}/report.html",
+            "repeat": {"shell": command("predict", [run.as_posix()], options), "python": "\n".join(python)},
+        },
+    )
+
+
+def export(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
+    """Write draws of a run as material cards; say the files and what they are."""
+    from tissuq.export import CardSettings
+    from tissuq.report.cards import write_cards
+    from tissuq.studies.earlier_run import load
+
+    format, draws, seed = str(request["format"]), int(request.get("draws") or 20), int(request.get("seed") or 0)
+    run, unit = RUNS / _run_name(request), str(request.get("unit") or "MPa")
+    keep_all = bool(request.get("all_draws"))
+    settings = CardSettings(unit=unit)
+    target = CARDS / f"{run.name}-{format}"
+    say("step", "drawing")
+    ensemble = load(run).ensemble(draws, seed, admissible=not keep_all)
+    say("step", "writing the cards")
+    source = f"run {run.name} of tissuq, sobol draws from seed {seed}"
+    cards = write_cards(ensemble, target, format, force=True, source=source, unit=settings.unit)
+    options = {"format": format, "draws": draws, "unit": unit, "seed": seed, "all_draws": keep_all}
+    drawn = f"{draws}, seed={seed}" + (", admissible=False" if keep_all else "")
+    python = [
+        "import tissuq as tq", "", f'posterior = tq.load("{run.as_posix()}")',
+        f'tq.write_cards(posterior.ensemble({drawn}), "{target.as_posix()}", "{format}", unit="{unit}")',
+    ]  # fmt: skip
+    say(
+        "done",
+        {
+            "files": list(cards.files),
+            "explanations": list(cards.warnings),
+            "example": next(iter(cards.files.values())),
+            "folder": target.as_posix(),
+            "repeat": {"shell": command("export", [run.as_posix()], options), "python": "\n".join(python)},
+        },
+    )
+
+
+TASKS: dict[str, Callable[[ShellForms, Mapping[str, Any], Say], None]] = {
+    "choices": choices,
+    "inspect": inspect,
+    "fit": fit,
+    "laws": laws,
+    "predict": predict,
+    "export": export,
+}
+"""Every task by name."""
+
+
+def warm_up(forms: ShellForms) -> None:
+    """Do all of a small fit once in the current folder, so that imports and compilation are over when it matters."""
+    stretches = [1 + 0.01 * number for number in range(1, 41)]
+    stresses = (10 * (x - x**-2) * (1 + 0.5 * (x - 1)) + 0.02 * (-1) ** n for n, x in enumerate(stretches))
+    rows = "".join(f"{x},{stress}\n" for x, stress in zip(stretches, stresses, strict=True))
+    Path("warm-up.csv").write_text(f"# mode: uniaxial\nstretch,stress [kPa]\n{rows}", encoding="utf-8")
+    fit(forms, {"files": ["warm-up.csv"]}, lambda kind, news: None)
+
+
+def _files(request: Mapping[str, Any]) -> tuple[list[str], list[str], dict[str, Any]]:
+    """Return the files of a request, the mode of each where they are stated, and how they are read."""
+    reading = {name: value for name, value in dict(request.get("reading") or {}).items() if value not in (None, {}, "")}
+    if "columns" in reading:
+        reading["columns"] = {role: _name_or_number(name) for role, name in reading["columns"].items()}
+    if "sheet" in reading:
+        reading["sheet"] = _name_or_number(reading["sheet"])
+    modes = list(request.get("modes") or [])
+    return list(request["files"]), modes if any(modes) else [], reading
+
+
+def _name_or_number(name: Any) -> str | int:
+    """Return a number where a column or sheet is named by one, as on the command line."""
+    return int(name) if str(name).isdecimal() else str(name)
+
+
+def _measured(forms: ShellForms, request: Mapping[str, Any]) -> tuple[dict[str, Any], Sequence[Any], str]:
+    """Return the settings that say what was measured, what was read, and the name of the run."""
+    files, modes, reading = _files(request)
+    paths = list(map(Path, files))
+    with redirect_stdout(StringIO()):  # it prints what several tests are, which the page shows by itself
+        values, found = forms.measured(paths, reading, modes or None, None, None)
+    values = {name: value for name, value in values.items() if value is not None}
+    sources = [Path(test["file"]) for test in values.get("tests") or [values]]
+    name = paths[0].stem if len(paths) == 1 else f"{sources[0].stem}-and-{len(sources) - 1}-more"
+    return values, found, name
+
+
+def _options(request: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return the options of a request that are not left to the default."""
+    stated = {name: request.get(name) for name in names}
+    return {name: value for name, value in stated.items() if value not in (None, "", [], ())}
+
+
+def _settings(kind: Any, values: dict[str, Any]) -> Any:
+    from tissuq.studies.settings import load_settings
+
+    return load_settings(kind, None, values, rivals=("noise", "noise_sd"))
+
+
+def _sources(settings: Any) -> list[Path]:
+    return [Path(test.file) for test in settings.tests or (settings,)]
+
+
+def _shell(
+    verb: str,
+    files: Sequence[str],
+    modes: Sequence[str],
+    reading: Mapping[str, Any],
+    options: Mapping[str, Any] | None = None,
+) -> str:
+    modes = modes[:1] if len(set(modes)) == 1 else modes
+    words = [*files, *reading_words(reading), *(word for mode in modes for word in ("--mode", mode))]
+    return command(verb, words, options or {})
+
+
+def _stage(text: str) -> str:
+    return text if text == "assessing" or ":" in text else f"fitting, discrepancy {text}"
+
+
+def _run_name(request: Mapping[str, Any]) -> str:
+    """Return the name of a run in the folder of runs, and of nothing else."""
+    return Path(str(request["run"])).name
+
+
+def _imports(points: Any) -> list[str]:
+    return [*(["import numpy as np"] if points is not None else []), "import tissuq as tq", ""]
+
+
+def _points_in_python(settings: Any, points: Any) -> str:
+    if points is None:
+        return ""
+    if points.ndim == 1 and ":" in cast("str", settings.stretch):
+        low, high = points[0], points[-1]
+        return f", stretch=np.linspace({low:.12g}, {high:.12g}, {len(points)})"
+    if points.ndim == 1:
+        return f", stretch=np.array({points.tolist()})"
+    return f", stretch=np.column_stack([np.linspace({points[0, 0]:.12g}, {points[-1, 0]:.12g}, {len(points)}), " + (
+        f"np.linspace({points[0, 1]:.12g}, {points[-1, 1]:.12g}, {len(points)})])"
+    )

@@ -1,0 +1,107 @@
+"""The parameters of a law that come nearest to a draw, under the condition that the law is stable."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.export.constrained_fit import Inequalities, fit_within, least_squares
+from tissuq.export.draw_stresses import DrawStresses
+from tissuq.export.stability_rows import StabilityRows
+
+__all__ = ["WANTED_ERROR", "Candidate", "NearestLaw", "squared_distance"]
+
+FloatArray = NDArray[np.float64]
+
+WEIGHTS_BEYOND = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""Weights of states beyond the measured ones, of which the heaviest is taken that costs little inside."""
+WANTED_ERROR = 0.01
+"""Largest relative error of a stress inside with which a card is content."""
+MAX_RMS_RATIO = 1.1
+"""Where that is out of reach: the root mean square error inside may be so many times the smallest."""
+
+
+class Candidate(NamedTuple):
+    """Values of the parameters that are not linear, and what unit values of the k others give.
+
+    Attributes
+    ----------
+    setting : tuple of float
+    columns : (n, k) array
+        Stresses in the states.
+    unit_moduli : (k,) array
+        Initial shear moduli.
+    """
+
+    setting: tuple[float, ...]
+    columns: FloatArray
+    unit_moduli: FloatArray
+
+
+class NearestLaw:
+    """The linear parameters nearest to a draw that have its initial shear modulus, and are stable where it is.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    stability : StabilityRows
+        Of the same material with the same other parameters.
+    draws : DrawStresses
+    number : int
+        Of the draw.
+    """
+
+    def __init__(self, candidate: Candidate, stability: StabilityRows, draws: DrawStresses, number: int) -> None:
+        start, self.free = _of_modulus(candidate.unit_moduli, draws.modulus[[number]])
+        self.start, self.stability = start[:, 0], stability
+        self.wanted_stiffness = draws.wanted_stiffness[number]
+        self.modulus, self.is_stable = float(draws.modulus[number]), bool(draws.stable[number])
+        stress = draws.of_states.stress[number]
+        is_borne = np.isfinite(stress)
+        self.is_beyond, size = draws.shell[is_borne] > 0, draws.size_in_fits[number, is_borne]
+        self.columns, self.stress = candidate.columns[is_borne] / size[:, None], stress[is_borne] / size
+
+    def values(self) -> FloatArray:
+        """Return the parameters (k,) with the heaviest weight of what was not measured that costs little inside."""
+        found = [self._weighted(weight) for weight in WEIGHTS_BEYOND]
+        errors = [np.abs(self.columns @ values - self.stress)[~self.is_beyond] for values in found]
+        rms = [float(np.sqrt((error**2).mean())) for error in errors]
+        is_good = [
+            error.max() <= WANTED_ERROR or size <= MAX_RMS_RATIO * min(rms)
+            for error, size in zip(errors, rms, strict=True)
+        ]
+        return found[is_good.index(True)]
+
+    def _weighted(self, weight_beyond: float) -> FloatArray:
+        weights = np.where(self.is_beyond, weight_beyond, 1.0)
+        columns = weights[:, None] * (self.columns @ self.free)
+        wanted = weights * (self.stress - self.columns @ self.start)
+        solution = fit_within(columns, wanted, self._broken) if self.is_stable else None
+        if solution is None:  # as near as it gets: that it is not stable is said
+            solution = least_squares(columns, wanted)
+        return np.asarray(self.start + self.free @ solution)
+
+    def _broken(self, solution: FloatArray) -> Inequalities:
+        rows, bounds = self.stability.broken(self.start + self.free @ solution, self.modulus, self.wanted_stiffness)
+        return rows @ self.free, bounds - rows @ self.start
+
+
+def _of_modulus(unit_moduli: FloatArray, modulus: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return linear parameters (k, N) of these initial shear moduli (N,), and what they may change by: (k, k - 1)."""
+    pivot = int(np.argmax(np.abs(unit_moduli)))
+    start = np.zeros((len(unit_moduli), len(modulus)))
+    start[pivot] = modulus / unit_moduli[pivot]
+    free = np.delete(np.eye(len(unit_moduli)), pivot, axis=1)
+    free[pivot] = -np.delete(unit_moduli, pivot) / unit_moduli[pivot]
+    return start, free
+
+
+def squared_distance(candidate: Candidate, weights: FloatArray, wanted: FloatArray, modulus: FloatArray) -> float:
+    """Return the squared distance, by weights (n,), of stresses (n, N) from the nearest that have these moduli (N,)."""
+    start, free = _of_modulus(candidate.unit_moduli, modulus)
+    columns = weights[:, None] * (candidate.columns @ free)
+    apart = weights[:, None] * (wanted - candidate.columns @ start)
+    basis = np.linalg.qr(columns / np.maximum(np.abs(columns).max(axis=0, initial=0.0), 1e-300))[0]
+    return float((apart**2).sum() - ((basis.T @ apart) ** 2).sum())

@@ -1,0 +1,88 @@
+"""What the page says of files is what was measured; what is doubtful becomes questions whose answers can be taken."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.app.account import account
+
+
+def taken(forms, file, question, label, reading=None, mode=None):
+    """Return what is understood once the answer of a label is taken, as the page takes it."""
+    settings = dict(next(answer for answer in question["answers"] if answer["label"] == label)["settings"])
+    mode = settings.pop("mode", mode)
+    return account(forms, [file], {**(reading or {}), **settings}, [mode])
+
+
+def test_the_curve_that_is_drawn_is_what_was_measured(forms, here, write_stretches):
+    write_stretches(here)
+    found = account(forms, ["kidney.csv"], {}, ["uniaxial"])
+    (test,) = found["tests"]
+    rows = np.loadtxt("kidney.csv", delimiter=",", skiprows=1).T
+    for drawn in ("used", "recorded"):
+        np.testing.assert_allclose([test["curves"][0][drawn][name] for name in "xy"], rows, rtol=1e-5, atol=1e-6)
+    assert (test["unit"], test["mode"], test["rows"], test["all_rows"]) == ("kPa", "uniaxial", 40, 40)
+    assert test["roles"] == {"stretch": "stretch", "stress [kPa]": "stress"}
+    assert found["text"] == str(tq.inspect("kidney.csv", mode="uniaxial"))
+    assert (found["questions"], found["error"]) == ([], None)
+    json.dumps(found, allow_nan=False)
+
+
+def test_an_unstated_unit_and_mode_are_questions_and_their_answers_settle_them(forms, here, write_stretches):
+    write_stretches(here, heading="stretch,stress")
+    found = account(forms, ["kidney.csv"], {}, [None])
+    unit, mode = found["questions"]
+    assert "MPa was assumed" in unit["plain"]
+    assert "--" not in unit["plain"]
+    assert [answer["label"] for answer in unit["answers"]] == ["stresses are in kPa", "stresses are in MPa"]
+    mended = taken(forms, "kidney.csv", unit, "stresses are in kPa")
+    assert mended["tests"][0]["unit"] == "kPa"
+    assert [question["text"] for question in mended["questions"]] == [mode["text"]]
+    planar = taken(forms, "kidney.csv", mode, "planar", {"stress_unit": "kPa"})
+    assert (planar["tests"][0]["mode"], planar["questions"]) == ("planar", [])
+
+
+def test_a_length_that_is_missing_is_asked_for_and_makes_the_stretches_right(forms, here, write_machine):
+    write_machine(here)
+    error = account(forms, ["skin.csv"], {}, ["uniaxial"])["error"]
+    (answer,) = error["answers"]
+    assert answer["asked_for"] == ["length"]
+    found = account(forms, ["skin.csv"], {"dimensions": {"length": "12 mm"}}, ["uniaxial"])
+    (test,) = found["tests"]
+    assert test["range"] == pytest.approx([1, 1 + 4 / 12], rel=1e-5)
+    drawn = test["curves"][0]["used"]
+    stretch, expected = np.array(drawn["x"][:60]), np.array(drawn["y"][:60])
+    np.testing.assert_allclose(20 * (stretch - stretch**-2), expected, atol=0.3)
+
+
+def test_a_finding_has_a_button_that_mends_it(forms, here, write_machine):
+    write_machine(here)
+    reading = {"dimensions": {"length": "12 mm"}}
+    (finding,) = account(forms, ["skin.csv"], reading, ["uniaxial"])["findings"]
+    assert "loading and unloading differ" in finding["plain"]
+    (answer,) = finding["answers"]
+    assert answer == {"label": "take only loading", "settings": {"branch": "loading"}}
+    mended = account(forms, ["skin.csv"], reading | answer["settings"], ["uniaxial"])
+    assert (mended["tests"][0]["rows"], mended["findings"]) == (60, [])
+
+
+def test_a_column_that_is_not_known_can_be_chosen(forms, here, write_stretches):
+    write_stretches(here, heading="stretch,result")
+    error = account(forms, ["kidney.csv"], {}, ["uniaxial"])["error"]
+    assert "stress is in column 'result'" in [answer["label"] for answer in error["answers"]]
+    found = taken(forms, "kidney.csv", error, "stress is in column 'result'", mode="uniaxial")
+    assert found["tests"][0]["roles"]["result"] == "stress"
+
+
+def test_a_file_that_holds_no_measurements_is_refused_with_the_message_of_the_command_line(forms, here):
+    (here / "bad.csv").write_text("hello,world\nfoo,bar\n")
+    found = account(forms, ["bad.csv"], {}, [None])
+    with pytest.raises(tq.InputError) as refusal:
+        tq.read("bad.csv")
+    assert found["error"]["text"] == str(refusal.value)
+    assert (found["tests"], found["error"]["file"]) == ([], "bad.csv")
+    json.dumps(found, allow_nan=False)

@@ -1,0 +1,82 @@
+"""Beyond the measured range: cards are stable, state how far they are off there, and say what is out of reach."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from card_readers import READERS
+from tissuq.export import CardSettings, card_format
+
+STEP = 1e-4
+
+
+def states(most, factor, angles=(0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0), shares=(0.5, 0.8, 1.0)):
+    """Logarithmic strains at angles of their own, up to so many times the measured invariants."""
+    logs = []
+    for angle in np.radians(angles):
+        direction = np.cos(angle - 2 * np.pi / 3 * np.array([0.0, 1.0, -1.0]))
+        sizes = np.linspace(0, 3, 30001)
+        first, second = (np.exp(sign * 2 * np.outer(sizes, direction)).sum(axis=1) - 3 for sign in (1, -1))
+        end = sizes[np.flatnonzero((first <= factor * most[0]) & (second <= factor * most[1]))[-1]]
+        logs += [share * end * direction for share in shares]
+    return np.array(logs)
+
+
+def principal_differences(energy, logs):
+    """The three differences of principal Cauchy stresses, by complex steps."""
+    found = []
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        moved = logs.astype(complex)
+        moved[:, i] += 1e-30j
+        moved[:, j] -= 1e-30j
+        found.append([np.imag(complex(energy(tuple(np.exp(row))))) / 1e-30 for row in moved])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("code", ["calculix", "febio"])
+def test_the_error_beyond_the_range_is_the_one_that_is_stated(auto, code):
+    cards = card_format(code).cards(auto, CardSettings())
+    for draw, text, row in zip(auto, cards.files.values(), cards.index, strict=True):
+        energy = READERS[code](text).energy
+        for reach in (1.0, 1.25, 1.5):
+            logs = states(auto.most, reach)
+            truth, found = (principal_differences(each, logs) for each in (draw.energy, energy))
+            apart = (np.abs(found - truth).max(axis=0) / np.abs(truth).max(axis=0)).max()
+            told = row[f"error_within_{reach:g}_max"]
+            assert 0.5 * told <= apart <= 1.2 * told + 1e-6  # at other angles
+        (said,) = re.findall(r"to 1.5 times the measured invariants: (\S+) %", text)
+        assert float(said) / 100 == pytest.approx(row["error_within_1.5_max"], rel=1e-2)
+
+
+def hessians(energy, logs):
+    """The Hessians of an energy in logarithmic strains of unchanged volume, by differences."""
+    along = np.array([[1.0, 0.0, -1.0], [-1.0, 2.0, -1.0]]) / np.sqrt([[2.0], [6.0]])
+    found = np.zeros((len(logs), 2, 2))
+    for number, row in enumerate(logs):
+        for i in range(2):
+            for j in range(2):
+                corners = [(a, b) for a in (1, -1) for b in (1, -1)]
+                values = [
+                    a * b * float(energy(tuple(np.exp(row + STEP * (a * along[i] + b * along[j]))))) for a, b in corners
+                ]
+                found[number, i, j] = sum(values) / (4 * STEP**2)
+    return found
+
+
+def test_a_card_is_stable_to_half_again_the_measured_invariants_where_free_least_squares_is_not(given, monkeypatch):
+    """A single Ogden term that hardens in compression alone, which two coefficients of I1 follow by softening."""
+    ensemble = given([("ogden-1", [1.0, -9.0])])
+    settings = CardSettings(law="reduced-polynomial", order=2)
+    rows = card_format("abaqus").cards(ensemble, settings)
+    free = []
+    monkeypatch.setattr("tissuq.export.nearest_law.fit_within", lambda *_: None)
+    for text in card_format("abaqus").cards(ensemble, settings).files.values():
+        free.append(np.linalg.eigvalsh(hessians(READERS["abaqus"](text).energy, states(ensemble.most, 1.5))).min())
+    assert min(free) < 0
+    for text, row in zip(rows.files.values(), rows.index, strict=True):
+        assert row["card_is_stable_within_1.5"]
+        least = np.linalg.eigvalsh(hessians(READERS["abaqus"](text).energy, states(ensemble.most, 1.5))).min()
+        assert least > 0

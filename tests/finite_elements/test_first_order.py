@@ -1,0 +1,125 @@
+"""Forces from the deformation of one draw: exact or near the full ones with an error that is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+from tissuq.errors import ConvergenceError
+from tissuq.finite_elements import ClampedBar, Indentation, case_forces, simulate
+from tissuq.finite_elements.first_order import FirstOrder, controlled, draws_in_full, first_order_forces
+from tissuq.finite_elements.response import BULK_RATIO
+from tissuq.mechanics import material_named
+
+pytest.importorskip("felupe", reason="FElupe is not installed")
+
+COARSE = {"bar": ClampedBar(elongation=1.5, fineness=0.5), "indentation": Indentation(depth=0.2, fineness=0.5)}
+
+
+@pytest.fixture(scope="module")
+def ensemble_of(posterior):
+    def ensemble(law, *rows):
+        material = material_named(law)
+        like = posterior.ensemble(2)
+        draws = (tq.EnergyDraw(number, ((material, tuple(row)),), None) for number, row in enumerate(rows))
+        return replace(like, draws=tuple(draws))
+
+    return ensemble
+
+
+@pytest.mark.parametrize("case", COARSE.values(), ids=COARSE)
+def test_draws_that_are_proportional_have_their_forces(ensemble_of, case):
+    rows = [[1e-3, 2e-3, 0.0], [0.7e-3, 1.4e-3, 0.0]]
+    ensemble = ensemble_of("yeoh", *rows)
+    found = first_order_forces(case, ensemble, ensemble[0], 2, BULK_RATIO)
+    for number, row in enumerate(rows):
+        wanted = case_forces(case, "yeoh", row, case.steps(2))
+        np.testing.assert_allclose(found.forces[number], wanted, rtol=1e-6)
+    np.testing.assert_allclose(found.stiffening, 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("case", COARSE.values(), ids=COARSE)
+def test_what_is_lacking_is_of_second_order(ensemble_of, case):
+    """Half the difference between two laws has a quarter of the error."""
+    steps = [0.0, 1.0, 2.0]
+    rows = [[1e-3, 4e-3 * (1 + 0.25 * step), 0.0] for step in steps]
+    ensemble = ensemble_of("yeoh", *rows)
+    found = first_order_forces(case, ensemble, ensemble[0], 2, BULK_RATIO)
+    wanted = np.array([case_forces(case, "yeoh", row, case.steps(2)) for row in rows])
+    lack = (found.forces / wanted - 1)[:, -1]
+    assert abs(lack[0]) < 1e-7
+    assert lack[2] > 1e-5
+    assert lack[2] / lack[1] == pytest.approx(4, rel=0.25)
+
+
+def test_a_reference_that_does_not_get_there_is_told(ensemble_of):
+    ensemble = ensemble_of("gent", [1e-3, 0.05], [1e-3, 0.06])
+    with pytest.raises(ConvergenceError, match="the draw in the middle ended"):
+        first_order_forces(replace(COARSE["bar"], elongation=8.0), ensemble, ensemble[0], 2, BULK_RATIO)
+
+
+def exact_law(count=24, steps=3, noise=0.0):
+    """First order and full forces whose relative difference is 0.3 (stiffening - 1)^2."""
+    generator = np.random.default_rng(1)
+    stiffening = 1 + np.linspace(0.2, 1.0, steps) * generator.normal(0, 0.1, (count, 1))
+    forces = generator.uniform(1, 2, (count, 1)) * stiffening
+    lack = 0.3 * (stiffening - 1) ** 2 + noise * generator.normal(size=stiffening.shape)
+    return FirstOrder(forces, stiffening), forces * (1 + lack)
+
+
+def test_the_correction_is_exact_where_second_order_is_all_that_lacks():
+    first_order, full = exact_law()
+    numbers = draws_in_full(first_order, 6)
+    assert len(numbers) == 6
+    forces, error = controlled(first_order, {number: full[number] for number in numbers})
+    np.testing.assert_allclose(forces, full, rtol=1e-9)
+    assert (error < 1e-9).all()
+
+
+def test_the_error_that_is_told_is_that_of_the_others():
+    first_order, full = exact_law(count=200, noise=0.01)
+    numbers = draws_in_full(first_order, 24)
+    forces, error = controlled(first_order, {number: full[number] for number in numbers})
+    others = np.setdiff1d(np.arange(200), numbers)
+    found = np.sqrt(((forces / full - 1)[others] ** 2).mean(axis=0))
+    assert error == pytest.approx(found, rel=0.6)
+    np.testing.assert_array_equal(forces[numbers], full[numbers])
+
+
+def test_the_draws_in_full_are_the_farthest_and_some_between():
+    stiffening = 1 + np.arange(20)[:, None] / 100
+    numbers = draws_in_full(FirstOrder(stiffening, stiffening), 6)
+    assert {17, 18, 19} <= set(numbers)
+    assert min(numbers) == 0
+    assert draws_in_full(FirstOrder(stiffening, stiffening), 99) == list(range(20))
+
+
+def test_a_simulation_with_few_full_runs_has_the_band_of_one_with_all(posterior):
+    case = replace(COARSE["indentation"], depth=0.15)
+    every, some = (simulate(posterior, case, 16, steps=2, check_mesh=False, full_runs=full) for full in (None, 5))
+    assert not every.first_order_error
+    error = some.first_order_error["complete"]
+    wanted, found = (each.forces["complete"] for each in (every, some))
+    assert (np.sqrt(((found / wanted - 1) ** 2).mean(axis=0)) <= 2 * error + 1e-4).all()
+    assert found.std(axis=0) == pytest.approx(wanted.std(axis=0), rel=0.05)
+    assert np.isfinite(some.energy_beyond).any(axis=1).sum() == 5
+
+
+@pytest.mark.finite_elements
+def test_the_force_on_cells_without_size_is_that_of_meshes_four_times_as_fine(without):
+    """Their own extrapolation; draws of a neo-Hookean material, which are one solution."""
+    case = Indentation(depth=0.2)
+    found = simulate(without, case, 2, steps=2)
+    (travel, change) = found.mesh_changes[-1]
+    assert found.mesh_change == (change, travel)
+    draw = found.ensembles["complete"][1]
+    fine, finest = (case_forces(replace(case, fineness=size), draw, None, case.steps(2))[-1] for size in (2.0, 4.0))
+    coarse, wanted = found.forces["complete"][1, -1], 2 * finest - fine
+    assert abs(coarse * found.mesh_factor[-1] / wanted - 1) < 0.25 * abs(coarse / wanted - 1)
+    row = found.table().iloc[-1]
+    assert row["mesh_free_mean"] == pytest.approx(row["mean"] * (1 + 2 * change))
+    assert row["mesh_free_sd"] > row["sd"] * (1 + 2 * change)
+    assert row["mesh_free_low"] < row["mesh_free_mean"] < row["mesh_free_high"]
