@@ -33,7 +33,7 @@ def help_of(*words):
 
 
 def listed_commands(*words):
-    commands = help_of(*words).partition("\nCommands:\n")[2]
+    commands = help_of(*words).partition("\n  --help ")[2]  # the last option; commands follow under their headings
     return re.findall(r"^  ([a-z]\S*)", commands, flags=re.MULTILINE)
 
 
