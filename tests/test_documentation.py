@@ -33,7 +33,7 @@ def help_of(*words):
 
 
 def listed_commands(*words):
-    commands = help_of(*words).partition("\nCommands:\n")[2]
+    commands = help_of(*words).partition("\nOptions:\n")[2].partition("\n\n")[2]  # under several headings
     return re.findall(r"^  ([a-z]\S*)", commands, flags=re.MULTILINE)
 
 
