@@ -18,7 +18,7 @@ from tissuq.report.prediction import (
     score_headers,
 )
 from tissuq.report.writer import write_result
-from tissuq.studies.prediction import predicted
+from tissuq.studies.predict_run import predicted
 from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
 
 

@@ -11,8 +11,8 @@ from tissuq.assessment.stability import calibrated_range
 from tissuq.experiments.modes import loading_mode
 from tissuq.prediction import moments
 from tissuq.report.specimen import write_specimen_run
-from tissuq.studies.prediction import predicted
-from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings, run_prediction, stretches
+from tissuq.studies.predict_run import predicted, run_prediction
+from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings, stretches
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
 TRUTH = {"C10": 0.4, "C20": 0.03, "C30": 0.002}

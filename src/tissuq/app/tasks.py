@@ -138,7 +138,8 @@ def predict(_: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     from tissuq.report.run_folder import run_folder
     from tissuq.report.writer import write_result
     from tissuq.result_warning import in_shell
-    from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
+    from tissuq.studies.predict_run import run_prediction
+    from tissuq.studies.prediction_settings import PredictionSettings
 
     options = _options(request, ("mode", "stretch", "stretch2"))
     run = RUNS / _run_name(request)

@@ -73,7 +73,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
         check_source(beside / source, folder / POSTERIORS / str(number))
     _write_inputs(prepared, stored, sources, beside, folder)
     if how.again:
-        forget_failures(prepared, folder)
+        forget_failures(prepared.tasks(folder), folder)
     with open_pool(how.max_jobs or os.cpu_count() or 1, how.scheduler) as pool:
         study = run_ensemble(
             prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
@@ -146,7 +146,7 @@ def _write_inputs(
     from tissuq.studies.ensemble_files import copy_model
 
     folder.mkdir(parents=True, exist_ok=True)
-    copy_model(prepared, beside, folder)
+    copy_model(prepared.deck, prepared.settings.also, beside, folder)
     for number, source in enumerate(sources, start=1):
         copy_source(beside / source, folder / POSTERIORS / str(number))
     quantities = stored.quantities | copy_functions(prepared.quantities, folder)

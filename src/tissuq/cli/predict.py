@@ -11,7 +11,7 @@ from tissuq.cli.reading import resolve
 from tissuq.cli.running import OfRun
 from tissuq.errors import InputError
 from tissuq.studies.option import option
-from tissuq.studies.prediction_settings import PredictionSettings, run_prediction
+from tissuq.studies.prediction_settings import PredictionSettings
 
 __all__ = ["predict"]
 
@@ -26,6 +26,7 @@ class PredictOptions(OfRun):
 def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
     """Predict the stress in any loading mode from a fit, and compare it with measurements."""
     from tissuq.report.prediction import prediction_result
+    from tissuq.studies.predict_run import run_prediction
 
     call.check_source("run", "the RUN folder of a fit", "prediction")
     data = call.stated.get("data", {})

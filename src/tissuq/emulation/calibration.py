@@ -262,7 +262,9 @@ class Calibration:
         """
         from tissuq.emulation.material_posterior import material_posterior
 
-        return material_posterior(self, material, stretch, mode=mode, unit=unit)
+        return material_posterior(
+            self.problem, self.posterior, material, stretch, mode=mode, unit=unit, runs=len(self.runs), seed=self.seed
+        )
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tissuq.emulation.problem import Problem
+from tissuq.emulation.sampling import SampledPosterior
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
@@ -22,9 +23,6 @@ from tissuq.parameters.priors import Prior
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Solver
 
-if TYPE_CHECKING:
-    from tissuq.emulation.calibration import Calibration
-
 __all__ = ["check_material", "material_posterior"]
 
 POINTS = 20
@@ -34,18 +32,24 @@ NOISE_SHARE = 1e-6
 
 
 def material_posterior(
-    calibration: Calibration,
+    problem: Problem,
+    sampled: SampledPosterior,
     material: str | Material,
     stretch: tuple[float, float],
     *,
     mode: str | LoadingMode = "uniaxial",
     unit: str = "MPa",
+    runs: int,
+    seed: int,
 ) -> Posterior:
     """Return the draws of a calibration as the posterior of a material, without discrepancy.
 
     Parameters
     ----------
-    calibration : Calibration
+    problem : Problem
+        What was calibrated.
+    sampled : SampledPosterior
+        The draws of its parameters.
     material : str or Material
         The law in the forward model, whose parameters are all among the calibrated ones.
     stretch : (float, float)
@@ -54,13 +58,16 @@ def material_posterior(
         The loading mode of that range; of one control.
     unit : str
         Unit of stress of the forward model's parameters.
+    runs : int
+        Of the forward model.
+    seed : int
 
     Raises
     ------
     InputError
         When a parameter of the material was not calibrated, or has a prior beyond its support, or the range is none.
     """
-    law, priors = check_material(material, calibration.problem.forward_priors, unit)
+    law, priors = check_material(material, problem.forward_priors, unit)
     loading, factor = loading_mode(mode), stress_unit(unit).to_mpa
     if len(loading.controls) != 1:
         raise InputError(f"the mode '{loading.name}' has several controls: give the range in one with one control.")
@@ -69,8 +76,7 @@ def material_posterior(
         raise InputError(f"the range of the stretch must be two rising positive numbers, not {low:g}:{high:g}.")
     symbols = list(priors)
     factors = {parameter.symbol: factor if parameter.unit else 1.0 for parameter in law.parameters}
-    columns = [calibration.problem.symbols.index(symbol) for symbol in symbols]
-    sampled = calibration.posterior
+    columns = [problem.symbols.index(symbol) for symbol in symbols]
     draws = sampled.draws[:, :, columns] * np.array([factors[symbol] for symbol in symbols])
     chains, count, _ = draws.shape
     points = np.linspace(low, high, POINTS)
@@ -93,16 +99,16 @@ def material_posterior(
     solution = Solution(
         model,
         "calibration",
-        f"the parameters of a forward model that was calibrated on {len(calibration.problem.measured)} measurements "
-        f"through an emulator of {len(calibration.runs)} runs",
+        f"the parameters of a forward model that was calibrated on {len(problem.measured)} measurements "
+        f"through an emulator of {runs} runs",
         lambda: mixture,
         Marginals.of(model, lambda symbol: marginals[symbol]),
-        seed=calibration.seed,
+        seed=seed,
         sampled=linear.reshape(chains, count, -1),
         diagnostics=Diagnostics(sampled.converged, sampled.verdict, rhat, ess, ess),
         is_of_data=False,
     )
-    return Posterior(solution, Solver(seed=calibration.seed))
+    return Posterior(solution, Solver(seed=seed))
 
 
 def check_material(

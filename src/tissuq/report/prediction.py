@@ -19,8 +19,7 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import interval, significant
 from tissuq.result_warning import in_shell
-from tissuq.studies.prediction import Prediction
-from tissuq.studies.prediction_picture import draw_prediction
+from tissuq.studies.prediction import Prediction, draw_prediction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

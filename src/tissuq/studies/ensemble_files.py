@@ -10,14 +10,11 @@ import shutil
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tissuq.decks import Deck
+from tissuq.decks.model_run import ModelRun
 from tissuq.errors import InputError
 from tissuq.studies.stream import RESULTS, read_results
-
-if TYPE_CHECKING:
-    from tissuq.studies.ensemble import PreparedEnsemble
 
 __all__ = ["DRAWS", "MODEL", "copy_model", "extra_files", "forget_failures", "stored_place"]
 
@@ -31,16 +28,15 @@ RUN_FOLDER = re.compile(r"[a-z]+-[0-9]+")
 """What folders of runs are called."""
 
 
-def copy_model(prepared: PreparedEnsemble, beside: Path, folder: Path) -> None:
-    """Copy the files of the model into the folder of an ensemble, or see that they are those that lie there.
+def copy_model(deck: Deck, also: Sequence[str], beside: Path, folder: Path) -> None:
+    """Copy the files of a model into the folder of an ensemble, or see that they are those that lie there.
 
     Raises
     ------
     InputError
         When the folder holds another model.
     """
-    deck, stored = prepared.deck, folder / MODEL
-    extra = extra_files(deck, prepared.settings.also, beside)
+    stored, extra = folder / MODEL, extra_files(deck, also, beside)
     digests = json.dumps({name: _digest(Path(name)) for name in deck.outside}, indent=2) + "\n"
     if stored.is_dir():
         stored_files = {name: (stored / name).read_bytes() for name in deck.files if (stored / name).is_file()}
@@ -68,9 +64,9 @@ def deck_folder(deck: Deck) -> str:
     return deck.main[: deck.main.rfind("/") + 1]
 
 
-def forget_failures(prepared: PreparedEnsemble, folder: Path) -> int:
+def forget_failures(runs: Sequence[ModelRun], folder: Path) -> int:
     """Take the results of runs that failed off the file of results, and their folders away; return how many."""
-    places = {task.key: task.folder.name for task in prepared.tasks(folder)}
+    places = {run.key: run.folder.name for run in runs}
     path = folder / RESULTS
     results = read_results(path)
     failed = {key for key, result in results.items() if result.get("problem") or result.get("misread")}

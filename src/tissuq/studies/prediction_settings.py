@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import MeasuredFile, ReadingSettings
@@ -15,11 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tissuq.experiments.experiment import Experiment
-    from tissuq.mechanics import Material
-    from tissuq.studies.prediction import Prediction
 
-__all__ = ["POINTS", "ComparedFile", "PredictionSettings", "run_prediction", "stretches"]
+__all__ = ["POINTS", "ComparedFile", "PredictionSettings", "stretches"]
 
 POINTS = 101
 """Number of stretches of a band by default."""
@@ -138,32 +134,3 @@ def stretches(text: str, points: int = POINTS) -> NDArray[np.float64]:
             f"'{text}' is not a range or list of stretches: write LOW:HIGH as 0.7:2.0, or a list as 1.1,1.2,1.5."
         )
     return np.linspace(numbers[0], numbers[-1], points) if is_range else numbers
-
-
-def run_prediction(
-    settings: PredictionSettings,
-    folder: Path = Path(),
-    step: Callable[[str], None] = lambda text: None,
-    law: Material | None = None,
-) -> Prediction:
-    """Predict what the settings ask for from a run; relative paths lie in ``folder``.
-
-    Raises
-    ------
-    InputError, ModelError, ConvergenceError
-        When run, files or settings cannot be used.
-    """
-    from tissuq.studies.prediction import predict_run
-
-    step("reading")
-    mode = settings.mode_in(folder)
-    options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}
-    options |= {"mode": mode, "stretch": settings.points_of(mode), "data": _data(settings, mode, folder)}
-    step("predicting")
-    return predict_run(folder / settings.run, settings.discrepancy, law, **options)
-
-
-def _data(settings: PredictionSettings, mode: str, folder: Path) -> Experiment | None:
-    if settings.data is None:
-        return None
-    return settings.data.model_copy(update={"mode": mode}).experiment(folder)

@@ -207,7 +207,7 @@ def test_tension_leaves_compression_open(directed):
 
 
 def test_modes_of_one_stress_say_what_they_predict_of_a_directed_material(directed):
-    from tissuq.studies.prediction import predicted
+    from tissuq.studies.predict_run import predicted
 
     for mode, words in (("uniaxial", "along axis 1"), ("equibiaxial", "mean of those of axes 1 and 2")):
         warnings = predicted(directed, mode=mode, stretch=[1.05, 1.1]).warnings
