@@ -42,9 +42,10 @@ def test_febio_takes_a_card_of_every_type(given, kind):
 
 
 def test_febio_takes_the_mixture_of_a_free_energy(auto):
-    text, _ = card(auto)
+    text, _ = card(auto, law="mixture")
     assert 'type="uncoupled solid mixture"' in text
     assert refusals(text) == []
+    assert refusals(card(auto)[0]) == []  # the nearest of its laws
 
 
 def test_what_the_rules_refuse(given):

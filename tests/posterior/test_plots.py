@@ -171,9 +171,12 @@ def test_vague_data_keep_an_axis_that_is_read_and_it_says_where_the_bands_end(mo
     assert low < table["median"].min() < table["median"].max() < high
     measured = 1000 * vague.stress if mode == "uniaxial" else table["median"].to_numpy()
     assert high - low < 5.5 * max(np.ptp(measured), np.ptp(table["median"]))
-    (words,) = [text.get_text() for text in axis.texts]
-    numbers = [float(word) for word in words.removeprefix("bands go on to ").removesuffix(" kPa").split(" and ")]
-    assert numbers == pytest.approx([table["low"].min(), table["high"].max()], rel=0.1)
+    hidden = [end for end in (table["low"].min(), table["high"].max()) if not low <= end <= high]
+    words = [text.get_text() for text in axis.texts]
+    assert len(words) == bool(hidden)
+    assert hidden or mode == "planar"  # which is drawn farther, on an axis that holds the whole band
+    numbers = [float(w) for text in words for w in text[len("bands go on to ") : -len(" kPa")].split(" and ")]
+    assert numbers == pytest.approx(hidden, rel=0.1)
 
 
 def test_a_prediction_shows_the_bands_of_the_mode(posterior):

@@ -17,7 +17,7 @@ __all__ = ["factors_of_tests", "measurement_warnings"]
 MIN_MEASUREMENTS = 12
 """Smallest number of measurements that describe how the stress deviates from the material."""
 NEAR_STRAIN_SHARE = 0.15
-"""Share of the largest strain within which a measurement is near the reference, twice that where on both sides."""
+"""Share of the largest strain within which a measurement is near the reference."""
 
 
 def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
@@ -33,14 +33,13 @@ def measurement_warnings(experiment: Experiment) -> Iterator[ResultWarning]:
             "one-direction",
             Severity.NOTE,
         )
-    near, sides = NEAR_STRAIN_SHARE * reach, (strain[strain > 0], -strain[strain < 0])
-    is_near = ((np.abs(strain) <= near) & (strain != 0)).any()
-    if not is_near and not all((side <= 2 * near).any() for side in sides):
+    is_near = (np.abs(strain) <= NEAR_STRAIN_SHARE * reach) & (strain != 0)
+    if not is_near.any():
         control = experiment.curves[0].mode.controls[0]
         nearest = control.reference + strain[np.abs(strain) > 0][np.abs(strain[np.abs(strain) > 0]).argmin()]
         yield ResultWarning(
             f"nothing is measured near the reference (the nearest {control.name} is {nearest:.4g}), so the initial "
-            f"modulus is extrapolated: measure within {near:.2g} of {control.name} "
+            f"modulus is extrapolated: measure within {NEAR_STRAIN_SHARE * reach:.2g} of {control.name} "
             f"{control.reference:g}.",
             "not-near-reference",
         )
