@@ -6,6 +6,7 @@ import csv
 import json
 import shutil
 
+import numpy as np
 import pytest
 
 from .conftest import run_in, write_specimen
@@ -53,6 +54,23 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "too few for a 95 % band" in page
     assert page.count("data:image/svg+xml") == 4
+
+
+@pytest.mark.finite_elements
+def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others(cli, here, run):
+    import xarray as xr
+
+    said = cli("structure", "run", *SMALL, "--draws", 9, "--full-runs", 4, "--no-figures", "--out", "few")
+    assert said.status == 0, said.err
+    with xr.open_dataset(here / "few" / "curves.nc") as curves:
+        assert np.isfinite(curves["force_complete"].values).all()
+        assert curves["force_complete"].shape == curves["energy_beyond"].shape == (9, 2)
+        assert np.isfinite(curves["energy_beyond"].values[:, -1]).sum() == 4
+    error = json.loads((here / "few" / "summary.json").read_text(encoding="utf-8"))["first_order_error"]["complete"]
+    assert 0 < error < 0.05
+    page = (here / "few" / "report.html").read_text(encoding="utf-8")
+    assert "4 draws were computed in full" in page
+    assert f"The error of such a force is {100 * error:.2g} %" in page
 
 
 @pytest.mark.finite_elements

@@ -66,7 +66,8 @@ class Simulation:
         discrepancy); not a number where a draw did not get that far. Families that do not apply are missing.
     failures : tuple of Failure
     volume_beyond, energy_beyond : (N, s) arrays
-        Shares of the volume that is strained beyond what was measured, and of the energy that is there.
+        Shares of the volume that is strained beyond what was measured, and of the energy that is there; not a number
+        where a draw was not computed in full, or not that far.
     max_invariants : (float, float)
         The largest I1 - 3 and I2 - 3 that were measured.
     fields : mapping of str to array
@@ -233,8 +234,8 @@ def simulate(
         travel=case.steps(steps),
         forces=forces,
         failures=tuple(_failures(computed, results)),
-        volume_beyond=_quantity(complete, results, "volume_beyond", steps, scaled=False),
-        energy_beyond=_quantity(complete, results, "energy_beyond", steps, scaled=False),
+        volume_beyond=_quantity(tasks[COMPLETE], results, "volume_beyond", steps, scaled=False),
+        energy_beyond=_quantity(tasks[COMPLETE], results, "energy_beyond", steps, scaled=False),
         max_invariants=max_invariants,
         fields=_fields(complete, results),
         ensembles=ensembles,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import filecmp
 import shutil
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from tissuq.report.simulation_figures import (
     write_collection,
     write_vtu,
 )
-from tissuq.report.tables import significant
+from tissuq.report.tables import known_number, significant
 from tissuq.studies.earlier_run import POSTERIORS
 from tissuq.studies.structure import SimulationStudy
 
@@ -187,6 +188,9 @@ def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
         "measured_invariants": list(simulation.max_invariants),
         "mesh_change": None if simulation.mesh_change is None else simulation.mesh_change[0],
         "noise_sd": simulation.noise_sd,
+        "first_order_error": {
+            family: known_number(float(error[-1])) for family, error in simulation.first_order_error.items()
+        },
         "admissible_share": simulation.ensembles[COMPLETE].admissible_share,
         "seconds": simulation.seconds,
         "warnings": study.warnings,
@@ -315,11 +319,26 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         "initial shear modulus.",
         f"{len(simulation.case.mesh().cells)} axisymmetric quadrilaterals with one pressure and one volume each (mean "
         f"dilatation), FElupe's; Newton's method with load steps that are halved where it fails.{mesh}",
+        *_first_order(simulation),
         "Numbers after ± are bootstrap standard errors from the number of draws. "
         f"{simulation.seconds:.0f} s of one processor.",
     )
     sizes = [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items()]
     return (*sections, Section("How it was computed", (computed, Table(["size", "value"], sizes))))
+
+
+def _first_order(simulation: Simulation) -> Iterator[str]:
+    """Yield which draws were not computed in full, and the error of their forces."""
+    if COMPLETE in simulation.first_order_error:
+        in_full = int(np.isfinite(simulation.volume_beyond).any(axis=1).sum())
+        error = simulation.first_order_error[COMPLETE][-1]
+        size = "not known" if np.isnan(error) else f"{100 * error:.2g} % at the last step"
+        yield (
+            f"{in_full} draws were computed in full, of which half are those that stiffen most differently; the forces "
+            "of the others follow to first order from the deformation of the draw in the middle, corrected by those in "
+            f"full. The error of such a force is {size}. Fields, and what is strained beyond the measurements, are of "
+            "the draws in full alone."
+        )
 
 
 def _size(name: str, value: float | str) -> str:
