@@ -134,6 +134,23 @@ def test_paths_of_a_test_with_two_controls_are_drawn_by_themselves():
         assert "path" in test["name"]
 
 
+def test_measurements_that_are_no_curve_are_drawn_where_they_were_made_however_many(monkeypatch):
+    monkeypatch.setattr("tissuq.report.chart.MAX_MEASUREMENTS", 20)
+    points = 1 + np.random.default_rng(0).uniform(0.0, 0.2, (50, 2))
+    measured = tq.simulate("neo-hookean", {"C10": 0.5}, points, noise_sd=0.02, seed=2, mode="biaxial")
+    posterior = tq.fit(measured, discrepancy="none", noise_sd=0.02)
+    data = chart_data({"none": posterior}, "none", KPA)
+    for axis, (test, view) in enumerate(zip(data["tests"][:2], data["views"][:2], strict=True)):
+        order = np.argsort(points[:, axis])[np.linspace(0, 49, 20).astype(int)]
+        assert not test["is_curve"]
+        assert test["x"] == test["measured_at"]
+        np.testing.assert_allclose(test["x"], points[order, axis], rtol=1e-4)
+        np.testing.assert_allclose(test["measured"], 1000 * measured.curves[axis].stress[order], rtol=1e-4)
+        first, second = points[order, axis], points[order, 1 - axis]
+        closed_form = 1000 * (first - first**-3 * second**-2)  # of engineering stress for C10 = 0.5
+        np.testing.assert_allclose(view["median"], closed_form, rtol=0.1, atol=20)
+
+
 def test_what_is_known_of_the_curves_is_not_computed_anew(posterior, monkeypatch):
     found = {"none": described(posterior.solution)}
     expected = chart_data({"none": posterior}, "none", KPA, found)

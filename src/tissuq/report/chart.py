@@ -120,14 +120,19 @@ def _measured(found: Sequence[Described]) -> Iterator[_Test]:
         for number, (places, is_curve) in enumerate(of.ways, 1):
             rows = _spread(np.argsort(curve.abscissa, kind="stable") if of.points.ndim == 1 else places)
             named = f"{name}, path {number}" if len(of.ways) > 1 else name
-            yield _Test(named, curve.mode, curve.channel, of.points[places], curve.abscissa[rows], curve.stress[rows],
-                        is_curve)  # fmt: skip
+            points = of.points[_drawn(places, is_curve)]
+            yield _Test(named, curve.mode, curve.channel, points, curve.abscissa[rows], curve.stress[rows], is_curve)
 
 
 def _spread(places: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return so many places as are drawn, spread over all."""
     count = min(len(places), MAX_MEASUREMENTS)
     return np.asarray(places[np.unique(np.linspace(0, len(places) - 1, count).astype(int))])
+
+
+def _drawn(places: NDArray[np.intp], is_curve: bool) -> NDArray[np.intp]:
+    """Return the places at which bands are drawn: where they are no curve, those of the measurements that are."""
+    return places if is_curve else _spread(places)
 
 
 def _others(posterior: Posterior) -> Iterator[_Test]:
@@ -141,9 +146,10 @@ def _others(posterior: Posterior) -> Iterator[_Test]:
 
 def _of_measured(found: Sequence[Described]) -> Iterator[_Bands | None]:
     for of in found:
-        for places, _ in of.ways:
-            alone = _at(of.stress_alone, places) if of.has_discrepancy else None
-            yield _Bands(_at(of.measurements, places), _at(of.stress, places), alone)
+        for places, is_curve in of.ways:
+            drawn = _drawn(places, is_curve)
+            alone = _at(of.stress_alone, drawn) if of.has_discrepancy else None
+            yield _Bands(_at(of.measurements, drawn), _at(of.stress, drawn), alone)
 
 
 def _of_others(posterior: Posterior, tests: Sequence[_Test]) -> Iterator[_Bands | None]:
