@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from math import inf, nan
 
 import pandas as pd
 import pytest
@@ -54,10 +55,20 @@ def result_of(**changes):
         (Number("x", 0.5), "0.5", ""),
         (Number("x", "planar", remark="by far"), "planar", "by far"),
         (Number("x", 1.0, 1.0, 1.0, "MPa", "95 % band"), "1 MPa", "95 % band 1 to 1"),
+        (Number("x", 404.0, 15.0, 3e21, "kPa"), "404 kPa", "95 % interval 15 to 3e+21"),
+        (Number("x", 404.0, 15.0, inf, "kPa"), "404 kPa", "95 % interval 15 to inf"),
+        (Number("x", nan, nan, nan, "kPa"), "not known", ""),
     ],
 )
 def test_a_number_is_rounded_by_the_width_of_its_interval(number, text, beside):
     assert (number.text, number.beside) == (text, beside)
+
+
+def test_what_is_not_finite_is_null_for_programs(tmp_path):
+    write_result(result_of(numbers=(Number("x", 1.0, -inf, inf), Number("y", nan))), tmp_path)
+    first, second = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["numbers"]
+    assert (first["value"], first["low"], first["high"]) == (1.0, None, None)
+    assert (second["value"], second["text"]) == (None, "not known")
 
 
 def test_at_most_three_warnings_are_shown_the_severest_first_and_notes_are_folded():

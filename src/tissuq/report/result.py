@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isnan
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 from tissuq.assessment.answer import Use
@@ -44,6 +45,8 @@ RESULT = "result.json"
 """The file with the record of a result."""
 MAX_NUMBERS = 3
 """Numbers of one kind in an answer; tables have all."""
+MAX_PLAIN = 1e6
+"""Size of a number, or of an end of its interval, from which it is given to three digits."""
 MAX_SHOWN = 3
 """Warnings that are shown at once; notes and the others are counted and folded."""
 
@@ -145,6 +148,8 @@ class Number:
         """The value with its unit, rounded by the width of the interval."""
         if isinstance(self.value, str):
             return self.value
+        if isnan(self.value):
+            return "not known"
         spread = self._spread
         rounded = interval(self.value, self.value, spread)[0] if spread else significant(self.value)
         return f"{rounded} {self.unit}".strip()
@@ -152,7 +157,7 @@ class Number:
     @property
     def range(self) -> str:
         """The ends of the interval, or nothing."""
-        if self.low is None or self.high is None:
+        if self.low is None or self.high is None or isnan(self.low + self.high):
             return ""
         spread = self._spread
         ends = interval(self.low, self.high, spread) if spread else (significant(self.low), significant(self.high))
@@ -160,8 +165,11 @@ class Number:
 
     @property
     def _spread(self) -> float:
-        """The width that says how many digits count; zero where there is none."""
-        return 0.0 if self.low is None or self.high is None else (self.high - self.low) / 4
+        """The width that says how many digits count; zero where there is none, or where few digits can be read."""
+        if self.low is None or self.high is None:
+            return 0.0
+        largest = max(abs(number) for number in (self.value, self.low, self.high) if not isinstance(number, str))
+        return (self.high - self.low) / 4 if largest < MAX_PLAIN else 0.0
 
     @property
     def beside(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping, Sequence
-from math import floor, isnan, log10
+from math import floor, isfinite, isnan, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,16 +177,16 @@ def write_csv(path: Path, rows: list[Row]) -> None:
 
 
 def write_json(path: Path, content: Sequence[Row] | Mapping[str, Any]) -> None:
-    """Write rows, or one record, as JSON, which knows no nan: null stands for it."""
-    path.write_text(json.dumps(_without_nan(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    """Write rows, or one record, as JSON, which knows neither nan nor infinity: null stands for both."""
+    path.write_text(json.dumps(_finite(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _without_nan(value: Any) -> Any:
+def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _without_nan(item) for name, item in value.items()}
+        return {name: _finite(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_without_nan(item) for item in value]
-    return None if value != value else value
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 HELD_OUT_HEADLINE = ("median", "hdi_low", "hdi_high")
