@@ -46,6 +46,17 @@ def test_conditions_that_contradict_each_other_have_no_solution():
     assert fit_within(np.eye(2), np.zeros(2), lambda x: (rows, bounds)) is None
 
 
+def test_what_does_not_converge_has_no_solution(monkeypatch):
+    def nnls(*arguments, **options):
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    columns, wanted, rows, bounds = problem(1)
+    bounds = bounds + 1 - (bounds - rows @ least_squares(columns, wanted)).max()  # one is broken
+    assert constrained_least_squares(columns, wanted, (rows, bounds)) is not None
+    monkeypatch.setattr("scipy.optimize.nnls", nnls)
+    assert constrained_least_squares(columns, wanted, (rows, bounds)) is None
+
+
 def test_a_convex_condition_is_met_by_its_tangents():
     """The nearest point of the unit disc to (3, 4) is (0.6, 0.8)."""
 

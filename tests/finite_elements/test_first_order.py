@@ -89,6 +89,14 @@ def test_the_error_that_is_told_is_that_of_the_others():
     np.testing.assert_array_equal(forces[numbers], full[numbers])
 
 
+def test_the_reference_for_which_first_order_is_exact_does_not_lower_the_error():
+    stiffening = np.array([[1.0], [1.1], [1.2], [1.4]])
+    first_order = FirstOrder(np.ones((4, 1)), stiffening)
+    lack = {0: 0.0, 1: 0.03, 2: 0.0, 3: 0.0}
+    _, error = controlled(first_order, {number: [1 + value] for number, value in lack.items()})
+    assert error == pytest.approx([0.03])  # of the nearer two only the second stands for others
+
+
 def test_the_draws_in_full_are_the_farthest_and_some_between():
     stiffening = 1 + np.arange(20)[:, None] / 100
     numbers = draws_in_full(FirstOrder(stiffening, stiffening), 6)

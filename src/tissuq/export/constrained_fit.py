@@ -20,7 +20,7 @@ MAX_ROUNDS = 40
 
 
 def constrained_least_squares(columns: FloatArray, wanted: FloatArray, inequalities: Inequalities) -> FloatArray | None:
-    """Return the x (k,) that minimises |columns x - wanted| among those with rows x >= bounds; None where none exists.
+    """Return the x (k,) that minimises |columns x - wanted| among those with rows x >= bounds; None where none is found.
 
     Parameters
     ----------
@@ -57,7 +57,10 @@ def constrained_least_squares(columns: FloatArray, wanted: FloatArray, inequalit
     dual = np.vstack([transformed.T, missing / scale])
     target = np.zeros(len(dual))
     target[-1] = 1.0
-    multipliers, _ = nnls(dual, target, maxiter=10 * dual.shape[1] + 100)
+    try:
+        multipliers, _ = nnls(dual, target, maxiter=10 * dual.shape[1] + 100)
+    except RuntimeError:  # it has not converged
+        return None
     residual = dual @ multipliers - target
     if -residual[-1] < 1e-12:
         return None

@@ -25,6 +25,9 @@ __all__ = ["FirstOrder", "controlled", "draws_in_full", "first_order_forces"]
 
 FloatArray = NDArray[np.float64]
 
+EXACT = 1e-9
+"""Difference of the stiffening from one below which a draw is proportional to the reference."""
+
 
 @dataclass(frozen=True, eq=False)
 class FirstOrder:
@@ -108,7 +111,8 @@ def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> 
 
     What first order lacks is of second order in the stiffening: its relative error is c (stiffening - 1)^2, with c from
     the draws in full, of which the farther ones count less. The error is what that leaves of the nearer half of the
-    draws in full, each left out of the estimate of c: root mean square, relative to the force.
+    draws in full, each left out of the estimate of c: root mean square, relative to the force. Those that are proportional
+    to the reference, for which nothing is lacking, say nothing about others.
 
     Parameters
     ----------
@@ -133,7 +137,8 @@ def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> 
 
 
 def _typical(left: FloatArray, near: FloatArray) -> FloatArray:
-    """Return what is left of the draws in full without the farther half, which stands for no other draw."""
-    count = max(1, len(left) // 2)
-    order = np.argsort(near[:, -1])[:count]
-    return left[order]
+    """Return what is left of the draws in full without the farther half, and those that lack nothing."""
+    order = np.argsort(near[:, -1])
+    typical = order[: max(1, len(left) // 2)]
+    lacking = typical[near[typical, -1] > EXACT**2]
+    return left[lacking] if len(lacking) else left[typical]
