@@ -20,13 +20,18 @@ MAX_ROUNDS = 40
 
 
 def constrained_least_squares(columns: FloatArray, wanted: FloatArray, inequalities: Inequalities) -> FloatArray | None:
-    """Return the x (k,) that minimises |columns x - wanted| among those with rows x >= bounds; None where none is found.
+    """Return the x (k,) that minimises |columns x - wanted| among those with rows x >= bounds, or None.
 
     Parameters
     ----------
     columns : (n, k) array
     wanted : (n,) array
     inequalities : ((m, k) array, (m,) array)
+
+    Returns
+    -------
+    (k,) array or None
+        None where none exists, or none is found.
 
     References
     ----------

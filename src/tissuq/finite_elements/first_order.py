@@ -111,8 +111,8 @@ def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> 
 
     What first order lacks is of second order in the stiffening: its relative error is c (stiffening - 1)^2, with c from
     the draws in full, of which the farther ones count less. The error is what that leaves of the nearer half of the
-    draws in full, each left out of the estimate of c: root mean square, relative to the force. Those that are proportional
-    to the reference, for which nothing is lacking, say nothing about others.
+    draws in full, each left out of the estimate of c: root mean square, relative to the force. Those that are
+    proportional to the reference, for which nothing is lacking, say nothing about others.
 
     Parameters
     ----------
