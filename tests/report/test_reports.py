@@ -194,6 +194,17 @@ def test_cautions_of_the_discrepancies_are_told(request, kind):
     assert all(caution in words for caution in cautions)
 
 
+def test_the_summary_on_the_page_has_stability_in_the_modes_that_were_measured(specimen_folder, specimen_study):
+    page = (specimen_folder / "report.html").read_text()
+    start = page.index('aria-label="table of the fits"')
+    table = page[start : page.index("</table>", start)]
+    headers = re.findall(r'<th scope="col">(.*?)</th>', table)
+    row = re.search(r'<th scope="row">auto</th>(.*?)</tr>', table, re.DOTALL)[1]
+    cells = re.findall(r"<td>(.*?)</td>", row)
+    probability = specimen_study.posteriors["auto"].stable_ranges["uniaxial"].probability
+    assert cells[headers.index("stable in the modes that were measured") - 1] == f"{probability:.0%}"
+
+
 def test_a_page_without_figures_says_how_to_repeat_it_without(specimen_study, specimen_file, tmp_path):
     write_specimen_run(specimen_study, [specimen_file], tmp_path, figures=False)
     text = (tmp_path / "report.html").read_text()
