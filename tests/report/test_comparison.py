@@ -31,6 +31,16 @@ def test_every_fit_is_a_row_and_the_parameter_is_in_the_unit_asked_for(table):
     assert any("for predictions only" in text.get_text() for text in prediction.texts)
 
 
+def test_the_best_for_left_out_measurements_is_that_with_the_largest_elpd_and_others_are_below_it(table):
+    best = sorted(table.index, key=lambda name: table["elpd"][name])[-1]
+    numbers = {number.name: number.value for number in comparison_result(table, ["runs/a"], KPA).numbers}
+    assert numbers["best for left-out measurements"] == best
+    for row in readable_comparison(table, KPA):
+        difference = float(row[5].split(" ± ")[0])
+        assert difference == pytest.approx(table["elpd"][row[0]] - table["elpd"][best], abs=0.06)
+        assert (row[5] == "0.0 ± 0.0") == (row[0] == best)
+
+
 def test_what_is_far_below_is_told_at_the_edge(table):
     far = table.copy()
     far.loc["none", "log_bayes_factor"] = -12_345.0

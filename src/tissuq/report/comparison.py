@@ -64,7 +64,7 @@ def readable_comparison(table: pd.DataFrame, unit: StressUnit) -> list[list[str]
                 _text(row["log_bayes_factor"], ".2f"),
                 "" if isnan(ends[0]) else f"{ends[0]:.1f} to {ends[1]:.1f}",
                 _text(row["probability"], ".1%"),
-                f"{row['elpd_difference']:.1f} ± {row['elpd_difference_error']:.1f}",
+                f"{0.0 - row['elpd_difference']:.1f} ± {row['elpd_difference_error']:.1f}",
                 f"{row['stacking']:.2f}{' (rough)' if row['is_rough'] else ''}",
                 _interval(row, unit),
             ]
@@ -167,7 +167,7 @@ def _numbers(table: pd.DataFrame, unit: StressUnit) -> tuple[Number, ...]:
     if table["log_evidence"].notna().any():
         name = str(table["log_evidence"].idxmax())
         numbers.append(Number("largest evidence", name, remark=f"probability {table['probability'][name]:.0%}"))
-    best = str(table["elpd_difference"].idxmax())
+    best = str(table["elpd"].idxmax())
     numbers.append(Number("best for left-out measurements", best, remark=f"stacking {table['stacking'][best]:.2f}"))
     known = table.dropna(subset=["median"])
     if len(known) and known["parameter"].nunique() == 1:
