@@ -109,7 +109,7 @@ async def _begin(request: Request, sessions: Sessions) -> Response:
     if task not in TASKS or not isinstance(asked, dict):
         return JSONResponse({"error": f"there is no task '{task}' with such values."}, 400)
     files = asked.get("files", [])
-    if not set(map(_file_of, files)) <= set(session.files):
+    if not isinstance(files, list) or not set(map(_file_of, files)) <= set(session.files):
         return JSONResponse({"error": "one of these files is not here any more: drop it again."}, 400)
     return JSONResponse({"task": session.begin(sessions.workers, task, asked)})
 
