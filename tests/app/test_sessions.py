@@ -103,3 +103,16 @@ def test_a_task_that_is_stopped_says_so_and_the_session_goes_on(tmp_path):
         assert session.folder.exists()
 
     run_with(check, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["", "..", "../x", "\0", "x" * 5000, "/etc/passwd"])
+def test_a_path_that_is_none_in_the_session_is_refused_without_an_error_of_the_program(tmp_path, name):
+    async def check(sessions, workers):
+        session = sessions.new()
+        if name:
+            with pytest.raises(InputError, match="in this session"):
+                session.path_of(name)
+        else:
+            assert session.path_of(name) == session.folder.resolve()
+
+    run_with(check, tmp_path)

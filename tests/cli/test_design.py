@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 
 import pytest
 
@@ -73,3 +74,11 @@ def test_what_cannot_be_used_is_told_and_leaves_nothing(cli, run, here, argument
 def test_a_ranking_is_never_overwritten_unasked(cli, run, here):
     for options, status in (([], 0), ([], 2), (["--force"], 0)):
         assert cli("design", "run", *TESTS, "--no-figures", *options).status == status
+
+
+def test_a_run_that_is_typed_is_one_of_the_current_folder_also_beside_a_config(cli, run, here):
+    (here / "mine").mkdir()
+    (here / "mine" / "tests.toml").write_text('candidates = ["planar 1:1.5 20"]\n')
+    said = cli("design", os.path.relpath(run), "--config", "mine/tests.toml", "--no-figures")
+    assert said.status == 0, said.err
+    assert "give the RUN folder" in cli("design", "--target", "modulus").err

@@ -376,3 +376,23 @@ def test_a_doubtful_unit_is_warned_of_once(cli, here):
     (here / "test.csv").write_text(f"stretch,stress\n{rows}", encoding="utf-8")
     result = cli("fit", "test.csv", "--discrepancy", "none", "--no-figures")
     assert (result.out + result.err).count("check the unit") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--mode", "uniaxial", "--mode", "planar"), "--mode is given 2 times beside --config"),
+        (("--noise-sd", "1,2"), "--noise-sd is given 2 times beside --config"),
+        (("--specimen", "S1"), "--specimen names the specimens of FILES"),
+    ],
+)
+def test_what_is_said_of_each_of_several_files_is_refused_beside_a_config(cli, fit_run, here, options, words):
+    said = cli("fit", "--config", fit_run[0] / "run.toml", "--out", "again", *options)
+    assert (said.status, (here / "again").exists()) == (2, False)
+    assert words in said.err
+
+
+def test_a_mode_prevails_over_that_of_a_config(cli, fit_run, here):
+    said = cli("fit", "--config", fit_run[0] / "run.toml", "--out", "again", "--mode", "equibiaxial", "--no-figures")
+    assert said.status == 0, said.err
+    assert 'mode = "equibiaxial"' in (here / "again" / "run.toml").read_text()

@@ -149,3 +149,10 @@ def test_quiet_prints_the_numbers_of_a_fit_alone(cli, here, specimen):
     for line in said.out.splitlines():
         name, _, value = line.partition(": ")
         assert f"{name} {value}" in loud
+
+
+def test_the_log_names_a_file_elsewhere_without_its_folders(here, monkeypatch):
+    file, folder = here / "secret" / "skin.csv", here / "results"
+    monkeypatch.setattr(sys, "argv", ["tissuq", "fit", str(file), f"--out={folder}", "--prior", "C10=uniform(0,5)"])
+    Monitor().write_log(here)
+    assert "command: tissuq fit skin.csv --out=results --prior 'C10=uniform(0,5)'\n" in (here / LOG).read_text()

@@ -7,8 +7,10 @@ import json
 import shutil
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
+from secrets import token_urlsafe
 from typing import Any
 
+from starlette.background import BackgroundTask
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
@@ -109,7 +111,7 @@ async def _begin(request: Request, sessions: Sessions) -> Response:
     if task not in TASKS or not isinstance(asked, dict):
         return JSONResponse({"error": f"there is no task '{task}' with such values."}, 400)
     files = asked.get("files", [])
-    if not set(map(_file_of, files)) <= set(session.files):
+    if not isinstance(files, list) or not set(map(_file_of, files)) <= set(session.files):
         return JSONResponse({"error": "one of these files is not here any more: drop it again."}, 400)
     return JSONResponse({"task": session.begin(sessions.workers, task, asked)})
 
@@ -166,6 +168,9 @@ async def _result(request: Request, sessions: Sessions) -> Response:
 async def _zip(request: Request, sessions: Sessions) -> Response:
     session = _session(request, sessions)
     folder = session.path_of(request.path_params["path"])
-    archive = session.folder / f".{folder.name}.zip"
+    if not folder.is_dir() or folder == session.folder.resolve():
+        return JSONResponse({"error": "that is no folder of a result."}, 400)
+    archive = sessions.folder / f"{token_urlsafe(12)}.zip"  # beside the session, whose files are counted
     await asyncio.to_thread(shutil.make_archive, str(archive.with_suffix("")), "zip", folder.parent, folder.name)
-    return FileResponse(archive, media_type="application/zip", filename=f"{folder.name}.zip")
+    after = BackgroundTask(archive.unlink, missing_ok=True)
+    return FileResponse(archive, media_type="application/zip", filename=f"{folder.name}.zip", background=after)

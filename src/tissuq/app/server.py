@@ -25,15 +25,17 @@ from tissuq.errors import InputError
 __all__ = ["LOOPBACK", "serve"]
 
 LOOPBACK = "127.0.0.1"
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Ctrl-C, a request to terminate, and a terminal that was closed, which Windows has not."""
 
 
 class _Server(uvicorn.Server):
-    """A server that Ctrl-C and requests to terminate end without more, so that files are deleted after it."""
+    """A server that signals end without more, so that files are deleted after it."""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
         """End on signals; Uvicorn would raise them anew, and so end the process at once."""
-        before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
+        before = {number: signal.signal(number, self.handle_exit) for number in ENDING}
         try:
             yield
         finally:
@@ -75,7 +77,7 @@ def serve(
     port, token = listening.getsockname()[1], token_urlsafe(24)
     address = f"http://{LOOPBACK}:{port}/{token}/"
     with tempfile.TemporaryDirectory(prefix="tissuq-app-", ignore_cleanup_errors=True) as folder:
-        sessions = Sessions(Path(folder), Workers(forms), grace)
+        sessions = Sessions(Path(folder), Workers(forms, Path(folder)), grace)
 
         @asynccontextmanager
         async def lifespan(_: Starlette) -> AsyncIterator[None]:

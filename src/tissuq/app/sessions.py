@@ -12,6 +12,7 @@ from typing import Any
 
 from tissuq.app.workers import News, Workers
 from tissuq.errors import InputError
+from tissuq.studies.settings import is_inside
 
 __all__ = ["GRACE", "Session", "Sessions"]
 
@@ -20,6 +21,17 @@ GRACE = 15.0
 MAX_SESSIONS = 50
 FIRST_SIGN = 60.0
 """Seconds within which a new session's page must listen."""
+
+
+SHOWN = 200
+"""Letters of a name in a message."""
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # such as a name that is too long
+        return False
 
 
 class Session:
@@ -55,10 +67,10 @@ class Session:
         InputError
             When there is no such file, or it lies elsewhere.
         """
-        path = (self.folder / name).resolve()
-        if not path.is_relative_to(self.folder.resolve()) or not path.exists():
-            raise InputError(f"there is no '{name}' in this session.")
-        return path
+        path = self.folder / name
+        if not (is_inside(path, self.folder.resolve()) and _exists(path)):
+            raise InputError(f"there is no '{name[:SHOWN]}' in this session.")
+        return path.resolve()
 
     def begin(self, workers: Workers, task: str, request: Mapping[str, Any]) -> int:
         """Begin a task and return its number, under which its news are."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from tissuq.app.repeat import command, fit_lines, reading_words
 from tissuq.app.shell_forms import ShellForms
+from tissuq.errors import InputError
 
 if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenStudy
@@ -56,8 +57,9 @@ def inspect(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     files, modes, reading = _files(request)
     found = account(forms, files, reading, [mode or None for mode in modes or [""] * len(files)])
     options = f", {', '.join(f'{name}={value!r}' for name, value in reading.items())}" if reading else ""
-    options += f", mode={modes[0]!r}" if modes else ""
-    lines = "\n".join(["import tissuq as tq", "", *(f"print(tq.inspect({file!r}{options}))" for file in files)])
+    of_files = [f", mode={mode!r}" if mode else "" for mode in modes or [""] * len(files)]
+    prints = [f"print(tq.inspect({file!r}{options}{mode}))" for file, mode in zip(files, of_files, strict=True)]
+    lines = "\n".join(["import tissuq as tq", "", *prints])
     say("done", found | {"repeat": {"shell": _shell("inspect", files, modes, reading), "python": lines}})
 
 
@@ -282,7 +284,10 @@ def _stage(text: str) -> str:
 
 def _run_name(request: Mapping[str, Any]) -> str:
     """Return the name of a run in the folder of runs, and of nothing else."""
-    return Path(str(request["run"])).name
+    name = Path(str(request["run"])).name
+    if name in ("", ".."):
+        raise InputError("no run was named.")
+    return name
 
 
 def _imports(points: Any) -> list[str]:

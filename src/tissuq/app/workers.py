@@ -7,9 +7,9 @@ import multiprocessing
 import os
 import signal
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,10 +34,11 @@ class News(NamedTuple):
 class _Process:
     """A process that does one task after another, and its end of the pipe."""
 
-    def __init__(self, forms: ShellForms, *, is_light: bool) -> None:
+    def __init__(self, forms: ShellForms, scratch: Path, *, is_light: bool) -> None:
         self.connection, other = SPAWNED.Pipe()
-        self.process = SPAWNED.Process(target=_work, args=(other, forms, is_light), daemon=True)
-        self.process.start()
+        self.process = SPAWNED.Process(target=_work, args=(other, forms, scratch, is_light), daemon=True)
+        with _deaf_to_interrupts():
+            self.process.start()
         other.close()
 
     def receive(self) -> News:
@@ -57,9 +58,12 @@ class _Process:
 class _Pool:
     """Processes of one kind: one from the start, further ones when all are busy."""
 
-    def __init__(self, forms: ShellForms, most: int, threads: ThreadPoolExecutor, *, is_light: bool) -> None:
-        self.forms, self.most, self.is_light = forms, most, is_light
+    def __init__(
+        self, forms: ShellForms, scratch: Path, most: int, threads: ThreadPoolExecutor, *, is_light: bool
+    ) -> None:
+        self.forms, self.scratch, self.most, self.is_light = forms, scratch, most, is_light
         self.threads = threads
+        self.has_ended = False
         self.idle: asyncio.Queue[_Process] = asyncio.Queue()
         self.processes: set[_Process] = set()
         self.busy = 0
@@ -67,7 +71,7 @@ class _Pool:
 
     def start(self) -> None:
         """Start one more process; it is idle as soon as it is prepared."""
-        process = _Process(self.forms, is_light=self.is_light)
+        process = _Process(self.forms, self.scratch, is_light=self.is_light)
         self.processes.add(process)
         task = asyncio.get_running_loop().create_task(self._prepared(process))
         self.starts.add(task)
@@ -99,6 +103,7 @@ class _Pool:
         return await asyncio.get_running_loop().run_in_executor(self.threads, process.receive)
 
     def end(self) -> None:
+        self.has_ended = True
         for start in list(self.starts):
             start.cancel()
         for process in self.processes:
@@ -111,7 +116,8 @@ class _Pool:
     def _replace(self, process: _Process) -> None:
         self.processes.discard(process)
         process.end()
-        self.start()
+        if not self.has_ended:
+            self.start()
 
 
 class Workers:
@@ -120,15 +126,17 @@ class Workers:
     Parameters
     ----------
     forms : ShellForms
+    scratch : Path
+        Folder that is deleted after the processes have ended, in which they may leave files.
     fitting : int, optional
         How many fits go on at once; unless given, two where the computer has two cores or more.
     """
 
-    def __init__(self, forms: ShellForms, fitting: int | None = None) -> None:
+    def __init__(self, forms: ShellForms, scratch: Path, fitting: int | None = None) -> None:
         most = fitting or min(2, os.cpu_count() or 1)
         self._threads = ThreadPoolExecutor(max_workers=most + 2, thread_name_prefix="news")
-        self._light = _Pool(forms, 1, self._threads, is_light=True)
-        self._heavy = _Pool(forms, most, self._threads, is_light=False)
+        self._light = _Pool(forms, scratch, 1, self._threads, is_light=True)
+        self._heavy = _Pool(forms, scratch, most, self._threads, is_light=False)
 
     async def start(self) -> None:
         """Start a process of each kind."""
@@ -147,18 +155,27 @@ class Workers:
         self._threads.shutdown(wait=False, cancel_futures=True)
 
 
-def _work(connection: Any, forms: ShellForms, is_light: bool) -> None:
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C for a moment: what is started then ignores it for good, for the page ends it."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _work(connection: Any, forms: ShellForms, scratch: Path, is_light: bool) -> None:
     """Do tasks until the page ends; every message of tissuq is news, and an error of the program is one, too."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the page, which ends this
-    home = Path(tempfile.gettempdir())
-    os.chdir(home)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where systems do not hand it down
+    os.chdir(scratch)
     from tissuq.app.tasks import TASKS, warm_up
 
     if not is_light:
-        with tempfile.TemporaryDirectory(prefix="tissuq-warm-up-") as folder, suppress(Exception):
+        with tempfile.TemporaryDirectory(prefix="warm-up-", dir=scratch) as folder, suppress(Exception):
             os.chdir(folder)
             warm_up(forms)
-            os.chdir(home)
+            os.chdir(scratch)
     try:
         connection.send((PREPARED, None))
         while True:
@@ -172,6 +189,6 @@ def _work(connection: Any, forms: ShellForms, is_light: bool) -> None:
                 text = f"This is a fault of tissuq ({type(error).__name__}: {error}). Please report it with the file."
                 connection.send(("error", {"text": text, "code": "fault"}))
             finally:
-                os.chdir(home)
+                os.chdir(scratch)
     except (EOFError, BrokenPipeError, KeyboardInterrupt):
         return

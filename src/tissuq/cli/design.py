@@ -28,14 +28,16 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     from tissuq.report.design import design_result
     from tissuq.studies.design import run_design
 
-    if not (call.config or call.stated):
+    stated = call.stated.get("run")
+    if not (call.config or stated):
         raise InputError("give the RUN folder of a fit, or --config run.toml.")
-    run = (call.beside / call.settings.run).resolve()
+    settings = call.loaded(run=str(Path(stated).absolute()) if stated else None)
+    run = (call.beside / settings.run).resolve()
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
-    recipe = call.settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
+    recipe = settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
 
     call.carried_out(
         target,
-        lambda step: run_design(call.settings, call.beside, step, call.law),
+        lambda step: run_design(settings, call.beside, step, call.law),
         partial(design_result, recipe=recipe),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from filecmp import cmp
 from functools import partial
 from pathlib import Path
@@ -45,6 +46,9 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     files = reading.files_of(paths)
     read_as = {name: call.stated.pop(name) for name in ReadingSettings.model_fields if name in call.stated}
     modes, noise = read_as.pop("mode", None), call.stated.pop("noise_sd", None)
+    if call.config:
+        _check_once(call.how.specimen, modes, noise)
+        read_as |= {"mode": modes[0]} if modes else {}
     of_files = [] if call.config else files
     measured, found = reading.measured(of_files, read_as, modes, call.how.specimen, noise)
     if not (paths or call.config):
@@ -123,6 +127,15 @@ def _print_omissions(study: SpecimenStudy | LawStudy) -> None:
     for name, reason in study.skipped.items():
         print(f"Not fitted: {name}: {reason}")
     not_converged(study.not_converged)
+
+
+def _check_once(specimens: Sequence[str], modes: Sequence[str] | None, noise: Sequence[float | str] | None) -> None:
+    """Refuse what is given for each of several files, which a configuration says of its tests."""
+    if specimens:
+        raise InputError("--specimen names the specimens of FILES; in a configuration, 'specimen' of a test does.")
+    for typed, values in (("--mode", modes), ("--noise-sd", noise)):
+        if values and len(values) > 1:
+            raise InputError(f"{typed} is given {len(values)} times beside --config; give it once.")
 
 
 def _check_same(file: Path, named: Path, config: Path) -> None:

@@ -114,7 +114,7 @@ class Monitor:
 
         lines = [
             f"{self.started_at:%Y-%m-%d %H:%M:%S} UTC  tissuq {version('tissuq')}, Python {platform.python_version()}",
-            f"command: {_as_typed()}",
+            f"command: {_without_folders()}",
             *(f"{began:8.1f} s  {name}" for name, began in self.stages if name),
             f"{self.seconds:8.1f} s  written",
             *(f"warning: {' '.join(text.split())}" for text in warnings),
@@ -197,6 +197,17 @@ class _Timed:
 
 def _as_typed() -> str:
     return shlex.join(["tissuq", *sys.argv[1:]])
+
+
+def _without_folders() -> str:
+    """Return what was typed, but of paths that begin at the root, which a run says nothing of, the names alone."""
+    words = [word.partition("=") for word in sys.argv[1:]]
+    ends = [(_name(first), equals, _name(last)) for first, equals, last in words]
+    return shlex.join(["tissuq", *("".join(parts) for parts in ends)])
+
+
+def _name(text: str) -> str:
+    return Path(text).name if Path(text).is_absolute() else text
 
 
 def _left(seconds: float | None) -> str:
