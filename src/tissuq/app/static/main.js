@@ -58,8 +58,12 @@ const measured = () => {
   const seen = file => state.found?.tests.find(test => test.file === file)?.mode ?? "";
   return { files: state.files, reading: state.reading, modes: modes.some(Boolean) ? modes.map((mode, i) => mode || seen(state.files[i])) : [] };
 };
+const fitted = () => { // with a mode for every test: one file may hold tests in several
+  const { modes, ...request } = measured();
+  return { ...request, modes: modes.length ? state.found.tests.map(test => state.modes[test.file] || test.mode) : [] };
+};
 
-const changedSince = () => { byId("stale").hidden = !state.answer || state.fitted === JSON.stringify([measured(), fitOptions()]); };
+const changedSince = () => { byId("stale").hidden = !state.answer || state.fitted === JSON.stringify([fitted(), fitOptions()]); };
 
 let inspection = 0;
 const inspect = safely(async () => {
@@ -126,7 +130,7 @@ const fitOptions = () => ({
 const fit = safely(async event => {
   event.preventDefault();
   if (byId("noise").value.trim() && !(Number(byId("noise").value) > 0)) throw new Error("The noise is a positive number with a decimal point, or nothing.");
-  const asked = [measured(), fitOptions()];
+  const asked = [fitted(), fitOptions()];
   await beginShown("fit", { ...asked[0], ...asked[1] }, byId("fit-progress"), byId("fit-form"), (kind, data) => {
     if (kind === "answer") {
       state.answer = data;

@@ -26,6 +26,7 @@ const FIELDS = [
     ["sheet", "Sheet", "2"], ["table", "Table", "1"], ["skip_rows", "Skip lines at the top", "3"], ["axis", "Axis", ["x", "y"]]]],
 ];
 const NUMBERS = new Set(["every", "table", "skip_rows"]);
+const numberOf = text => (Number.isNaN(Number(text)) ? text : Number(text)); // what is no number is refused with a message
 
 const valueOf = (reading, name) => {
   if (name === "low" || name === "high") return reading.stretch_range?.[name === "low" ? 0 : 1] ?? "";
@@ -38,14 +39,14 @@ const changed = (reading, name, text) => {
   const next = structuredClone(reading), [whole, part] = name.split(".");
   if (name === "low" || name === "high") {
     const ends = next.stretch_range ?? [-1e9, 1e9];
-    ends[name === "low" ? 0 : 1] = text === "" ? (name === "low" ? -1e9 : 1e9) : Number(text);
+    ends[name === "low" ? 0 : 1] = text === "" ? (name === "low" ? -1e9 : 1e9) : numberOf(text);
     next.stretch_range = ends[0] === -1e9 && ends[1] === 1e9 ? null : ends;
   } else if (part) {
     next[whole] = { ...next[whole], [part]: text };
     if (text === "") delete next[whole][part];
   } else if (text === "" || text === false) delete next[whole];
   else if (name === "compression_positive") next[whole] = text === "true";
-  else next[whole] = NUMBERS.has(name) ? Number(text) : text;
+  else next[whole] = NUMBERS.has(name) ? numberOf(text) : text;
   return next;
 };
 
