@@ -60,7 +60,7 @@ const measured = () => {
 };
 const fitted = () => { // with a mode for every test: one file may hold tests in several
   const { modes, ...request } = measured();
-  return { ...request, modes: modes.length ? state.found.tests.map(test => state.modes[test.file] || test.mode) : [] };
+  return { ...request, modes: modes.length ? (state.found?.tests ?? []).map(test => state.modes[test.file] || test.mode) : [] };
 };
 
 const changedSince = () => { byId("stale").hidden = !state.answer || state.fitted === JSON.stringify([fitted(), fitOptions()]); };
