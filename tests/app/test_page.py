@@ -286,3 +286,16 @@ def test_a_fit_that_is_cancelled_or_whose_page_is_closed_leaves_nothing(visit, s
     upload(other, write_stretches(tmp_path))
     fit(other, ".numbers .first")
     assert number_of(other)[1] < 10 < number_of(other)[2]
+
+
+def test_files_chosen_while_the_page_starts_are_not_lost(browser, address, tmp_path):
+    path = tmp_path / "early.csv"
+    path.write_text("stretch,stress_kPa\n" + "".join(f"{1 + k / 50},{k}\n" for k in range(12)))
+    page = browser.new_page()
+    page.set_default_timeout(PATIENCE)
+    page.goto(address, wait_until="commit")
+    page.wait_for_function("document.getElementById('pick') !== null")
+    page.set_input_files("#pick", path)
+    page.wait_for_selector("#tests .plot, #refusal .question")
+    assert "early.csv" in page.inner_text("#file-list")
+    page.close()

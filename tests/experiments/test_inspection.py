@@ -114,3 +114,22 @@ def test_a_biaxial_test_read_as_uniaxial_is_doubted(tmp_path):
     options = {**file.options, "mode": "uniaxial"}
     assert "column 'YForce_mN' carries force, too" in notes(tq.inspect(path, **options))
     assert "carries force" not in notes(tq.inspect(path, **file.options))
+
+
+def test_compression_after_tension_from_the_reference_is_no_unloading(tmp_path):
+    text = "stretch,stress_kPa\n"
+    for end in (1.1, 0.9):
+        text += "".join(f"{x:.5f},{1e3 * (x - x**-2):.6f}\n" for x in np.linspace(1, end, 17))
+    path = tmp_path / "both.csv"
+    path.write_text(text)
+    assert "loading and unloading differ" not in str(tq.inspect(path))
+    down = np.linspace(1.1, 1, 17)[1:]
+    path.write_text(
+        text.split("\n1.00000", 2)[0]
+        + "\n"
+        + "".join(
+            [f"{x:.5f},{1e3 * (x - x**-2):.6f}\n" for x in np.linspace(1, 1.1, 17)]
+            + [f"{x:.5f},{900 * (x - x**-2):.6f}\n" for x in down]
+        )
+    )
+    assert "loading and unloading differ" in str(tq.inspect(path))

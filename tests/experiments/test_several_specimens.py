@@ -154,3 +154,22 @@ def test_a_value_that_is_not_there_is_refused_with_those_that_are(tmp_path):
         tq.read_experiment(path, only={"Specimen": "D"})
     with pytest.raises(InputError, match="no column 'Speciman'"):
         tq.read_experiment(path, only={"Speciman": "A"})
+
+
+@pytest.mark.parametrize("name", ["mode", "Loading mode", "test_mode"])
+@pytest.mark.parametrize("stated", ["equibiaxial", "Planar", "pure shear", "tension"])
+def test_a_column_of_the_loading_mode_says_it(tmp_path, name, stated):
+    path = written(tmp_path, name, [stated] * 3, interleaved=True)
+    mode = {"equibiaxial": "equibiaxial", "tension": "uniaxial"}.get(stated, "planar")
+    assert tq.read_experiment(path).mode.name == mode
+    assert tq.read_experiment(path, mode="uniaxial").mode.name == "uniaxial"
+    assert f"'{name}' is loading mode" in str(tq.inspect(path))
+
+
+@pytest.mark.parametrize("interleaved", [False, True])
+def test_rows_of_several_loading_modes_are_a_test_each(tmp_path, interleaved):
+    modes = ["uniaxial", "equibiaxial", "planar"]
+    tests = tq.read_tests(written(tmp_path, "mode", modes, interleaved=interleaved))
+    assert [test.mode.name for test in tests] == modes
+    for test, factor in zip(tests, STIFFNESS.values(), strict=True):
+        np.testing.assert_allclose(test.stress, factor * neo_hookean(test.stretch), atol=1e-6)

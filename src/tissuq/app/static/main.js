@@ -111,6 +111,7 @@ const showFiles = () => fill(byId("file-list"), ...state.files.map(file => {
 }));
 
 const upload = safely(async files => {
+  await state.prepared;
   alertOf("");
   const problems = [];
   for (const file of files) {
@@ -197,14 +198,17 @@ const start = safely(async () => {
   news.addEventListener("message", hear);
   news.addEventListener("error", () => { if (news.readyState === EventSource.CLOSED) alertOf("tissuq has ended, or this page was away for too long. Start 'tissuq app' again, or load the page again."); });
   addEventListener("pagehide", () => navigator.sendBeacon(own("end")));
-  showChoices(await new Promise((resolve, reject) => {
-    begin("choices", {}, (kind, data) => { if (kind === "done") resolve(data); else if (kind === "error") reject(new Error(data.text)); }).catch(reject);
-  }));
+  let prepared;
+  state.prepared = new Promise(resolve => { prepared = resolve; });  // files chosen before wait for it
   byId("pick").addEventListener("change", () => { upload([...byId("pick").files]); byId("pick").value = ""; });
   const drop = byId("drop");
   for (const kind of ["dragenter", "dragover"]) addEventListener(kind, event => { event.preventDefault(); drop.classList.add("over"); });
   addEventListener("dragleave", event => { if (!event.relatedTarget) drop.classList.remove("over"); });
   addEventListener("drop", event => { event.preventDefault(); drop.classList.remove("over"); upload([...event.dataTransfer.files]); });
+  showChoices(await new Promise((resolve, reject) => {
+    begin("choices", {}, (kind, data) => { if (kind === "done") resolve(data); else if (kind === "error") reject(new Error(data.text)); }).catch(reject);
+  }));
+  prepared();
   byId("fit-form").addEventListener("submit", fit);
   byId("fit-form").addEventListener("change", changedSince);
   byId("laws-form").addEventListener("submit", compare);

@@ -83,6 +83,11 @@ def _hysteresis(reading: Reading, number: int) -> str:
     ordered = [rows[np.argsort(course[rows])] for rows in branches]
     low = max(course[rows[0]] for rows in ordered)
     high = min(course[rows[-1]] for rows in ordered)
+    if (
+        min(np.count_nonzero((course[rows] >= low) & (course[rows] <= high)) for rows in ordered)
+        < MIN_ROWS_PER_CYCLE / 2
+    ):
+        return ""  # tension and compression one after another, of which a jump joins the two
     grid = np.linspace(low, high, 50)
     loading, unloading = (np.interp(grid, course[rows], stress[rows]) for rows in ordered)
     share = float(np.abs(loading - unloading).max() / max(np.abs(stress).max(), np.finfo(float).tiny))

@@ -134,6 +134,8 @@ class Inspection:
                 _typed(choice.strain_type) + choice.measure.replace("_", " ") + suffix * has_several_controls
             )
         for column in range(len(table.names)):
+            if self.reading.mode_source == f"column {table.label(column)}":
+                roles[column] = "loading mode"
             yield f"{table.label(column)} {'is ' + roles[column] if column in roles else 'not read'}"
 
     def _noise(self, noise_sd: float | None, stress: Column) -> str:

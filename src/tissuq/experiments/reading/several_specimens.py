@@ -13,6 +13,7 @@ from tissuq.experiments.numbers import NUMBER
 from tissuq.experiments.reading.columns import find_column
 from tissuq.experiments.reading.headings import dimensions_named, is_of_specimens, plain
 from tissuq.experiments.reading.recognition import ColumnChoice
+from tissuq.experiments.reading.stated_mode import modes_in_column
 from tissuq.experiments.reading.table import Column, Table, filled_on
 from tissuq.experiments.reading.vocabulary import CYCLE_NAMES, SET_NAMES
 
@@ -86,15 +87,18 @@ def check_one_specimen(table: Table, choices: Sequence[ColumnChoice], course: Co
     """Refuse a table of several specimens, which would be fitted as one.
 
     They are in a column that is named so, or in one whose words part the rows into tests that each begin anew, or its
-    numbers where no test was unloaded: last of all in those of sizes, which specimens may share.
+    numbers where no test was unloaded: last of all in those of sizes and loading modes, which specimens may share.
 
     Raises
     ------
     SeveralSpecimens
         When there are several, with what reads one of them, or all.
     """
-    parting = _parting_columns(table, choices, course)
-    for column, labels in sorted(parting, key=lambda pair: len(dimensions_named(table.quantities[pair[0]]))):
+
+    def last(parting: tuple[int, list[str]]) -> tuple[int, int]:
+        return len(dimensions_named(table.quantities[parting[0]])), len(modes_in_column(table, parting[0]))
+
+    for column, labels in sorted(_parting_columns(table, choices, course), key=last):
         quantity = table.quantities[column]
         is_numbered = not NOT_OF_TESTS.search(quantity) and _jump(labels, course)
         if not (is_of_specimens(quantity) or not any(map(NUMBER.fullmatch, labels)) or is_numbered):
@@ -143,7 +147,7 @@ def _parting_columns(table: Table, choices: Sequence[ColumnChoice], course: Colu
             continue
         are_cycles = all(plain(label).rstrip("0123456789 .#") in CYCLE_NAMES for label in distinct)
         is_of_tests = _begin_anew(labels, distinct, course) and not are_cycles
-        if is_of_specimens(quantity) or is_of_tests:
+        if is_of_specimens(quantity) or is_of_tests or len(modes_in_column(table, column)) > 1:
             yield column, labels
 
 

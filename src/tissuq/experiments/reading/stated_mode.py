@@ -1,4 +1,4 @@
-"""The loading mode that a file states: in a comment, by its name or that of a sheet, or by its columns."""
+"""The loading mode that a file states: in a comment or a column, by its name or that of a sheet, or by its columns."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ __all__ = [
     "is_torque",
     "mode_in_comment",
     "mode_of",
+    "modes_in_column",
 ]
 
 DEFAULT_MODE = "uniaxial"
@@ -44,6 +45,8 @@ MODE_WORDS = {"tension": "uniaxial", "compression": "uniaxial", "axial": "uniaxi
 """Words for loading modes beside their names."""
 NAMES_OF_MODES = {"pure-shear": "planar"}
 """Further names of loading modes."""
+NAMES_OF_COLUMN = frozenset({"mode", "loading mode", "mode of loading", "deformation mode", "test mode"})
+"""Names of a column that tells in which loading mode a row was measured."""
 OF_MACHINE = re.compile(
     r"^\W*(test(ing)? )?(station|machine|frame|system|device|rig|instrument|configuration|(prüf)?maschine)\b[^:=]*[:=]|"
     r"\w\.(?!csv|tsv|txt|dat|xls|ods|mat)[a-z]\w{1,3}\W*$",
@@ -116,13 +119,24 @@ def mode_of(
     """
     if (wanted := options.get("mode")) is not None:
         return wanted, GIVEN
-    mode, source = find_mode(file, [table.sheet, table.title, *words])
+    mode, source = "", ""
+    if not mode_in_comment(Path(file)):
+        mode, source = _mode_in_column(table)
+    if not mode:
+        mode, source = find_mode(file, [table.sheet, table.title, *words])
     columns = options.get("columns") or {}
     if not mode and columns.keys() & {*SHEARS, "torque"}:
         mode, source = "simple-shear", "a column of shear"
     if not (mode or columns or options.get("axis")):
         mode, source = _mode_of_columns(table)
     return (mode, source) if mode else (DEFAULT_MODE, DEFAULT_SOURCE)
+
+
+def modes_in_column(table: Table, column: int) -> set[str]:
+    """Return the loading modes that the cells of a column name, if its name says that it tells them."""
+    if table.quantities[column] not in NAMES_OF_COLUMN:
+        return set()
+    return {_mode_of_words(cell) for cell in set(table.texts(column))} - {""}
 
 
 def direction_of(*texts: str) -> str:
@@ -164,6 +178,15 @@ def about_mode(mode: str, source: str) -> Iterator[None]:
         if not mode or source in ("", GIVEN, DEFAULT_SOURCE):
             raise
         raise InputError(f"{error} (The loading mode {mode} is from {source}; give --mode for another.)") from error
+
+
+def _mode_in_column(table: Table) -> tuple[str, str]:
+    """Return the mode that a column names in all rows that say one, and which column; empty texts for several."""
+    for column in range(len(table.names)):
+        modes = modes_in_column(table, column)
+        if len(modes) == 1:
+            return modes.pop(), f"column {table.label(column)}"
+    return "", ""
 
 
 def _mode_of_columns(table: Table) -> tuple[str, str]:
