@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tissuq as tq
+from tissuq.assessment.answer import Use, Verdict
 from tissuq.report.prediction import (
     band_headers,
     prediction_figure,
@@ -144,3 +145,20 @@ def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(pos
     assert "At stretch 1.2 in mode planar, the engineering stress is" in page
     assert "How the measurements are predicted" not in page
     assert "<img" not in page
+
+
+@pytest.mark.parametrize(("mode", "reason"), [("uniaxial", "known here"), ("planar", "known elsewhere")])
+def test_the_page_repeats_what_the_fit_says_of_predicting_the_mode(posterior, tmp_path, mode, reason):
+    uses = [
+        Use("predict these tests", Verdict.YES, "known here"),
+        Use("predict other loading modes", Verdict.NO, "known elsewhere"),
+    ]
+    record = {"formulation": "yeoh", "uses": [use._asdict() for use in uses]}
+    (tmp_path / "run").mkdir()
+    found = predicted(posterior, mode=mode, stretch=[1.0, 1.2])
+    settings = PredictionSettings(run="run")
+    for formulation, reasons in (("yeoh", [reason]), ("none", [])):
+        (tmp_path / "run" / "answer.json").write_text(json.dumps(record | {"formulation": formulation}))
+        assert [use.reason for use in prediction_result(found, settings, tmp_path, tmp_path).uses] == reasons
+    (tmp_path / "run" / "answer.json").write_text("{")
+    assert prediction_result(found, settings, tmp_path, tmp_path).uses == ()

@@ -43,6 +43,8 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
     """
     from tissuq.model.tolerances import ESTIMANDS
 
+    if not folder.is_dir():
+        raise InputError(f"there is no folder '{folder}'.")
     try:
         answer = _answer(folder)
         rows, readable, unit, title = _read_run(folder, experiment)

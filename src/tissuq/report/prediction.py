@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,14 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.assessment.answer import Use, Verdict
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
 from tissuq.prediction.bands import Band
+from tissuq.report.answer import ANSWER
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import interval, significant
 from tissuq.result_warning import in_shell
 from tissuq.studies.prediction import Prediction, draw_prediction
+from tissuq.studies.settings import DAMAGE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,6 +109,7 @@ def prediction_result(
         subject=f"run {run}: {model.material.name}, discrepancy {model.discrepancy.name}, fitted to {measured}",
         numbers=(*_stresses_at_the_end(prediction), *_shares(prediction)),
         finding=_lead(prediction),
+        uses=_use_of_mode(prediction, beside / settings.run),
         next_step=_next_step(prediction),
         picture=Picture(
             "answer", lambda: _figure(replace(prediction, kinds=prediction.kinds[:1]), ANSWER_WIDTH, 2),
@@ -116,6 +121,19 @@ def prediction_result(
         files=files,
         recipe=settings.model_copy(update=relocated),
     )  # fmt: skip
+
+
+def _use_of_mode(prediction: Prediction, run: Path) -> tuple[Use, ...]:
+    """Return whether this mode can be predicted, as the answer of the run says; nothing where it is not known."""
+    try:
+        record = json.loads((run / ANSWER).read_text(encoding="utf-8"))
+        is_of_prediction = record["formulation"] == prediction.posterior.model.discrepancy.name
+        uses = [Use(use["purpose"], Verdict(use["verdict"]), str(use["reason"])) for use in record["uses"]]
+    except (OSError, *DAMAGE):
+        return ()
+    is_measured = prediction.mode in prediction.posterior.model.experiment.modes
+    purpose = "predict these tests" if is_measured else "predict other loading modes"
+    return tuple(use for use in uses if is_of_prediction and use.purpose == purpose)
 
 
 def _stresses_at_the_end(prediction: Prediction) -> list[Number]:
