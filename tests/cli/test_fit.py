@@ -279,7 +279,8 @@ def test_show_refuses_a_folder_that_is_not_a_complete_run(cli, here, fit_run, da
 def test_show_refuses_what_is_not_a_run_folder(cli, specimen, folder):
     said = cli("show", folder)
     assert said.status == 2
-    assert f"'{folder}' is not the folder of a complete run" in said.err
+    reason = "there is no folder 'nowhere'" if folder == "nowhere" else "is not the folder of a complete run"
+    assert reason in said.err
 
 
 @pytest.mark.parametrize("discrepancy", ["gp-orthogonal", "gp-scaled"])

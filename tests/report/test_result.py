@@ -122,7 +122,7 @@ def test_the_page_begins_with_the_answer_and_escapes_what_it_is_given(tmp_path):
     write_result(result_of(warnings=warnings_of(*[Severity.CAUTION] * 5)), tmp_path)
     page = (tmp_path / "report.html").read_text()
     body = page[page.index("<main>") :]
-    assert body.index("81.3 kPa") < body.index("Next:") < body.index("<img") < body.index("warning 0")
+    assert body.index("81.3\u00a0kPa") < body.index("Next:") < body.index("<img") < body.index("warning 0")
     assert len(re.sub(r"<[^>]*>", " ", body[: body.index("<img")]).split()) < 60
     assert "Title &lt;b&gt;" in body
     assert "<strong>Strong</strong> and <code>code</code> and &lt;i&gt;." in body

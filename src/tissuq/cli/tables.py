@@ -43,7 +43,7 @@ def print_summary(folder: Path, experiment: Experiment | None = None, *, details
     """
     from tissuq.model.tolerances import ESTIMANDS
 
-    if not folder.is_dir():
+    if not folder.exists():
         raise InputError(f"there is no folder '{folder}'.")
     try:
         answer = _answer(folder)
