@@ -17,22 +17,22 @@ pytest.importorskip("uvicorn", reason="the extra 'app' is not installed")
 
 from tissuq.app.shell_forms import ShellForms
 from tissuq.cli.answers import answers_in, with_options
-from tissuq.cli.reading import find_tests, measured
+from tissuq.cli.reading import find_tests, measured, run_name
 
 SERVED = """\
 from tissuq.app.server import serve
 from tissuq.app.shell_forms import ShellForms
 from tissuq.cli.answers import answers_in, with_options
-from tissuq.cli.reading import find_tests, measured
+from tissuq.cli.reading import find_tests, measured, run_name
 if __name__ == "__main__":
-    serve(ShellForms(measured, find_tests, answers_in, with_options), open_browser=False, grace=1.0)
+    serve(ShellForms(measured, find_tests, answers_in, with_options, run_name), open_browser=False, grace=1.0)
 """
 """As ``tissuq app --no-browser``, but for how long it waits for a page that has gone."""
 
 
 @pytest.fixture
 def forms():
-    return ShellForms(measured, find_tests, answers_in, with_options)
+    return ShellForms(measured, find_tests, answers_in, with_options, run_name)
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 import pytest
 
-from tissuq.cli.tables import print_rows
+from tissuq.report.terminal import print_rows
 
 
 @pytest.mark.parametrize("columns", ["40", "80"])

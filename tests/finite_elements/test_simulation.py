@@ -10,8 +10,8 @@ import pytest
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements import ClampedBar, Indentation, bar_force, respond, simulate
 from tissuq.finite_elements.response import Solve, run_in_turn, solved
-from tissuq.finite_elements.simulation import simulation_warnings
 from tissuq.finite_elements.solver import felupe
+from tissuq.finite_elements.warnings import simulation_warnings
 from tissuq.mechanics import material_named
 
 pytest.importorskip("felupe", reason="FElupe is not installed")

@@ -45,12 +45,15 @@ class ShellForms(NamedTuple):
         From a message, the names of columns and the settings to what the message proposes.
     with_proposal : callable
         From settings and a proposal to the settings with it.
+    run_name : callable
+        From files, no recipe and the files of all tests to the name of the run's folder.
     """
 
     measured: Callable[..., tuple[dict[str, Any], list[Reading | None]]]
     find_tests: Callable[..., list[tuple[dict[str, Any], Reading]]]
     proposals_in: Callable[[str, Sequence[str], Mapping[str, Any]], Sequence[Proposal]]
     with_proposal: Callable[[Mapping[str, Any], Any], dict[str, Any]]
+    run_name: Callable[[Sequence[Path], None, Sequence[Path]], str]
 
     def tests_in(
         self, files: Sequence[Path], reading: Mapping[str, Any], modes: Sequence[str | None]

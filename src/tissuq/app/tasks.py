@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from tissuq.app.repeat import command, fit_lines, reading_words
 from tissuq.app.shell_forms import ShellForms
 from tissuq.errors import InputError
+from tissuq.studies.option_texts import column
 
 if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenStudy
@@ -20,8 +21,6 @@ __all__ = ["TASKS", "Say", "warm_up"]
 Say = Callable[[str, Any], None]
 """Is told what has come of a task so far: the kind of news, and plain data."""
 RUNS, CARDS = Path("runs"), Path("cards")
-SHOWN_OPTIONS = ("material", "laws", "discrepancies", "noise_sd", "estimand", "stable_in")
-"""Options of a fit that the page has."""
 
 
 def choices(_: ShellForms, __: Mapping[str, Any], say: Say) -> None:
@@ -226,16 +225,11 @@ def _files(request: Mapping[str, Any]) -> tuple[list[str], list[str], dict[str, 
     """Return the files of a request, the mode of each where they are stated, and how they are read."""
     reading = {name: value for name, value in dict(request.get("reading") or {}).items() if value not in (None, {}, "")}
     if "columns" in reading:
-        reading["columns"] = {role: _name_or_number(name) for role, name in reading["columns"].items()}
+        reading["columns"] = {role: column(str(name)) for role, name in reading["columns"].items()}
     if "sheet" in reading:
-        reading["sheet"] = _name_or_number(reading["sheet"])
+        reading["sheet"] = column(str(reading["sheet"]))
     modes = list(request.get("modes") or [])
     return list(request["files"]), modes if any(modes) else [], reading
-
-
-def _name_or_number(name: Any) -> str | int:
-    """Return a number where a column or sheet is named by one, as on the command line."""
-    return int(name) if str(name).isdecimal() else str(name)
 
 
 def _measured(forms: ShellForms, request: Mapping[str, Any]) -> tuple[dict[str, Any], Sequence[Any], str]:
@@ -246,8 +240,7 @@ def _measured(forms: ShellForms, request: Mapping[str, Any]) -> tuple[dict[str, 
         values, found = forms.measured(paths, reading, modes or None, None, None)
     values = {name: value for name, value in values.items() if value is not None}
     sources = [Path(test["file"]) for test in values.get("tests") or [values]]
-    name = paths[0].stem if len(paths) == 1 else f"{sources[0].stem}-and-{len(sources) - 1}-more"
-    return values, found, name
+    return values, found, forms.run_name(paths, None, sources)
 
 
 def _options(request: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:

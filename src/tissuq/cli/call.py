@@ -138,29 +138,28 @@ class Call(Generic[Kind, How]):
         steps : int, optional
             Their number, where it is known.
         """
-        from tissuq.report.terminal import print_result
         from tissuq.report.writer import write_result
 
         records: list[Record] = []
 
         def write(study: Study, *, folder: Path, figures: bool) -> None:
-            result = result_of(study)
-            write_result(result, folder, figures=figures)
-            records.append(result.record())
+            records.append(write_result(result_of(study), folder, figures=figures))
 
         study = self.written(target, run, write, steps)
-        print_result(records[0], target)
-        self.answer(records[0]["numbers"])
+        self._show(records[0], target)
         return study
 
     def put_into(self, folder: Path, result: Result, *, figures: bool = True) -> None:
         """Write a result into the folder of a campaign, and print it."""
-        from tissuq.report.terminal import print_result
         from tissuq.report.writer import write_result
 
-        write_result(result, folder, figures=figures)
+        record = write_result(result, folder, figures=figures)
         self.monitor.write_log(folder, result.warnings)
-        record = result.record()
+        self._show(record, folder)
+
+    def _show(self, record: Record, folder: Path) -> None:
+        from tissuq.report.terminal import print_result
+
         print_result(record, folder)
         self.answer(record["numbers"])
 

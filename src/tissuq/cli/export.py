@@ -27,10 +27,10 @@ class ExportOptions(LawOfRun):
 @command(ExportSettings, ExportOptions)
 def export(call: Call[ExportSettings, ExportOptions]) -> None:
     """Write draws of a posterior, discrepancy included, as material cards for finite-element codes."""
-    from tissuq.cli.tables import print_explanations
     from tissuq.export import CardSettings, card_format
     from tissuq.report.cards import INDEX, write_cards
     from tissuq.report.run_folder import check_apart, check_target
+    from tissuq.report.terminal import print_explanations
     from tissuq.studies.earlier_run import load
 
     settings, force = call.settings, call.how.force

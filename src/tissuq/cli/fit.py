@@ -83,7 +83,7 @@ def _fit_one(
 ) -> None:
     """Fit one material, write the run and print its summary."""
     from tissuq.cli.tables import print_summary
-    from tissuq.report.answer import answer_record, readable_estimates
+    from tissuq.report.answer import answer_record, numbers_of
     from tissuq.report.specimen import write_specimen_run
     from tissuq.studies.specimen import run_specimen, steps_of
 
@@ -95,10 +95,7 @@ def _fit_one(
     )
     print_summary(target, study.experiment)
     record = answer_record(study.experiment.name, study.main, study.answer, study.unit, ())
-    call.answer([
-        {"name": estimate["name"], "text": estimate["value"], "remark": f"95 % interval {estimate['interval']}"}
-        for estimate in readable_estimates(record)
-    ])  # fmt: skip
+    call.answer(numbers_of(record))
     _print_omissions(study)
 
 

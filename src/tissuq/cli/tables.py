@@ -5,14 +5,20 @@ from __future__ import annotations
 import json
 import shlex
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
-from tissuq.report.answer import ANSWER, readable_estimates, shown_and_folded
+from tissuq.report.answer import ANSWER, numbers_of, readable_estimates, shown_and_folded
 from tissuq.report.run_folder import ASSESSMENT, HELD_OUT_TESTS, RECIPE
 from tissuq.report.tables import headline_of
-from tissuq.report.terminal import TEXT_WIDTH, print_explanations, print_rows, print_warnings
+from tissuq.report.terminal import (
+    print_explanations,
+    print_next,
+    print_numbers,
+    print_rows,
+    print_uses,
+    print_warnings,
+)
 from tissuq.report.writer import contents_for_programs
 from tissuq.result_warning import Severity
 from tissuq.studies.settings import DAMAGE, damage_reported, load_settings
@@ -20,7 +26,7 @@ from tissuq.studies.settings import DAMAGE, damage_reported, load_settings
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
 
-__all__ = ["print_explanations", "print_json", "print_rows", "print_summary", "print_warnings"]
+__all__ = ["print_json", "print_summary"]
 
 SUMMARY = "summary.json"
 
@@ -101,21 +107,10 @@ def _answer(folder: Path) -> dict[str, Any] | None:
 def _print_answer(answer: dict[str, Any], folder: Path) -> None:
     """Print the numbers with their intervals, for what they can be used, and what to do next."""
     print(f"\n{answer['title']}")
-    estimates = readable_estimates(answer)
-    name_width = max(len(estimate["name"]) for estimate in estimates)
-    for estimate in estimates:
-        print(f"  {estimate['name']:<{name_width}}  {estimate['value']}, 95 % interval {estimate['interval']}")
+    print_numbers(numbers_of(answer))
     print(f"  The intervals are of {answer['meaning']}.\n")
-    verdict_width = max(len(use["verdict"]) for use in answer["uses"])
-    for use in answer["uses"]:
-        start = f"  {use['verdict'].upper():<{verdict_width}}  "
-        print(
-            fill(f"{use['purpose']}: {use['reason']}", TEXT_WIDTH, initial_indent=start,
-                 subsequent_indent=" " * len(start))
-        )  # fmt: skip
-    print()
-    step = answer["next"].replace("{run}", shlex.quote(str(folder)))
-    print(fill(step, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
+    print_uses(answer["uses"])
+    print_next(answer["next"], folder)
 
 
 def _summary_cells(

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from tissuq.decks.model_run import ModelRun
 from tissuq.errors import ConvergenceError
-from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MAX_DRAWS_NAMED, MIN_DRAWS
+from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MIN_DRAWS
 from tissuq.finite_elements.spread import BAND, PROBABILITY, SHARES, band_probability, force_table
+from tissuq.finite_elements.warnings import MAX_DRAWS_NAMED
 
 if TYPE_CHECKING:
     import pandas as pd

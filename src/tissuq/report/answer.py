@@ -66,6 +66,14 @@ def readable_estimates(record: dict[str, Any]) -> list[dict[str, str]]:
     return readable
 
 
+def numbers_of(record: dict[str, Any]) -> list[dict[str, str]]:
+    """Return every estimate as a number of the terminal: ``name``, ``text`` and ``remark``."""
+    return [
+        {"name": estimate["name"], "text": estimate["value"], "remark": f"95 % interval {estimate['interval']}"}
+        for estimate in readable_estimates(record)
+    ]
+
+
 def shown_and_folded(record: dict[str, Any]) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
     """Return the warnings to show at once, problems in any case, and the others; they are in order of severity.
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
-from tissuq.report.result import NumberRecord, Record, TableRecord, UseRecord, few_and_others
+from tissuq.report.result import Record, TableRecord, UseRecord, few_and_others
 from tissuq.result_warning import Severity, in_shell
 
-__all__ = ["print_explanations", "print_result", "print_rows", "print_warnings"]
+__all__ = [
+    "print_explanations", "print_next", "print_numbers", "print_result", "print_rows", "print_uses", "print_warnings",
+]  # fmt: skip
 
 TEXT_WIDTH = 96
 """Letters in a line of prose."""
@@ -69,13 +72,12 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     shown, others = (shown + others, []) if details else (shown, others)
     print_warnings([warning["text"] for warning in shown if warning["severity"] == Severity.PROBLEM])
     print(f"\n{record['title']}")
-    _print_numbers(record["numbers"])
+    print_numbers(record["numbers"])
     if record["finding"]:
         print(fill(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
-    _print_uses(record["uses"])
+    print_uses(record["uses"])
     if record["next"]:
-        step = _plain(record["next"]).replace("{run}", shlex.quote(str(folder)))
-        print("\n" + fill(step, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
+        print_next(record["next"], folder)
     for table in record["tables"]:
         _print_table(table)
     print_warnings([warning["text"] for warning in shown if warning["severity"] != Severity.PROBLEM])
@@ -94,19 +96,27 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     print(f"Report: {folder / 'report.html'}")
 
 
-def _print_numbers(numbers: Sequence[NumberRecord]) -> None:
+def print_numbers(numbers: Sequence[Mapping[str, Any]]) -> None:
+    """Print numbers, each with its ``name``, ``text`` and ``remark``."""
     width = max((len(number["name"]) for number in numbers), default=0)
     for number in numbers:
         remark = f", {number['remark']}" if number["remark"] else ""
         print(f"  {number['name']:<{width}}  {number['text']}{remark}")
 
 
-def _print_uses(uses: Sequence[UseRecord]) -> None:
+def print_uses(uses: Sequence[UseRecord]) -> None:
+    """Print for what a result can be used, with the verdict in front."""
     width = max((len(use["verdict"]) for use in uses), default=0)
     for use in uses:
         start = f"  {use['verdict'].upper():<{width}}  "
         print(fill(f"{use['purpose']}: {use['reason']}", TEXT_WIDTH, initial_indent=start,
                    subsequent_indent=" " * len(start)))  # fmt: skip
+
+
+def print_next(step: str, folder: Path | None) -> None:
+    """Print what to do next, with the folder of the run where the step names it."""
+    words = _plain(step).replace("{run}", shlex.quote(str(folder)))
+    print("\n" + fill(words, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))
 
 
 def _print_table(table: TableRecord) -> None:

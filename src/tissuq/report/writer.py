@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["contents_for_programs", "data_file", "posterior_files", "read_record", "write_result"]
 
 
-def write_result(result: Result, folder: Path, *, figures: bool = True) -> None:
-    """Write a result into a folder, whose earlier figures go.
+def write_result(result: Result, folder: Path, *, figures: bool = True) -> Record:
+    """Write a result into a folder, whose earlier figures go; return its record.
 
     Parameters
     ----------
@@ -49,6 +49,7 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> None:
     write_json(folder / RESULT, record)
     shown, others = few_and_others(record["warnings"])
     write_page(folder, "result.html", result=result, record=record, shown=shown, others=others, command=command)
+    return record
 
 
 def _write(path: Path, content: Any) -> None:

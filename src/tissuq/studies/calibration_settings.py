@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -11,6 +10,7 @@ from pydantic import field_validator, model_validator
 
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.option_texts import column, priors, sd_or_unknown
+from tissuq.studies.settings import positive_or_unknown
 from tissuq.studies.shared_options import seed
 
 if TYPE_CHECKING:
@@ -78,12 +78,7 @@ class CalibrationSettings(Settings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if value != "unknown" and not (is_number and 0 < value < inf):
-            raise ValueError(
-                f"must be a positive number in the unit of the measured values, or 'unknown', not {value!r}"
-            )
-        return value
+        return positive_or_unknown(value, "the unit of the measured values")
 
     @model_validator(mode="after")
     def _one_model(self) -> Self:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, cast
 
@@ -12,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from tissuq.studies.option import Settings, option
 from tissuq.studies.option_texts import column, one_noise, pairs_of, range_of
+from tissuq.studies.settings import positive_or_unknown
 from tissuq.studies.shared_options import seed
 
 if TYPE_CHECKING:
@@ -168,13 +168,9 @@ class FittedSettings(Settings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if value != "unknown" and not (is_number and 0 < value < inf):
-            raise ValueError(
-                f"must be a positive number in the file's stress unit, or 'unknown', not {value!r}; noise of zero "
-                "would make every measurement exact"
-            )
-        return value
+        return positive_or_unknown(
+            value, "the file's stress unit", "; noise of zero would make every measurement exact"
+        )
 
     @model_validator(mode="after")
     def _one_noise(self) -> Self:

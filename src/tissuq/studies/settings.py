@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -14,7 +15,10 @@ from tissuq.errors import InputError, TissuqError
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
-__all__ = ["DAMAGE", "RECIPE", "damage_reported", "is_inside", "load_settings", "looked_up", "setting_of"]
+__all__ = [
+    "DAMAGE", "RECIPE", "damage_reported", "is_inside", "load_settings", "looked_up", "positive_or_unknown",
+    "setting_of",
+]  # fmt: skip
 
 RECIPE = "run.toml"
 """The file of a run that says how it is repeated."""
@@ -135,6 +139,17 @@ def _explain(item: Any, typed: Mapping[str, str]) -> str:
 
 def _place(item: Any) -> str:
     return ".".join(str(key) for key in item["loc"])
+
+
+def positive_or_unknown(value: Any, unit: str, reason: str = "") -> Any:
+    """Return a standard deviation, or 'unknown'; a ValueError, which pydantic reports with the setting, of any else.
+
+    ``unit`` says in which it is, and ``reason`` why nothing else is possible.
+    """
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if value != "unknown" and not (is_number and 0 < value < inf):
+        raise ValueError(f"must be a positive number in {unit}, or 'unknown', not {value!r}{reason}")
+    return value
 
 
 def looked_up(find: Callable[[Any], Named], name: Any) -> Named:

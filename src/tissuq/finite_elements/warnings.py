@@ -1,0 +1,98 @@
+"""Warnings about a simulation: draws that failed, strains beyond the measured ones, few draws, a coarse mesh."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, Simulation
+from tissuq.finite_elements.spread import PROBABILITY, band_probability, shares_of
+
+__all__ = ["MAX_DRAWS_NAMED", "simulation_warnings"]
+
+MAX_DRAWS_NAMED = 6
+"""Largest number of failed draws that a warning names; the table of failures has all of them."""
+
+MIN_ENERGY_SHARE = 0.05
+"""Share of the strain energy beyond the measured invariants from which a warning is given."""
+
+MIN_MESH_CHANGE = 0.03
+"""Relative change of the force on a finer mesh from which a warning is given."""
+
+MAX_NEGATIVE_SHARE = -0.05
+"""Share of the variance below which parameters and discrepancy are said to compensate each other."""
+
+
+def simulation_warnings(simulation: Simulation) -> list[str]:
+    """Return all warnings about a simulation."""
+    checks = _failed, _extrapolated, _compensated, _too_few_draws, _coarse_mesh
+    return [sentence for check in checks for sentence in check(simulation)]
+
+
+def _failed(simulation: Simulation) -> list[str]:
+    """Return a sentence for each family of draws of which some did not reach the end."""
+    name, texts = simulation.case.travel_name, []
+    for family, count in Counter(failure.family for failure in simulation.failures).items():
+        failures = [failure for failure in simulation.failures if failure.family == family]
+        failures.sort(key=lambda failure: failure.reached)
+        named = "; ".join(f"draw {item.number + 1} at {item.reached:.3g} mm" for item in failures[:MAX_DRAWS_NAMED])
+        more = f"; and {count - MAX_DRAWS_NAMED} more, see failures.csv" if count > MAX_DRAWS_NAMED else ""
+        texts.append(
+            f"{count} of {len(simulation.forces[family])} {FAMILIES[family]} did not reach the full {name} of "
+            f"{simulation.case.travel:.3g} mm ({named}{more}; first reason: {failures[0].problem}). Each step shows "
+            "only the draws that reached it, which may no longer be a fair sample."
+        )
+    return texts
+
+
+def _extrapolated(simulation: Simulation) -> list[str]:
+    is_reached = np.isfinite(simulation.energy_beyond)
+    last = np.flatnonzero(is_reached.any(axis=0))[-1]
+    shares = simulation.volume_beyond, simulation.energy_beyond
+    volume, energy = (float(rows[is_reached[:, last], last].mean()) for rows in shares)
+    if energy < MIN_ENERGY_SHARE:
+        return []
+    max_1, max_2 = simulation.max_invariants
+    return [
+        f"At {simulation.travel[last]:.3g} mm, {100 * volume:.2g} % of the volume, with {100 * energy:.0f} % of the "
+        f"strain energy, is strained beyond what was measured (I1 - 3 up to {max_1:.3g}, I2 - 3 up to {max_2:.3g}). "
+        "There the energy of every draw goes on as it ends, with an error that grows with the strain."
+    ]
+
+
+def _compensated(simulation: Simulation) -> list[str]:
+    if MATERIAL_ONLY not in simulation.forces:
+        return []
+    complete, material_only = simulation.forces[COMPLETE], simulation.forces[MATERIAL_ONLY]
+    is_reached = np.isfinite(complete) & np.isfinite(material_only)
+    steps = [step for step in range(is_reached.shape[1]) if is_reached[:, step].sum() > 1]
+    smallest = 0.0
+    for step in steps:
+        rows = is_reached[:, step]
+        shares = shares_of(complete[rows, step, None], material_only[rows, step, None], simulation.noise_sd)
+        smallest = min(smallest, float(shares.parameters[0]), float(shares.discrepancy[0]))
+    if smallest > MAX_NEGATIVE_SHARE:
+        return []
+    return [
+        "A share of the variance is negative: parameters and discrepancy compensate each other, because the "
+        "measurements know their sum better than either. Varying only one of them would overstate the uncertainty."
+    ]
+
+
+def _too_few_draws(simulation: Simulation) -> list[str]:
+    count = int(np.isfinite(simulation.forces[COMPLETE]).sum(axis=0).max())
+    probability = band_probability(count)
+    if probability >= PROBABILITY:
+        return []
+    return [f"{count} draws are too few for a 95 % band: the band is their range, a {100 * probability:.0f} % band."]
+
+
+def _coarse_mesh(simulation: Simulation) -> list[str]:
+    if simulation.mesh_change is None or abs(simulation.mesh_change[0]) < MIN_MESH_CHANGE:
+        return []
+    change, travel = simulation.mesh_change
+    return [
+        f"On a mesh of twice the fineness the force at {travel:.3g} mm changes by {100 * change:+.1f} %: the mesh is "
+        "too coarse for this force."
+    ]
