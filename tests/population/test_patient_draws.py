@@ -1,4 +1,4 @@
-"""A new patient's draws for other programs: against the predictive distribution, stable, and on cards with their law."""
+"""A new patient's draws for other programs: predictive mean and sd, stability, and cards with their law."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ TRUTHS = [(0.5, 0.1), (0.3, -0.05), (0.6, 0.4), (0.4, 0.2), (0.35, -0.1)]
 
 
 RATES = {
-    "uniaxial": lambda l: (l - l**-2, 1 - l**-3),
-    "equibiaxial": lambda l: (l - l**-5, l**3 - l**-3),
-    "planar": lambda l: (l - l**-3, l - l**-3),
+    "uniaxial": lambda x: (x - x**-2, 1 - x**-3),
+    "equibiaxial": lambda x: (x - x**-5, x**3 - x**-3),
+    "planar": lambda x: (x - x**-3, x - x**-3),
 }
 """Half of dI1/dl and dI2/dl by mode; of equal biaxial tension, of one axis."""
 
