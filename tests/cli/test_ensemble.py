@@ -54,7 +54,7 @@ def model(fitted, here):
     (here / "model.inp").write_text(DECK, encoding="utf-8")
     command = f'"{Path(sys.executable).as_posix()}" "{(here / "stub.py").as_posix()}" {{job}}'
     return [
-        "run", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP", "--solver", "ccx", "--command", command,
+        "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", "--solver", "ccx", "--command", command,
         "--draws", 6, "--max-jobs", 1, "--out", "out",
     ]  # fmt: skip
 
@@ -134,7 +134,7 @@ def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli,
     command = f'"{Path(sys.executable).as_posix()}" -c "print(\'{says}\')"'
     solver = ["--solver", "febio4"] if code == "febio" else []
     options = ["--qoi", "first=mine.py:first", *solver, "--command", command, "--draws", 3, "--max-jobs", 1]
-    said = cli("ensemble", "run", name, "--material", wanted, *options, "--no-figures", "--out", "out")
+    said = cli("ensemble", "run", name, "--replace", wanted, *options, "--no-figures", "--out", "out")
     assert said.status == 0, said.err
     assert cli("export", "run", "--format", code, "--draws", 3, "--out", "cards").status == 0
     constants = [float(row[column]) for row in rows_of(here / "cards" / "index.csv")]
@@ -142,7 +142,7 @@ def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli,
 
 
 def test_every_material_may_name_its_run(cli, here, model):
-    words = ["model.inp", "--material", "TISSUE=run", *model[4:]]
+    words = ["model.inp", "--replace", "TISSUE=run", *model[4:]]
     assert cli("ensemble", *words, "--no-figures").status == 0
     assert len(rows_of(here / "out" / "draws.csv")) == 6
 
@@ -272,7 +272,7 @@ def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, m
         cli("fit", write_specimen(here / "other.csv"), "--noise-sd", 2, "--discrepancy", "none", "--no-figures").status
         == 0
     )
-    said = cli("ensemble", *model, "--material", "fat=runs/other", "--no-figures")
+    said = cli("ensemble", *model, "--replace", "fat=runs/other", "--no-figures")
     assert said.status == 0, said.err
     rows = rows_of(here / "out" / "draws.csv")
     pairs = np.array([[float(row["TISSUE.C10"]), float(row["fat.C10"])] for row in rows])
@@ -307,8 +307,8 @@ def test_what_cannot_be_used_gets_one_message_and_leaves_nothing(cli, here, mode
     ("more", "words"),
     [
         (["--bulk-modulus", "1e-9"], ["Poisson's ratio that is not positive"]),
-        (["--material", "Tissue"], ["one material of the model twice"]),
-        (["--material", "TISSUE"], ["given twice for 'TISSUE'"]),
+        (["--replace", "Tissue"], ["one material of the model twice"]),
+        (["--replace", "TISSUE"], ["given twice for 'TISSUE'"]),
         (["--also", "umat.f"], ["umat.f"]),
         (["--qoi", "C10=RF1@TOP"], ["cannot be called 'C10'"]),
         (["--command", "no-such-program {job}"], ["no program 'no-such-program'"]),
@@ -328,9 +328,9 @@ def test_options_that_cannot_be_used_get_one_message(cli, here, model, more, wor
 
 def test_without_a_model_or_a_question_it_says_what_to_give(cli, here, model):
     assert "RUN folder of a fit and your MODEL" in cli("ensemble", "run").err
-    assert "has no run" in cli("ensemble", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP").err
-    assert "give --material NAME" in cli("ensemble", "run", "model.inp").err
-    assert "give --qoi" in cli("ensemble", "run", "model.inp", "--material", "TISSUE").err
+    assert "has no run" in cli("ensemble", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP").err
+    assert "give --replace NAME" in cli("ensemble", "run", "model.inp").err
+    assert "give --qoi" in cli("ensemble", "run", "model.inp", "--replace", "TISSUE").err
 
 
 def test_a_dry_run_of_a_recipe_runs_no_function(cli, here, model):
@@ -450,5 +450,5 @@ def test_a_set_of_a_set_that_is_nowhere_is_refused_before_a_run(cli, here, model
 
 def test_a_material_of_ansys_that_a_parameter_numbers_is_refused(cli, here, model):
     (here / "m.cdb").write_text("/PREP7\nfat=2\nMP,EX,1,5.0\nMP,EX,fat,10\n/SOLU\n")
-    said = cli("ensemble", "run", "m.cdb", "--material", "fat", "--qoi", "x=q.py:f", "--command", "true", "--dry-run")
+    said = cli("ensemble", "run", "m.cdb", "--replace", "fat", "--qoi", "x=q.py:f", "--command", "true", "--dry-run")
     assert (said.status, "number in digits" in said.err) == (2, True)
