@@ -175,7 +175,7 @@ def model(run_without_discrepancy, here):
     """A run, a deck and a stub of CalculiX in the current folder: the words after ``tissuq ensemble``."""
     shutil.copytree(run_without_discrepancy, here / "run")
     return [
-        "run", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP", "--solver", "ccx",
+        "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", "--solver", "ccx",
         "--command", write_model(here), "--draws", 6, "--max-jobs", 1, "--out", "out",
     ]  # fmt: skip
 

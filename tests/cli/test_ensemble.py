@@ -79,7 +79,7 @@ def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli,
     command = f'"{Path(sys.executable).as_posix()}" -c "print(\'{says}\')"'
     solver = ["--solver", "febio4"] if code == "febio" else []
     options = ["--qoi", "first=mine.py:first", *solver, "--command", command, "--draws", 3, "--max-jobs", 1]
-    said = cli("ensemble", "run", name, "--material", wanted, *options, "--no-figures", "--out", "out")
+    said = cli("ensemble", "run", name, "--replace", wanted, *options, "--no-figures", "--out", "out")
     assert said.status == 0, said.err
     assert cli("export", "run", "--format", code, "--draws", 3, "--out", "cards").status == 0
     constants = [float(row[column]) for row in rows_of(here / "cards" / "index.csv")]
@@ -87,7 +87,7 @@ def test_other_solvers_get_their_decks_and_a_function_reads_what_they_leave(cli,
 
 
 def test_every_material_may_name_its_run(cli, here, model):
-    words = ["model.inp", "--material", "TISSUE=run", *model[4:]]
+    words = ["model.inp", "--replace", "TISSUE=run", *model[4:]]
     assert cli("ensemble", *words, "--no-figures").status == 0
     assert len(rows_of(here / "out" / "draws.csv")) == 6
 
@@ -108,7 +108,7 @@ def test_two_materials_get_draws_of_their_runs_that_are_independent(cli, here, m
         cli("fit", write_specimen(here / "other.csv"), "--noise-sd", 2, "--discrepancy", "none", "--no-figures").status
         == 0
     )
-    said = cli("ensemble", *model, "--material", "fat=runs/other", "--no-figures")
+    said = cli("ensemble", *model, "--replace", "fat=runs/other", "--no-figures")
     assert said.status == 0, said.err
     rows = rows_of(here / "out" / "draws.csv")
     pairs = np.array([[float(row["TISSUE.C10"]), float(row["fat.C10"])] for row in rows])

@@ -60,8 +60,8 @@ def test_what_cannot_be_used_gets_one_message_and_leaves_nothing(cli, here, mode
     ("more", "words"),
     [
         (["--bulk-modulus", "1e-9"], ["Poisson's ratio that is not positive"]),
-        (["--material", "Tissue"], ["one material of the model twice"]),
-        (["--material", "TISSUE"], ["given twice for 'TISSUE'"]),
+        (["--replace", "Tissue"], ["one material of the model twice"]),
+        (["--replace", "TISSUE"], ["given twice for 'TISSUE'"]),
         (["--also", "umat.f"], ["umat.f"]),
         (["--qoi", "C10=RF1@TOP"], ["cannot be called 'C10'"]),
         (["--command", "no-such-program {job}"], ["no program 'no-such-program'"]),
@@ -81,9 +81,9 @@ def test_options_that_cannot_be_used_get_one_message(cli, here, model, more, wor
 
 def test_without_a_model_or_a_question_it_says_what_to_give(cli, here, model):
     assert "RUN folder of a fit and your MODEL" in cli("ensemble", "run").err
-    assert "has no run" in cli("ensemble", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP").err
-    assert "give --material NAME" in cli("ensemble", "run", "model.inp").err
-    assert "give --qoi" in cli("ensemble", "run", "model.inp", "--material", "TISSUE").err
+    assert "has no run" in cli("ensemble", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP").err
+    assert "give --replace NAME" in cli("ensemble", "run", "model.inp").err
+    assert "give --qoi" in cli("ensemble", "run", "model.inp", "--replace", "TISSUE").err
 
 
 def test_files_of_one_name_are_refused(cli, here, model):
@@ -134,5 +134,5 @@ def test_a_set_of_a_set_that_is_nowhere_is_refused_before_a_run(cli, here, model
 
 def test_a_material_of_ansys_that_a_parameter_numbers_is_refused(cli, here, model):
     (here / "m.cdb").write_text("/PREP7\nfat=2\nMP,EX,1,5.0\nMP,EX,fat,10\n/SOLU\n")
-    said = cli("ensemble", "run", "m.cdb", "--material", "fat", "--qoi", "x=q.py:f", "--command", "true", "--dry-run")
+    said = cli("ensemble", "run", "m.cdb", "--replace", "fat", "--qoi", "x=q.py:f", "--command", "true", "--dry-run")
     assert (said.status, "number in digits" in said.err) == (2, True)

@@ -105,7 +105,7 @@ def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_
     folder, _ = population_run
     command_of_stub = write_model(tmp_path)
     options = ["--command", command_of_stub, "--draws", 64, "--unit", "kPa", "--no-figures", "--max-jobs", 1]
-    words = ["ensemble", folder / "run", "model.inp", "--material", "TISSUE", "--qoi", "force=RF2@TOP", *options]
+    words = ["ensemble", folder / "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", *options]
     said = run_in(tmp_path, *words, "--solver", "ccx", "--out", "forces")
     assert said.status == 0, said.err
     assert "those of a new patient of the population of 6 specimens" in " ".join(said.out.split())

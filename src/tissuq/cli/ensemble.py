@@ -92,7 +92,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
     if bool(model) == bool(call.config) or (run and not model):
         raise InputError("give the RUN folder of a fit and your MODEL, or --config run.toml of an earlier ensemble.")
     materials = _materials(stated.get("materials", []), run)
-    for example, value in (("--material NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):
+    for example, value in (("--replace NAME", materials), ("--qoi NAME=RF3@SET", stated.get("quantities"))):
         if call.config is None and not value:
             raise InputError(f"give {example}: what the model is asked for.")
     settings = call.loaded(model=model, materials=materials or None)
@@ -163,4 +163,4 @@ def _materials(texts: list[str], run: Path | None) -> dict[str, str]:
         if not source and run is None:
             raise InputError(f"material '{name}' has no run: give its RUN before the model, or write {name}=RUN.")
         pairs.append((name, source or str(run)))
-    return once_each("--material", pairs)
+    return once_each("--replace", pairs)

@@ -14,6 +14,7 @@ FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "population": {"--specimen": "--specimen-column"},
         "design": {"--points": "--measurements", "--specimen": "--next-specimen", "--material": "--user-law"},
         "export": {"--material": "--user-law"},
+        "ensemble": {"--material": "--replace"},
         "structure": {"--material": "--user-law"},
         "simulate": {"--material": "--user-law"},
         "coverage": {"--noise": "--noise-sd"},

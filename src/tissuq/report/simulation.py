@@ -140,7 +140,7 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
 def _next_step(simulation: Simulation) -> str:
     if (_last_mean(simulation.energy_beyond) or 0.0) > MUCH_BEYOND:
         return "measure up to the strains of the body: tissuq design RUN says which test helps most (RUN: the fit)"
-    return "run your own model with the same draws: tissuq ensemble RUN MODEL --material NAME --qoi NAME=WHAT"
+    return "run your own model with the same draws: tissuq ensemble RUN MODEL --replace NAME --qoi NAME=WHAT"
 
 
 def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]:

@@ -145,7 +145,7 @@ def prepare_ensemble(
     quantities = tuple(_quantity(name, text, beside) for name, text in settings.quantities.items())
     replaced = {name: deck.material(name) for name in settings.materials}
     if len(set(replaced.values())) < len(replaced):
-        raise InputError(f"--material names one material of the model twice: {', '.join(replaced)}.")
+        raise InputError(f"--replace names one material of the model twice: {', '.join(replaced)}.")
     formatting = card_format(settings.card_format or solver.card_format or deck.format.card_format)
     runs = list(dict.fromkeys(settings.materials.values()))
     ensembles: dict[str, Ensemble] = {}

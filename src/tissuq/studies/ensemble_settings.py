@@ -30,9 +30,9 @@ class EnsembleSettings(Settings):
     )
     materials: dict[str, str] = option(
         ...,
-        "Name (ANSYS: number) of the material in the model that gets the draws; NAME=RUN takes them from another run. "
-        "Repeat for more.",
-        name="material",
+        "Name (ANSYS: number) of the material in the model that the draws replace; NAME=RUN takes them from another "
+        "run. Repeat for more.",
+        name="replace",
         min_length=1,
     )
     quantities: dict[str, str] = option(
