@@ -184,9 +184,9 @@ def test_from_a_file_to_the_answer_and_all_that_follows(visit, tmp_path, write_s
     download.value.save_as(tmp_path / "run.zip")
     with zipfile.ZipFile(tmp_path / "run.zip") as run:
         names = set(run.namelist())
-        answer = json.loads(run.read("kidney/answer.json"))
+        answer = json.loads(run.read("kidney/result.json"))
     assert {f"kidney/{name}" for name in ("report.html", "run.toml", "input/kidney.csv", "posterior/auto.nc")} <= names
-    assert answer["estimates"][0]["mean"] == pytest.approx(modulus, rel=6e-3)
+    assert answer["numbers"][0]["value"] == pytest.approx(modulus, rel=6e-3)
 
     page.click("#laws > summary")
     page.check("#law-list [value='neo-hookean']")

@@ -49,12 +49,12 @@ def check_repeats(said, monkeypatch):
     """Run both in the current folder; each gives the estimates that were shown, to rounding."""
     shown = said["answer"]
     run_in_shell(shown["repeat"]["shell"], monkeypatch, "--no-figures", "--out", "again")
-    expected = [list(estimate.values())[1:] for estimate in shown["estimates"]]
-    again = json.loads(Path("again/answer.json").read_text())["estimates"]
+    expected = [[number[name] for name in ("value", "low", "high")] for number in shown["numbers"]]
+    again = json.loads(Path("again/result.json").read_text())["numbers"]
     answer = executed(shown["repeat"]["python"])["posterior"].answer
-    scale = {"kPa": 1000.0, "MPa": 1.0}[shown["unit"]]
+    scale = {"kPa": 1000.0, "MPa": 1.0}[shown["numbers"][0]["unit"]]
     for found, numbers, estimate in zip(again, expected, answer.estimates, strict=True):
-        assert list(found.values())[1:] == pytest.approx(numbers, rel=1e-9)
+        assert [found[name] for name in ("value", "low", "high")] == pytest.approx(numbers, rel=1e-9)
         assert [scale * value for value in estimate[1:]] == pytest.approx(numbers, rel=1e-9)
 
 
@@ -87,8 +87,8 @@ def test_a_fit_is_repeated_by_its_command_and_by_its_python(forms, here, write_s
         "discrepancies": ["none"], "noise_sd": 0.05,
     }  # fmt: skip
     said = done("fit", forms, request)
-    (modulus, _) = said["answer"]["estimates"]
-    assert modulus["hdi_low"] < 10 < modulus["hdi_high"]
+    (modulus, _) = said["answer"]["numbers"]
+    assert modulus["low"] < 10 < modulus["high"]
     assert "--stretch 1.05:1.4" in said["answer"]["repeat"]["shell"]
     check_repeats(said, monkeypatch)
 

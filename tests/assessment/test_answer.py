@@ -7,7 +7,7 @@ import pytest
 
 import gallery
 import tissuq as tq
-from tissuq.assessment.answer import PRECISE, Verdict
+from tissuq.assessment.answer import PRECISE, Answer, Estimate, Step, Use, Verdict
 from tissuq.result_warning import ResultWarning, Severity
 
 STRETCH = np.r_[np.linspace(0.7, 0.98, 8), np.linspace(1.02, 1.6, 12)]
@@ -120,3 +120,16 @@ def test_a_width_that_errors_of_one_specimen_set_is_not_called_a_spread_between_
     answer = tq.fit(tq.datasets.load("brain-cortex-uniaxial"), discrepancy="auto").answer
     assert answer.meaning == tq.estimands()["specimen"].description
     assert answer.uses[0].reason.endswith("nearly all of it the assumed error of the stress as a whole")
+
+
+def test_an_answer_prints_itself_in_its_unit():
+    answer = Answer(
+        (Estimate("initial shear modulus", 0.00146, 0.00123, 0.00169),),
+        "this specimen",
+        (Use("report the modulus", Verdict.YES, "known to ± 15 %"),),
+        Step("tissuq design {run}", "posterior.design()"),
+        "kPa",
+    )
+    lines = str(answer).splitlines()
+    assert lines[0] == "initial shear modulus 1.46 kPa, 95 % interval 1.23 to 1.69"
+    assert lines[-1] == "Next: posterior.design()"

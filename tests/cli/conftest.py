@@ -187,7 +187,7 @@ def without_wall_times(folder: Path) -> dict[str, bytes | None]:
         number = rb'(?<="seconds": )[\d.e-]+' if name.endswith(".json") else rb"(?<=,)[\d.e-]+(?=\n)"
         files[name] = re.sub(number, b"", files[name] or b"")
     files.pop("tissuq.log", None)
-    files["report.html"] = re.sub(rb"<td>\d+\.\d\d</td></tr>", b"", files["report.html"] or b"")
-    if "result.json" in files:
-        files["result.json"] = re.sub(rb'"\d+\.\d\d"(?=\n *\])', b"", files["result.json"] or b"")
+    time = rb"(?<=It took )\d+\.\d\d(?= s\.)"
+    files["report.html"] = re.sub(rb"<td>\d+\.\d\d</td></tr>|" + time, b"", files["report.html"] or b"")
+    files["result.json"] = re.sub(rb'"\d+\.\d\d"(?=\n *\])|' + time, b"", files["result.json"] or b"")
     return files

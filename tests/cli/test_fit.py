@@ -61,7 +61,7 @@ def test_a_run_leaves_the_promised_files_and_a_copy_of_the_users(fit_run):
     posteriors = {f"posterior/{name}.nc" for name in ("none", "constant", "gp")}
     tables = {"data.csv", "summary.csv", "summary.json", "parameters.csv", "stability.csv"}
     assert found == figures | posteriors | tables | {
-        "report.html", "run.toml", "contents.txt", "tissuq.log", "answer.json", "assessment.json", "input/specimen.csv"
+        "report.html", "run.toml", "contents.txt", "tissuq.log", "result.json", "assessment.json", "input/specimen.csv"
     }  # fmt: skip
     users = folder.parents[1] / "specimen.csv"
     assert (folder / "input" / "specimen.csv").read_bytes() == users.read_bytes()
@@ -105,7 +105,7 @@ def test_the_table_in_the_terminal_is_in_the_stress_unit_of_the_file(cli, here, 
     size = unit_stress @ unit_stress
     mean, sd = unit_stress @ stress / size, 1 / np.sqrt(size)
     ends = mean - 1.959964 * sd, mean + 1.959964 * sd
-    assert line.split()[1:5] == [f"{mean:.2f}", f"{sd:.2f}", f"{ends[0]:.2f}", f"{ends[1]:.2f}"]
+    assert line.split()[1:5] == [f"{mean:.2f}", f"{sd:.2f}", f"[{ends[0]:.2f},", f"{ends[1]:.2f}]"]
     answer = next(line for line in said.out.splitlines() if line.strip().startswith("C10 "))
     assert answer.split()[1:] == f"{mean:.2f} kPa, 95 % interval {ends[0]:.2f} to {ends[1]:.2f}".split()
 
@@ -241,25 +241,23 @@ def test_show_gives_programs_what_the_files_hold(cli, here, specimen):
     assert cli("fit", specimen, "--noise-sd", 1, *ALONE).status == 0
     shown = json.loads(cli("show", "runs/specimen", "--json").out)
     files = {name: json.loads((here / "runs" / "specimen" / f"{name}.json").read_text()) for name in shown}
-    files["answer"]["next"] = files["answer"]["next"].replace("{run}", "runs/specimen")
+    files["result"]["next"] = files["result"]["next"].replace("{run}", "runs/specimen")
     assert shown == files
-    assert {"answer", "summary", "assessment"} == set(shown)
+    assert {"result", "summary", "assessment"} == set(shown)
     assert cli("show", "nowhere", "--json").status == 2
 
 
 @pytest.mark.parametrize(
     "damage",
     [
-        {"summary.json": "[]"},
-        {"summary.json": "{}"},
-        {"summary.json": "[{"},
-        {"summary.json": '[{"formulation": "none"}]'},
-        {"summary.json": "5"},
-        {"run.toml": "= ="},
-        {"run.toml": 'file = "input/specimen.csv"\nmaterail = "yeoh"\n'},
-        {"run.toml": None},
-        {"summary.json": None},
-        {"input/specimen.csv": None},
+        {"result.json": "[]"},
+        {"result.json": "{}"},
+        {"result.json": "[{"},
+        {"result.json": '[{"formulation": "none"}]'},
+        {"result.json": "5"},
+        {"result.json": None},
+        {"result.json": None, "run.toml": "= ="},
+        {"result.json": None, "run.toml": None},
     ],
     ids=str,
 )

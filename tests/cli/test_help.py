@@ -85,7 +85,7 @@ def test_ctrl_c_ends_with_status_130_and_leaves_nothing(cli, here, specimen, mon
     def interrupt(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tissuq.report.specimen.write_tables", interrupt)
+    monkeypatch.setattr("tissuq.report.writer.write_page", interrupt)
     said = cli("fit", specimen, "--discrepancy", "none", "--no-figures")
     assert said.status == 130
     assert said.err == (
@@ -103,7 +103,7 @@ def test_the_version_is_that_of_the_installed_package(cli):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
 def test_a_request_to_terminate_ends_with_status_143_and_leaves_nothing(cli, here, specimen, monkeypatch):
     before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr("tissuq.report.specimen.write_tables", lambda *_, **__: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setattr("tissuq.report.writer.write_page", lambda *_, **__: os.kill(os.getpid(), signal.SIGTERM))
     try:
         said = cli("fit", specimen, "--discrepancy", "none", "--no-figures")
     finally:

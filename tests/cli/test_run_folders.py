@@ -95,13 +95,17 @@ def test_a_folder_without_permission_is_refused_before_the_work(cli, here, speci
     assert "locked" in said.err
 
 
-@pytest.mark.parametrize("step", ["write_recipe", "write_data", "write_posteriors", "write_page"])
+PARTS = "recipe", "data", "json", "page"
+STEPS = [*(f"report.writer.write_{part}" for part in PARTS), "posterior.posterior.Posterior.save"]
+
+
+@pytest.mark.parametrize("step", STEPS)
 def test_a_disk_that_is_full_at_any_step_leaves_nothing(cli, here, specimen, monkeypatch, step):
     def fail(*arguments, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     before = tree(here)
-    monkeypatch.setattr(f"tissuq.report.specimen.{step}", fail)
+    monkeypatch.setattr(f"tissuq.{step}", fail)
     said = cli("fit", specimen, *ALONE, "--out", "new/folder/run")
     assert said.status == 2
     assert "the run could not be written to 'new/folder/run': No space left on device" in said.err
@@ -115,7 +119,7 @@ def test_a_disk_that_is_full_leaves_the_earlier_run_that_was_to_be_replaced(cli,
     def fail(*arguments, **options):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("tissuq.report.specimen.write_page", fail)
+    monkeypatch.setattr("tissuq.report.writer.write_page", fail)
     assert cli("fit", specimen, *ALONE, "--force").status == 2
     assert tree(here) == before
 
@@ -191,8 +195,10 @@ HUGE = b"9" * 5000
 @pytest.mark.parametrize(
     ("name", "content"),
     [
-        *((name, content) for name in ("answer.json", "summary.json", "assessment.json") for content in
+        *(("result.json", content) for content in
           (b"", b"\xff\xfe", b"null", b"[{}]", NESTED, HUGE, b'[{"formulation": 3, "C10_mean": [1]}]')),
+        *((name, content) for name in ("summary.json", "assessment.json") for content in
+          (b"", b"\xff\xfe", NESTED, HUGE)),
         *(("run.toml", content) for content in
           (b"\xff\xfe", b"a = " + NESTED, b"a = " + HUGE, b"a.b" * 2000 + b" = 1")),
         pytest.param("run.toml", b"a.b" * 20_000 + b" = 1", marks=pytest.mark.slow),
@@ -202,7 +208,8 @@ def test_a_damaged_file_of_a_run_is_one_message(cli, here, fit_run, name, conten
     folder, _ = fit_run
     shutil.copytree(folder, here / "run")
     (here / "run" / name).write_bytes(content)
-    repeat, show = ("fit", "--config", "run/run.toml", "--out", "again"), ("show", "run", "--details")
+    repeat = "fit", "--config", "run/run.toml", "--out", "again"
+    show = "show", "run", "--details" if name == "result.json" else "--json"
     said = cli(*(repeat if name == "run.toml" else show))
     assert said.status == 2
     assert said.err.startswith("tissuq: ")

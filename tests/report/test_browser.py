@@ -12,7 +12,7 @@ import tissuq as tq
 from browser import FIRST_SCREEN, needs_chromium, opened
 from tissuq.assessment.answer import Use, Verdict
 from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table
-from tissuq.report.specimen import write_specimen_run
+from tissuq.report.specimen import specimen_result
 from tissuq.report.writer import write_result
 from tissuq.result_warning import ResultWarning, Severity
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
@@ -28,7 +28,7 @@ NUMBER = r"-?\d+\.?\d*(?:e[+-]?\d+)?"
 def of_one_test(specimen_study, specimen_file, tmp_path_factory):
     """The page of a fit with several formulations."""
     folder = tmp_path_factory.mktemp("one")
-    write_specimen_run(specimen_study, [specimen_file], folder)
+    write_result(specimen_result(specimen_study, [specimen_file]), folder)
     return folder / "report.html"
 
 
@@ -44,7 +44,7 @@ def of_two_tests(tmp_path_factory):
     tests = [{"file": str(file), "mode": file.stem, "noise_sd": 0.01} for file in files]
     study = run_specimen(SpecimenSettings(tests=tests, material="ogden-1", discrepancies=["none"]))
     (folder / "run").mkdir()
-    write_specimen_run(study, files, folder / "run")
+    write_result(specimen_result(study, files), folder / "run")
     return folder / "run" / "report.html"
 
 
@@ -167,7 +167,7 @@ def test_axe_finds_nothing_that_shuts_someone_out(request, page_of, width):
 
 def test_the_page_of_any_command_has_verdicts_before_the_picture_on_a_small_screen(of_another_command):
     with opened(of_another_command, 400) as page:
-        parts = (".numbers", ".uses", ".picture", ".reasons")
+        parts = (".numbers", ".uses li span", ".uses .next", ".picture", "#warnings")
         tops = [page.locator(part).first.bounding_box()["y"] for part in parts]
         assert tops == sorted(tops)
         assert page.evaluate("document.documentElement.scrollWidth") <= 400

@@ -6,7 +6,7 @@ import pytest
 
 import tissuq as tq
 from planted import PLANTED, Planting
-from tissuq.report.specimen import REGIONS, curve_figure
+from tissuq.report.inspection import REGIONS, curve_figure
 
 KINDS = ("slack over a quarter", "rupture", "hold", "slips", "saturation", "outliers", "drift")
 

@@ -18,6 +18,7 @@ from tissuq.report.prediction import (
     readable_scores,
     score_headers,
 )
+from tissuq.report.result import Result
 from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted
 from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings
@@ -153,12 +154,16 @@ def test_the_page_repeats_what_the_fit_says_of_predicting_the_mode(posterior, tm
         Use("predict these tests", Verdict.YES, "known here"),
         Use("predict other loading modes", Verdict.NO, "known elsewhere"),
     ]
-    record = {"formulation": "yeoh", "uses": [use._asdict() for use in uses]}
-    (tmp_path / "run").mkdir()
+    record = Result(command="fit", title="a fit", subject="a test", uses=tuple(uses)).record()
+    (tmp_path / "run" / "posterior").mkdir(parents=True)
+    (tmp_path / "run" / "result.json").write_text(json.dumps(record))
     found = predicted(posterior, mode=mode, stretch=[1.0, 1.2])
     settings = PredictionSettings(run="run")
-    for formulation, reasons in (("yeoh", [reason]), ("none", [])):
-        (tmp_path / "run" / "answer.json").write_text(json.dumps(record | {"formulation": formulation}))
+    for formulations, reasons in ((["yeoh", "none"], [reason]), (["none", "yeoh"], []), (["yeoh", "auto"], [])):
+        recipe = f'# tissuq fit --config\nfile = "input/a.csv"\ndiscrepancies = {formulations}\n'
+        (tmp_path / "run" / "run.toml").write_text(recipe)
+        for formulation in formulations:
+            (tmp_path / "run" / "posterior" / f"{formulation}.nc").touch()
         assert [use.reason for use in prediction_result(found, settings, tmp_path, tmp_path).uses] == reasons
-    (tmp_path / "run" / "answer.json").write_text("{")
+    (tmp_path / "run" / "result.json").write_text("{")
     assert prediction_result(found, settings, tmp_path, tmp_path).uses == ()

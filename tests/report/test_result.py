@@ -74,10 +74,22 @@ def test_what_is_not_finite_is_null_for_programs(tmp_path):
 def test_at_most_three_warnings_are_shown_the_severest_first_and_notes_are_folded():
     caution, note, problem = Severity.CAUTION, Severity.NOTE, Severity.PROBLEM
     record = result_of(warnings=warnings_of(note, caution, caution, problem, caution)).record()
-    shown, others = few_and_others(record["warnings"])
+    shown, others = few_and_others(record)
     assert [warning["text"] for warning in shown] == ["warning 3", "warning 1", "warning 2"]
     assert [warning["text"] for warning in others] == ["warning 4", "warning 0"]
-    assert few_and_others(result_of(warnings=warnings_of(note)).record()["warnings"])[0] == []
+    assert few_and_others(result_of(uses=(), warnings=warnings_of(note)).record())[0] == []
+
+
+def test_every_problem_is_shown():
+    shown, others = few_and_others(result_of(warnings=warnings_of(*[Severity.PROBLEM] * 5, Severity.CAUTION)).record())
+    assert (len(shown), len(others)) == (5, 1)
+
+
+@pytest.mark.parametrize(("verdict", "count"), [(Verdict.YES, 0), (Verdict.CARE, 1), (Verdict.NO, 1)])
+def test_a_note_is_shown_where_the_first_use_is_in_doubt(verdict, count):
+    uses = (Use("report it", verdict, "known to ± 15 %"), Use("predict", Verdict.YES, "known"))
+    shown, others = few_and_others(result_of(uses=uses, warnings=warnings_of(Severity.NOTE)).record())
+    assert (len(shown), len(others)) == (count, 1 - count)
 
 
 def test_every_kind_of_content_is_written(tmp_path):
@@ -122,18 +134,19 @@ def test_the_page_begins_with_the_answer_and_escapes_what_it_is_given(tmp_path):
     write_result(result_of(warnings=warnings_of(*[Severity.CAUTION] * 5)), tmp_path)
     page = (tmp_path / "report.html").read_text()
     body = page[page.index("<main>") :]
-    assert body.index("81.3\u00a0kPa") < body.index("Next:") < body.index("<img") < body.index("warning 0")
+    assert body.index("81.3\u00a0kPa") < body.index("Next:") < body.index("<img") < body.index('class="warning ')
     assert len(re.sub(r"<[^>]*>", " ", body[: body.index("<img")]).split()) < 60
     assert "Title &lt;b&gt;" in body
     assert "<strong>Strong</strong> and <code>code</code> and &lt;i&gt;." in body
     assert "&lt;pre&gt;" in body
     unfolded = re.sub(r"<details.*?</details>", "", body, flags=re.DOTALL)
-    assert unfolded.count('class="warning') == 3
+    assert unfolded.count('class="warning ') == 3
     assert "Further warnings and notes: 2" in body
 
 
 def test_the_record_of_a_folder_is_that_of_the_result(tmp_path):
-    assert read_record(tmp_path) is None
+    with pytest.raises(InputError, match=r"not the folder of a complete run: result\.json is missing"):
+        read_record(tmp_path)
     result = result_of(warnings=warnings_of(Severity.NOTE))
     write_result(result, tmp_path, figures=False)
     assert read_record(tmp_path) == json.loads(json.dumps(result.record()))

@@ -4,7 +4,9 @@ from math import nan
 import pytest
 
 from tissuq.experiments.units import StressUnit
-from tissuq.report.tables import interval, readable_stability, readable_summary, significant, write_csv, write_json
+from tissuq.report.stability import stability_section
+from tissuq.report.summary import summary_table
+from tissuq.report.tables import interval, significant, write_csv, write_json
 
 ROW = {
     "formulation": "none",
@@ -46,12 +48,22 @@ def test_an_interval_is_shown_to_two_digits_of_the_sd(low, high, sd, texts):
 
 
 def test_a_summary_is_rounded_alike_in_the_unit_of_the_file():
-    (row,) = readable_summary([ROW], StressUnit("kPa", 1e-3))
-    assert (row["mean"], row["sd"], row["low"], row["high"]) == ("1235", "30", "1175", "1294")
-    (row,) = readable_summary([ROW], StressUnit("MPa", 1.0))
-    assert (row["mean"], row["sd"], row["low"], row["high"]) == ("1.235", "0.030", "1.175", "1.294")
-    assert (row["log_evidence"], row["coverage"], row["coverage_model_only"]) == ("-12.35", "97%", "50%")
-    assert row["rhat"] == row["ess"] == ""
+    table = summary_table([ROW], StressUnit("kPa", 1e-3), "title")
+    assert table.headers[:4] == ["discrepancy", "C10, kPa", "sd", "95 % HPD"]
+    assert table.rows[0][:4] == ["none", "1235", "30", "[1175, 1294]"]
+    table = summary_table([ROW], StressUnit("MPa", 1.0), "title")
+    assert table.headers[4:] == ["truth", "log ev.", "in band", "alone"]
+    assert table.rows == [["none", "1.235", "0.030", "[1.175, 1.294]", "yes", "-12.35", "97%", "50%"]]
+
+
+def test_a_summary_has_columns_for_what_is_known_of_any_of_its_rows():
+    sampled = ROW | {"contains_truth": None, "log_evidence": None, "rhat": 1.0012, "ess": 812.4}
+    sampled |= {"stable": 0.85, "lost_at": 0.925, "lost_at_low": 0.9071, "lost_at_high": 0.932}
+    unknown = dict.fromkeys(("contains_truth", "rhat", "stable", "lost_at", "lost_at_low", "lost_at_high"))
+    table = summary_table([sampled, ROW | unknown], StressUnit("MPa", 1.0), "title")
+    assert table.headers[4:] == ["log ev.", "in band", "alone", "stable", "lost at stretch", "R-hat", "ESS"]
+    assert table.rows[0][4:] == ["", "97%", "50%", "85%", "0.925 [0.907, 0.932]", "1.001", "812"]
+    assert table.rows[1][4:] == ["-12.35", "97%", "50%", "", "", "", ""]
 
 
 def test_tables_hold_every_digit_and_nothing_where_there_is_no_number(tmp_path):
@@ -66,4 +78,6 @@ def test_where_stability_is_lost_is_told_from_a_probability_of_5_percent():
     row |= {"lost_below_probability": 0.12, "lost_below_median": 0.925}
     row |= {"lost_below_low": 0.9071, "lost_below_high": 0.932}
     row |= {"lost_above_probability": 0.05, "lost_above_median": 1.0, "lost_above_low": 1.0, "lost_above_high": 1.0}
-    assert readable_stability([row]) == [["auto", "uniaxial", "0.9 to 1.1", "85%", "0.925 [0.907, 0.932]", ""]]
+    assert stability_section([row]).blocks[1].rows == [
+        ["auto", "uniaxial", "0.9 to 1.1", "85%", "0.925 [0.907, 0.932]", ""]
+    ]

@@ -7,7 +7,8 @@ import pytest
 
 import tissuq as tq
 from tissuq.report.run_folder import run_folder
-from tissuq.report.specimen import write_specimen_run
+from tissuq.report.specimen import specimen_result
+from tissuq.report.writer import write_result
 from tissuq.studies.design import run_design
 from tissuq.studies.design_settings import CandidateSettings, DesignSettings
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
@@ -22,7 +23,7 @@ def run(tmp_path_factory):
     (folder / "specimen.csv").write_text("stretch,stress_kPa\n" + "".join(rows))
     settings = SpecimenSettings(file="specimen.csv", discrepancies=("none", "gp"), noise_sd=20.0)
     with run_folder(folder / "run") as place:
-        write_specimen_run(run_specimen(settings, folder), [folder / "specimen.csv"], place, figures=False)
+        write_result(specimen_result(run_specimen(settings, folder), [folder / "specimen.csv"]), place, figures=False)
     return folder
 
 

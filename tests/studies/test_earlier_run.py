@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import tissuq as tq
-from tissuq.report.specimen import write_specimen_run
+from tissuq.report.specimen import specimen_result
+from tissuq.report.writer import write_result
 from tissuq.studies.earlier_run import load_without_discrepancy, recipe_of
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
 
@@ -36,7 +37,7 @@ def written_run(tmp_path_factory):
     )
     folder = tmp_path / "run"
     folder.mkdir()
-    write_specimen_run(run_specimen(settings), [source], folder, figures=False)
+    write_result(specimen_result(run_specimen(settings), [source]), folder, figures=False)
     source.unlink()
     return folder
 

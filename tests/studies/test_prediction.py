@@ -10,7 +10,8 @@ import tissuq as tq
 from tissuq.assessment.stability import calibrated_range
 from tissuq.experiments.modes import loading_mode
 from tissuq.prediction import moments
-from tissuq.report.specimen import write_specimen_run
+from tissuq.report.specimen import specimen_result
+from tissuq.report.writer import write_result
 from tissuq.studies.predict_run import predicted, run_prediction
 from tissuq.studies.prediction_settings import ComparedFile, PredictionSettings, stretches
 from tissuq.studies.specimen import SpecimenSettings, run_specimen
@@ -45,7 +46,7 @@ def run(data, tmp_path_factory):
     settings = SpecimenSettings(file=str(file), discrepancies=("constant", "none"), noise_sd=1000 * NOISE_SD)
     study = run_specimen(settings)
     (folder / "run").mkdir()
-    write_specimen_run(study, [file], folder / "run", figures=False)
+    write_result(specimen_result(study, [file]), folder / "run", figures=False)
     return folder / "run"
 
 

@@ -64,9 +64,10 @@ def inspect(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
 
 def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     """Fit a material; say the answer as soon as it is there, then write the run."""
-    from tissuq.report.answer import answer_record, readable_estimates, shown_and_folded
+    from tissuq.report.result import few_and_others
     from tissuq.report.run_folder import run_folder
-    from tissuq.report.specimen import write_specimen_run
+    from tissuq.report.specimen import specimen_answer, specimen_result
+    from tissuq.report.writer import write_result
     from tissuq.studies.specimen import run_specimen
     from tissuq.studies.specimen_settings import SpecimenSettings
 
@@ -77,11 +78,9 @@ def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
     shell = _shell("fit", *_files(request), options)
 
     def say_answer(study: SpecimenStudy) -> None:
-        title = f"{study.experiment.name}: {settings.material} with the discrepancy '{study.main}'"
-        record = answer_record(title, study.main, study.answer, study.unit, study.warnings)
-        shown, folded = shown_and_folded(record)
+        record = specimen_answer(study).record()
+        shown, folded = few_and_others(record)
         of_page = {
-            "readable": readable_estimates(record),
             "next": record["next"].replace("{run}", f"runs/{name}"),
             "shown": shown,
             "folded": folded,
@@ -90,12 +89,12 @@ def fit(forms: ShellForms, request: Mapping[str, Any], say: Say) -> None:
             "not_converged": study.not_converged,
             "repeat": {"shell": shell, "python": fit_lines(values | options, study.unit.name)},
         }
-        say("answer", record | of_page)
+        say("answer", {**record, **of_page})
 
     study = run_specimen(settings, Path(), lambda text: say("step", _stage(text)), found=found, early=say_answer)
     say("step", "writing the report")
     with run_folder(RUNS / name, force=True) as folder:
-        write_specimen_run(study, _sources(settings), folder)
+        write_result(specimen_result(study, _sources(settings)), folder)
     say("done", {"run": name, "report": f"runs/{name}/report.html"})
 
 

@@ -82,20 +82,15 @@ def _fit_one(
     target: Path,
 ) -> None:
     """Fit one material, write the run and print its summary."""
-    from tissuq.cli.tables import print_summary
-    from tissuq.report.answer import answer_record, numbers_of
-    from tissuq.report.specimen import write_specimen_run
+    from tissuq.report.specimen import specimen_result
     from tissuq.studies.specimen import run_specimen, steps_of
 
-    study = call.written(
+    study = call.carried_out(
         target,
         lambda step: run_specimen(settings, call.beside, step, law, found),
-        partial(write_specimen_run, sources=sources),
+        partial(specimen_result, sources=sources),
         steps_of(settings) + 1,
     )
-    print_summary(target, study.experiment)
-    record = answer_record(study.experiment.name, study.main, study.answer, study.unit, ())
-    call.answer(numbers_of(record))
     _print_omissions(study)
 
 

@@ -68,7 +68,7 @@ def inspect(call: Call[InspectedFiles, InspectOptions]) -> None:
         write.write_text(study_file([of_test for of_test, _ in tests], inspections, write.parent), encoding="utf-8")
         print(f"\nWritten: {write}. Look through it, then: tissuq fit {write}")
     if out is not None:
-        from tissuq.report.specimen import write_inspection
+        from tissuq.report.inspection import write_inspection
 
         with run_folder(out, force=force) as folder:
             write_inspection(inspections, folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from tissuq.cli.call import Call
@@ -30,17 +31,14 @@ class ShowOptions(Running):
 def show(call: Call[ShownRun, ShowOptions]) -> None:
     """Print the answer of a run and where its report lies."""
     from tissuq.cli.pdf import write_pdf
-    from tissuq.cli.tables import print_json, print_summary
     from tissuq.report.terminal import print_result
-    from tissuq.report.writer import read_record
+    from tissuq.report.writer import contents_for_programs, read_record
 
     folder = call.settings.run_folder
     if call.how.pdf is not None:
         write_pdf(folder / "report.html", call.how.pdf)
         print(call.how.pdf)
     elif call.how.as_json:
-        print_json(folder)
-    elif record := read_record(folder):
-        print_result(record, folder, details=call.how.details)
+        print(json.dumps(contents_for_programs(folder), indent=2))
     else:
-        print_summary(folder, details=call.how.details)
+        print_result(read_record(folder), folder, details=call.how.details)

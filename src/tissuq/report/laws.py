@@ -12,16 +12,9 @@ from tissuq.drawing.style import ANSWER_WIDTH, BASE, SERIES, new_figure
 from tissuq.pictures.curves import points_along, ways_of
 from tissuq.prediction.bands import predict_band
 from tissuq.report.inputs import inputs_of
-from tissuq.report.result import Block, Number, Picture, Result, Section, Table
-from tissuq.report.specimen import lines_of_tests, noise_in_words
-from tissuq.report.tables import (
-    in_unit_of,
-    known_number,
-    readable_methods,
-    significant,
-    tolerances_in_words,
-    with_named_units,
-)
+from tissuq.report.measured import computed_section, data_section, subject_of
+from tissuq.report.result import Number, Picture, Result, Section, Table
+from tissuq.report.tables import in_unit_of, known_number, significant, with_named_units
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.studies.laws import LawStudy
 
@@ -66,7 +59,6 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         "laws.json": in_unit_of(rows, MODULUS, unit),
     }
     discrepancy = settings.discrepancies[0]
-    tests = lines_of_tests(study.experiment)
     caption = (
         f"Initial shear modulus under every law with the discrepancy '{discrepancy}': median and 95 % HPD, and the "
         "average by the laws' probabilities."
@@ -75,14 +67,14 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
     return Result(
         command=f"fit{inputs.options}",
         title=f"{study.experiment.name}: which law",
-        subject=tests[0] if len(tests) == 1 else f"{len(tests)} tests",
+        subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.tolerances.meaning}.",
         next_step=f"to continue with one law: tissuq predict, export or design {{run}} --discrepancy {rows[0]['law']}",
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",
                       note="Log evidences, intervals of the shares and times are in `laws.csv`."),),
-        sections=_sections(study, tests),
+        sections=_sections(study),
         warnings=tuple(study.warnings),
         files=inputs.files | data_file(study.experiment, unit) | files | posterior_files(comparison.fits),
         recipe=inputs.recipe,
@@ -191,29 +183,16 @@ def curve_figure(study: LawStudy) -> Figure:
     return figure
 
 
-def _sections(study: LawStudy, tests: list[str]) -> tuple[Section, ...]:
+def _sections(study: LawStudy) -> tuple[Section, ...]:
     """Return what a page folds: the curves of the laws, how to read the table, how it was computed, the data."""
     comparison = study.comparison
     caption = "The laws fitted alone, without discrepancy: medians of those that come nearest to the measurements."
     curves = Picture("curves", lambda: curve_figure(study), "Curves of the laws", caption, is_slim=True)
-    tolerances = tolerances_in_words(study.tolerances, study.unit)
-    noise = noise_in_words(study.settings, next(iter(comparison.fits.values())), study.unit)
-    data: list[Block] = [tuple(tests)] if len(tests) > 1 else []
-    data.append(f"{study.experiment.source}.")
-    data += [f"Errors of whole tests (standard deviations): {tolerances}."] * bool(tolerances)
-    data.append(
-        f"Noise: {noise}. Default priors are uniform and wide: boxes ten times as large as a least-squares fit "
-        "requires."
-    )
-    if comparison.skipped:
-        reasons = " ".join(f"{name} ({reason})" for name, reason in comparison.skipped.items())
-        data.append(f"Not fitted: {reasons}")
-    methods = tuple(f"**{law}**: {text}" for law, text in readable_methods(comparison.fits).items())
     return (
         Section("The laws alone", (curves,)),
         Section("How to read it", (HOW_TO_READ,)),
-        Section("How it was computed", (methods,)),
-        Section("The data", tuple(data)),
+        computed_section(comparison.fits, comparison.skipped),
+        data_section(study, next(iter(comparison.fits.values()))),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,8 @@ from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import Yeoh, engineering_stress
 from tissuq.report.figures import marginal_figure, predictive_figure
 from tissuq.report.result import Block, Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import summary_tables
-from tissuq.report.tables import Row, readable_parameters, readable_summary, summary_row
+from tissuq.report.summary import parameter_table, summary_row, summary_table, summary_tables
+from tissuq.report.tables import Row
 from tissuq.report.writer import data_file, posterior_files
 from tissuq.validation.paper.study import AMPLITUDE_BOUNDS, FORMULATIONS, Fitted, PaperStudy
 
@@ -52,12 +53,10 @@ FIGURE_7 = (
     "and mean (dot). Blue: the interval holds the true value; grey: it does not."
 )
 NOTE = (
-    "In band, alone: share of measurements inside the 95 % band with the discrepancy, and inside that of the material "
-    "alone. The log evidence is that of the data in MPa with respect to the normalised priors, uniform densities "
+    "The log evidence is that of the data in MPa with respect to the normalised priors, uniform densities "
     "included: wider boxes lower it. {nuts}With the Mooney-Rivlin term the initial shear modulus is 2 (C10 + C01), so "
     "C10 alone is not half the modulus there."
 )
-PARAMETERS = ["formulation", "parameter", "unit", "prior", "median", "mean", "sd", "95 % HPD"]
 AGREEMENT = ["formulation", "mean", "sd ratio", "HPD low", "HPD high", "R-hat", "ESS", "converged"]
 
 
@@ -116,23 +115,14 @@ def _numbers(summary: list[Row], held: list[str], passed: list[str]) -> tuple[Nu
 
 
 def _table(study: PaperStudy, summary: list[Row]) -> Table:
-    is_sampled = study.settings.sampler == "nuts"
-    headers = ["formulation", "C10, MPa", "sd", "95 % HPD", "truth", "log ev.", "in band", "alone"]
-    rows = []
-    for row in readable_summary(summary, MPA):
-        cells = [row["formulation"], row["mean"], row["sd"], f"[{row['low']}, {row['high']}]"]
-        cells += ["yes" if row["contains_truth"] else "no", row["log_evidence"]]
-        cells += [row["coverage"], row["coverage_model_only"], *[row["rhat"], row["ess"]] * is_sampled]
-        rows.append(cells)
-    note = NOTE.format(nuts="NUTS gives no evidence. " * is_sampled)
-    title = "The study of the paper: neo-Hookean C10 under seven formulations"
-    return Table([*headers, *["R-hat", "ESS"] * is_sampled], rows, title, note=note)
+    table = summary_table(summary, MPA, "The study of the paper: neo-Hookean C10 under seven formulations")
+    nuts = "NUTS gives no evidence. " * (study.settings.sampler == "nuts")
+    return replace(table, note=f"{table.note} {NOTE.format(nuts=nuts)}")
 
 
 def _sections(study: PaperStudy) -> tuple[Section, ...]:
     """Return what a page folds: the question, the paper's figures and claims, ranges, routes, parameters."""
-    settings, posteriors = study.settings, _posteriors(study.main)
-    truth = settings.truth
+    settings, truth = study.settings, study.settings.truth
     question = (
         "Measured stress = material + discrepancy + noise (the form of Kennedy & O'Hagan). The material is "
         f"neo-Hookean, with uniaxial stress 2 C10 (λ − λ^−2). The truth is Yeoh: C10 = {truth['C10']}, "
@@ -153,10 +143,9 @@ def _sections(study: PaperStudy) -> tuple[Section, ...]:
         )
         rows = [_readable_agreement(row) for row in _agreement(study)]
         sections.append(Section("Two independent routes", (words, Table(AGREEMENT, rows))))
-    parameters = Table(PARAMETERS, readable_parameters(posteriors, MPA), text_columns=(1, 2, 3))
     times = [[name, f"{fit.seconds:.2f}"] for name, fit in study.main.items()]
     took = Section("How long it took", (Table(["formulation", "seconds"], times),))
-    return (*sections, Section("Every parameter", (parameters,)), took)
+    return (*sections, Section("Every parameter", (parameter_table(_posteriors(study.main)),)), took)
 
 
 def _pair(study: PaperStudy, number: int, title: str) -> tuple[Block, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,14 +15,15 @@ from numpy.typing import NDArray
 from tissuq.assessment.answer import Use, Verdict
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, new_figure
+from tissuq.errors import InputError
 from tissuq.prediction.bands import Band
-from tissuq.report.answer import ANSWER
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import interval, significant
+from tissuq.report.writer import read_record
 from tissuq.result_warning import in_shell
+from tissuq.studies.earlier_run import answering
 from tissuq.studies.prediction import Prediction, draw_prediction
-from tissuq.studies.settings import DAMAGE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -126,10 +126,9 @@ def prediction_result(
 def _use_of_mode(prediction: Prediction, run: Path) -> tuple[Use, ...]:
     """Return whether this mode can be predicted, as the answer of the run says; nothing where it is not known."""
     try:
-        record = json.loads((run / ANSWER).read_text(encoding="utf-8"))
-        is_of_prediction = record["formulation"] == prediction.posterior.model.discrepancy.name
-        uses = [Use(use["purpose"], Verdict(use["verdict"]), str(use["reason"])) for use in record["uses"]]
-    except (OSError, *DAMAGE):
+        is_of_prediction = answering(run) == prediction.posterior.model.discrepancy.name
+        uses = [Use(use["purpose"], Verdict(use["verdict"]), use["reason"]) for use in read_record(run)["uses"]]
+    except (InputError, ValueError):
         return ()
     is_measured = prediction.mode in prediction.posterior.model.experiment.modes
     purpose = "predict these tests" if is_measured else "predict other loading modes"

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from math import isnan
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
-from tissuq.assessment.answer import Use
+from tissuq.assessment.answer import Use, Verdict
 from tissuq.report.tables import interval, known_number, significant
 from tissuq.result_warning import Severity, most_severe_first
 
@@ -48,7 +48,7 @@ MAX_NUMBERS = 3
 MAX_PLAIN = 1e6
 """Size of a number, or of an end of its interval, from which it is given to three digits."""
 MAX_SHOWN = 3
-"""Warnings that are shown at once; notes and the others are counted and folded."""
+"""Warnings that are shown at once, unless more are problems; the others are counted and folded."""
 
 
 class NumberRecord(TypedDict):
@@ -197,6 +197,10 @@ class Table:
         Columns that are read, not compared; the first is one in any case.
     note : str
         Stands beneath.
+    main : str
+        First cell of the row that the answer is of.
+    picture : Picture, optional
+        Shows the same; a page has it above the table.
     """
 
     headers: list[str]
@@ -204,6 +208,8 @@ class Table:
     title: str = ""
     text_columns: tuple[int, ...] = ()
     note: str = ""
+    main: str = ""
+    picture: Picture | None = None
 
     kind = "table"
 
@@ -225,6 +231,8 @@ class Picture:
     alt, caption : str
     is_slim : bool
         Whether a page shows it narrower than its text.
+    chart : function without arguments, optional
+        Returns the data of the interactive chart (`chart_data`) that stands in its place where scripts run.
     """
 
     name: str
@@ -232,6 +240,7 @@ class Picture:
     alt: str
     caption: str
     is_slim: bool = False
+    chart: Callable[[], dict[str, Any]] | None = None
 
     kind = "picture"
 
@@ -335,7 +344,7 @@ class Result:
         """All figures, that beside the answer first."""
         if self.picture is not None:
             yield self.picture
-        yield from _pictures_of(self.sections)
+        yield from _pictures_of((*self.tables, *self.sections))
 
     def record(self) -> Record:
         """Return everything but figures and files as it stands in result.json, with warnings in the form of a shell."""
@@ -353,9 +362,16 @@ class Result:
         }
 
 
-def few_and_others(warnings: list[WarningRecord]) -> tuple[list[WarningRecord], list[WarningRecord]]:
-    """Return the warnings of a record to show at once, and the others; they are in the order of their severity."""
-    count = min(MAX_SHOWN, sum(warning["severity"] != Severity.NOTE for warning in warnings))
+def few_and_others(record: Record) -> tuple[list[WarningRecord], list[WarningRecord]]:
+    """Return the warnings of a record to show at once, problems in any case, and the others; in order of severity.
+
+    Notes are folded, unless the first use is in doubt: then one of them may say why.
+    """
+    warnings, uses = record["warnings"], record["uses"]
+    severities = [warning["severity"] for warning in warnings]
+    is_in_doubt = bool(uses) and uses[0]["verdict"] != Verdict.YES
+    notes = 0 if is_in_doubt else severities.count(Severity.NOTE)
+    count = min(max(MAX_SHOWN, severities.count(Severity.PROBLEM)), len(warnings) - notes)
     return warnings[:count], warnings[count:]
 
 
@@ -363,5 +379,7 @@ def _pictures_of(blocks: tuple[Block, ...]) -> Iterator[Picture]:
     for block in blocks:
         if isinstance(block, Picture):
             yield block
+        elif isinstance(block, Table) and block.picture is not None:
+            yield block.picture
         elif isinstance(block, Section):
             yield from _pictures_of(block.blocks)

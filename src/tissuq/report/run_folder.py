@@ -19,15 +19,6 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
-from tissuq.report.tables import (
-    Row,
-    headline_columns,
-    in_unit_of,
-    parameter_rows,
-    with_named_units,
-    write_csv,
-    write_json,
-)
 from tissuq.studies.settings import RECIPE
 
 if TYPE_CHECKING:
@@ -38,26 +29,21 @@ if TYPE_CHECKING:
 
     from tissuq.experiments.experiment import Experiment
     from tissuq.experiments.units import StressUnit
-    from tissuq.posterior.posterior import Posterior
 
 __all__ = [
     "ASSESSMENT",
     "CONTENTS",
-    "HELD_OUT_TESTS",
     "INPUT",
     "RECIPE",
     "check_apart",
     "check_target",
     "law_files",
     "run_folder",
-    "summary_tables",
     "versions",
     "write_data",
     "write_figures",
     "write_page",
-    "write_posteriors",
     "write_recipe",
-    "write_tables",
 ]
 
 INPUT = "input"
@@ -65,9 +51,6 @@ INPUT = "input"
 
 ASSESSMENT = "assessment.json"
 """The file with the assessment of each discrepancy."""
-
-HELD_OUT_TESTS = "held_out.json"
-"""The file with the prediction of each of several tests from the others."""
 
 CONTENTS = "contents.txt"
 """The list of a run's own files; a folder without it is not a run, and files that it does not list are foreign."""
@@ -202,12 +185,12 @@ def _not_written(target: Path, error: OSError) -> InputError:
 LIBRARIES = ("tissuq", "numpy", "scipy", "jax", "blackjax", "arviz-stats", "xarray", "matplotlib")
 
 
-def write_page(folder: Path, template: str, **context: Any) -> None:
-    """Write report.html from a template of this package, with the folder's recipe and figures; values are escaped."""
+def write_page(folder: Path, **context: Any) -> None:
+    """Write report.html from the template of a result, with the folder's recipe and figures; values are escaped."""
     recipe = folder / RECIPE
     context["recipe"] = recipe.read_text(encoding="utf-8") if recipe.exists() else ""
     context["figures"] = {path.stem: _as_address(path) for path in sorted((folder / "figures").glob("*.svg"))}
-    page = _templates().get_template(template).render(versions=versions(), asset=_asset, **context)
+    page = _templates().get_template("result.html").render(versions=versions(), asset=_asset, **context)
     (folder / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -268,37 +251,6 @@ def write_data(folder: Path, experiment: Experiment, unit: StressUnit | None = N
             stresses = [curve.stress, *[curve.standard_error] * has_errors]
             values = curve.abscissa.tolist(), *((column / to_mpa).tolist() for column in stresses)
             writer.writerows(zip(*label_columns, *values, strict=False))
-
-
-def write_tables(
-    folder: Path,
-    summary: list[Row],
-    posteriors: Mapping[str, Posterior],
-    suffix: str = "",
-    unit: StressUnit | None = None,
-) -> None:
-    """Write the tables of `summary_tables`."""
-    for name, rows in summary_tables(summary, posteriors, suffix, unit).items():
-        (write_csv if name.endswith(".csv") else write_json)(folder / name, rows)
-
-
-def summary_tables(
-    summary: list[Row], posteriors: Mapping[str, Posterior], suffix: str = "", unit: StressUnit | None = None
-) -> dict[str, list[Row]]:
-    """Return summary.csv, summary.json and parameters.csv; the summary, in MPa, in a unit where one is said."""
-    columns = headline_columns(summary[0])
-    return {
-        f"summary{suffix}.csv": summary if unit is None else with_named_units(summary, columns, unit),
-        f"summary{suffix}.json": summary if unit is None else in_unit_of(summary, columns, unit),
-        f"parameters{suffix}.csv": parameter_rows(posteriors),
-    }
-
-
-def write_posteriors(folder: Path, posteriors: Mapping[str, Posterior], suffix: str = "") -> None:
-    """Write one NetCDF file a formulation."""
-    (folder / "posterior").mkdir(exist_ok=True)
-    for name, posterior in posteriors.items():
-        posterior.save(folder / "posterior" / f"{name}{suffix}.nc")
 
 
 def write_figures(folder: Path, figures: Mapping[str, Figure]) -> None:

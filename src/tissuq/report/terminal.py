@@ -12,9 +12,7 @@ from typing import Any
 from tissuq.report.result import Record, TableRecord, UseRecord, few_and_others
 from tissuq.result_warning import Severity, in_shell
 
-__all__ = [
-    "print_explanations", "print_next", "print_numbers", "print_result", "print_rows", "print_uses", "print_warnings",
-]  # fmt: skip
+__all__ = ["print_explanations", "print_result", "print_rows", "print_warnings"]
 
 TEXT_WIDTH = 96
 """Letters in a line of prose."""
@@ -68,16 +66,18 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     details : bool
         All warnings, and the sections that a page folds.
     """
-    shown, others = few_and_others(record["warnings"])
+    shown, others = few_and_others(record)
     shown, others = (shown + others, []) if details else (shown, others)
     print_warnings([warning["text"] for warning in shown if warning["severity"] == Severity.PROBLEM])
     print(f"\n{record['title']}")
-    print_numbers(record["numbers"])
+    _print_numbers(record["numbers"])
     if record["finding"]:
         print(fill(_plain(record["finding"]), TEXT_WIDTH, initial_indent="  ", subsequent_indent="  "))
-    print_uses(record["uses"])
+    if record["uses"]:
+        print()
+    _print_uses(record["uses"])
     if record["next"]:
-        print_next(record["next"], folder)
+        _print_next(record["next"], folder)
     for table in record["tables"]:
         _print_table(table)
     print_warnings([warning["text"] for warning in shown if warning["severity"] != Severity.PROBLEM])
@@ -96,7 +96,7 @@ def print_result(record: Record, folder: Path | None = None, *, details: bool = 
     print(f"Report: {folder / 'report.html'}")
 
 
-def print_numbers(numbers: Sequence[Mapping[str, Any]]) -> None:
+def _print_numbers(numbers: Sequence[Mapping[str, Any]]) -> None:
     """Print numbers, each with its ``name``, ``text`` and ``remark``."""
     width = max((len(number["name"]) for number in numbers), default=0)
     for number in numbers:
@@ -104,7 +104,7 @@ def print_numbers(numbers: Sequence[Mapping[str, Any]]) -> None:
         print(f"  {number['name']:<{width}}  {number['text']}{remark}")
 
 
-def print_uses(uses: Sequence[UseRecord]) -> None:
+def _print_uses(uses: Sequence[UseRecord]) -> None:
     """Print for what a result can be used, with the verdict in front."""
     width = max((len(use["verdict"]) for use in uses), default=0)
     for use in uses:
@@ -113,7 +113,7 @@ def print_uses(uses: Sequence[UseRecord]) -> None:
                    subsequent_indent=" " * len(start)))  # fmt: skip
 
 
-def print_next(step: str, folder: Path | None) -> None:
+def _print_next(step: str, folder: Path | None) -> None:
     """Print what to do next, with the folder of the run where the step names it."""
     words = _plain(step).replace("{run}", shlex.quote(str(folder)))
     print("\n" + fill(words, TEXT_WIDTH, initial_indent="Next: ", subsequent_indent="  ", break_on_hyphens=False))

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints, is_typeddict
 
 from tissuq.errors import InputError
-from tissuq.report.answer import ANSWER
 from tissuq.report.result import RESULT, Record, Result, few_and_others
 from tissuq.report.run_folder import RECIPE, write_data, write_figures, write_page, write_recipe
 from tissuq.report.tables import write_csv, write_json
@@ -47,8 +46,10 @@ def write_result(result: Result, folder: Path, *, figures: bool = True) -> Recor
         write_figures(folder, pictures)
     record = result.record()
     write_json(folder / RESULT, record)
-    shown, others = few_and_others(record["warnings"])
-    write_page(folder, "result.html", result=result, record=record, shown=shown, others=others, command=command)
+    shown, others = few_and_others(record)
+    of_chart = result.picture.chart if figures and result.picture is not None else None
+    write_page(folder, result=result, record=record, shown=shown, others=others, command=command,
+               chart_data=of_chart() if of_chart else None)  # fmt: skip
     return record
 
 
@@ -71,17 +72,17 @@ def _write(path: Path, content: Any) -> None:
         write_json(path, content)
 
 
-def read_record(folder: Path) -> Record | None:
-    """Return the record of a result in a run folder; None where it has none.
+def read_record(folder: Path) -> Record:
+    """Return the record of a result in a run folder.
 
     Raises
     ------
     InputError
-        When it is damaged.
+        When there is none, or it is damaged.
     """
     path = folder / RESULT
     if not path.exists():
-        return None
+        raise _without_record(folder)
     with damage_reported(path):
         content = json.loads(path.read_text(encoding="utf-8"))
         if not _is_of(content, Record):
@@ -112,12 +113,20 @@ def contents_for_programs(folder: Path) -> dict[str, Any]:
     for path in sorted(folder.glob("*.json")) if (folder / RECIPE).exists() or (folder / RESULT).exists() else ():
         with damage_reported(path):
             contents[path.stem] = json.loads(path.read_text(encoding="utf-8"))
-            if path.name in (ANSWER, RESULT):
+            if path.name == RESULT:
                 step = str(contents[path.stem]["next"])
                 contents[path.stem]["next"] = step.replace("{run}", shlex.quote(str(folder)))
     if not contents:
-        raise InputError(f"'{folder}' is not the folder of a complete run: {RESULT} is missing.")
+        raise _without_record(folder)
     return contents
+
+
+def _without_record(folder: Path) -> InputError:
+    if not folder.exists():
+        return InputError(f"there is no folder '{folder}'.")
+    recipe = folder / RECIPE
+    again = f" If an earlier version made it, make it again, as the first line of '{recipe}' says." * recipe.is_file()
+    return InputError(f"'{folder}' is not the folder of a complete run: {RESULT} is missing.{again}")
 
 
 def data_file(experiment: Experiment, unit: StressUnit | None = None) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from tissuq.studies.settings import RECIPE, damage_reported, load_settings, sett
 if TYPE_CHECKING:
     from tissuq.studies.specimen import SpecimenSettings
 
-__all__ = ["POSTERIORS", "load", "load_run", "load_without_discrepancy", "modes_of", "recipe_of"]
+__all__ = ["POSTERIORS", "answering", "load", "load_run", "load_without_discrepancy", "modes_of", "recipe_of"]
 
 POSTERIORS = "posterior"
 """Subfolder of a run with a file for each of its posteriors."""
@@ -93,6 +93,20 @@ def modes_of(folder: str | Path, discrepancy: str | None = None) -> list[str]:
         As `load`.
     """
     return read_modes(_file_in(Path(folder), discrepancy))
+
+
+def answering(folder: str | Path) -> str:
+    """Return the discrepancy whose posterior answers in a run of ``tissuq fit``: auto, or the first of its settings.
+
+    Raises
+    ------
+    InputError
+        As `recipe_of`.
+    """
+    files = _files(Path(folder))
+    if Auto.name in files:
+        return Auto.name
+    return next((name for name in recipe_of(folder).discrepancies if name in files), "")
 
 
 def recipe_of(folder: str | Path) -> SpecimenSettings:

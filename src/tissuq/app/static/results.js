@@ -2,14 +2,14 @@
 import { byId, fill, make, repeatOf, tableOf, warningsOf } from "./dom.js";
 
 export const showAnswer = answer => {
-  const [first, ...others] = answer.readable;
+  const [first, ...others] = answer.numbers, number = item => [`${item.name} `, make("strong", { textContent: item.text }), make("span", { textContent: ` ${item.remark}` })];
   fill(byId("answer-body"),
     ...warningsOf(answer.shown.filter(warning => warning.severity === "problem")),
     make("div", { className: "numbers" },
       make("p", { className: "soft", textContent: answer.title }),
-      make("p", { className: "first" }, `${first.name} `, make("strong", { textContent: first.value }), make("span", { textContent: ` 95 % interval ${first.interval}` })),
-      ...others.map(item => make("p", {}, `${item.name} `, make("strong", { textContent: item.value }), make("span", { textContent: ` 95 % interval ${item.interval}` }))),
-      make("p", { className: "soft", textContent: `The intervals are of ${answer.meaning}.` })),
+      make("p", { className: "first" }, ...number(first)),
+      ...others.map(item => make("p", {}, ...number(item))),
+      make("p", { className: "soft", textContent: answer.finding })),
     make("ul", { className: "uses" }, ...answer.uses.map(use => make("li", { className: use.verdict.split(" ")[0] },
       make("strong", { textContent: `${use.verdict.toUpperCase()}: ` }), use.purpose, make("span", { textContent: use.reason })))),
     make("p", {}, make("strong", { textContent: "Next: " }), answer.next),

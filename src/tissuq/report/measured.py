@@ -1,0 +1,99 @@
+"""What was measured, what the intervals of fits include, and how they were computed, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.units import StressUnit
+from tissuq.report.result import Block, Section
+
+if TYPE_CHECKING:
+    from tissuq.model.tolerances import Tolerances
+    from tissuq.posterior.posterior import Posterior
+    from tissuq.studies.laws import LawStudy
+    from tissuq.studies.specimen import SpecimenStudy
+
+__all__ = ["computed_section", "data_section", "subject_of"]
+
+PRIORS = (
+    "Default priors are uniform and wide: boxes ten times as large as a least-squares fit requires (for the material's "
+    "parameters: least squares with the material alone), random errors up to the largest stress. Amplitudes of "
+    "energies are half-Cauchy, with the typical C10 of the data as their scale; such a posterior may have no mean or "
+    "sd, so none is given."
+)
+
+
+def subject_of(experiment: Experiment) -> str:
+    """Return in a line what was measured: the test, or how many there are."""
+    tests = _lines_of_tests(experiment)
+    return tests[0] if len(tests) == 1 else f"{len(tests)} tests"
+
+
+def _lines_of_tests(experiment: Experiment) -> list[str]:
+    """Return every test in a few words."""
+    return [_test_line(test) for test in experiment.tests]
+
+
+def _test_line(test: Experiment) -> str:
+    """Return a test in a few words: its mode, measurements and range."""
+    control, values = test.mode.controls[0].name, test.stretch.reshape(len(test), -1)[:, 0]
+    specimen_words = f" of specimen {test.specimen}" if test.specimen else ""
+    ends = f"{values.min():.4g} to {values.max():.4g}"
+    return f"{test.mode.name} test{specimen_words}, {len(test)} measurements, {control} {ends}"
+
+
+def data_section(study: SpecimenStudy | LawStudy, posterior: Posterior) -> Section:
+    """Return where the data are from, and which errors the intervals of a study include."""
+    tests, tolerances = _lines_of_tests(study.experiment), study.tolerances
+    blocks: list[Block] = [tuple(tests)] if len(tests) > 1 else []
+    blocks += [f"{study.experiment.source}.", f"Intervals are of {tolerances.meaning}."]
+    if words := _tolerances_in_words(tolerances, study.unit):
+        blocks.append(
+            f"Errors of whole tests (standard deviations): {words}. An error in stress that all tests share cannot be "
+            "determined from the data and is included in the intervals; the bands are those of a new test with its own "
+            "error."
+        )
+    blocks.append(f"Noise: {_noise_in_words(study, posterior)}.")
+    return Section("The data and what intervals include", tuple(blocks))
+
+
+def _noise_in_words(study: SpecimenStudy | LawStudy, posterior: Posterior) -> str:
+    noise, lag, settings = posterior.model.noise, posterior.model.fitted_errors.lag, study.settings
+    if noise.parameters:
+        return noise.description + (f" (lag-1 correlation {lag:.2f})" if lag else "")
+    values = [test.noise_sd for test in settings.tests if test.noise_sd is not None]
+    return f"sd {', '.join(f'{value:g}' for value in values) or f'{settings.noise_sd:g}'} {study.unit.name}"
+
+
+def _tolerances_in_words(tolerances: Tolerances, unit: StressUnit) -> str:
+    """Return the standard deviations of the errors of whole tests in words; empty if there are none."""
+    texts = []
+    for error, size in tolerances:
+        value = f"{size / unit.to_mpa:.3g} {unit.name}" if error.is_stress else f"{size:.3g}"
+        texts.append(f"{value} {error.description}")
+    return ", ".join(texts)
+
+
+def computed_section(
+    posteriors: Mapping[str, Posterior],
+    skipped: Mapping[str, str],
+    *more: str,
+    seconds: Mapping[str, float] | None = None,
+) -> Section:
+    """Return how posteriors were computed, under which priors, and what was not fitted, beside ``more`` paragraphs."""
+    times = {name: f" It took {duration:.2f} s." for name, duration in (seconds or {}).items()}
+    methods = tuple(
+        f"**{name}**: {_method_of(posterior)}{times.get(name, '')}" for name, posterior in posteriors.items()
+    )
+    reasons = [f"Not fitted: {' '.join(f'{name} ({reason})' for name, reason in skipped.items())}"] * bool(skipped)
+    return Section("How it was computed", (methods, PRIORS, *more, *reasons))
+
+
+def _method_of(posterior: Posterior) -> str:
+    """Return by which method a posterior was computed, how accurately, and whether it converged."""
+    diagnostics, error = posterior.diagnostics, posterior.log_evidence_error
+    text = f"method {posterior.method}. {posterior.how}."
+    text += "" if error is None else f" Error of the log evidence: {error:.0e}."
+    return text if diagnostics is None else f"{text} {diagnostics.verdict}"

@@ -1,0 +1,69 @@
+"""The result of a fit of one material: its answer, comparison and files."""
+
+import json
+
+import pytest
+
+from tissuq.report.result import Table
+from tissuq.report.specimen import specimen_answer, specimen_result
+from tissuq.report.writer import read_record, write_result
+
+
+@pytest.fixture(scope="module")
+def result(specimen_study, specimen_file):
+    return specimen_result(specimen_study, [specimen_file])
+
+
+def test_the_numbers_are_those_of_the_answer_in_the_unit_of_the_file(result, specimen_study):
+    marginal = specimen_study.posteriors["auto"].initial_shear_modulus
+    modulus, headline = result.numbers
+    low, high = marginal.hdi()
+    assert (modulus.name, headline.name) == ("initial shear modulus", "C10")
+    assert [modulus.value, modulus.low, modulus.high] == pytest.approx([1e3 * x for x in (marginal.mean, low, high)])
+    assert {modulus.unit, headline.unit} == {"kPa"}
+    assert specimen_study.tolerances.meaning in result.finding
+
+
+def test_what_is_said_before_anything_is_assessed_is_the_head_of_the_result(result, specimen_study):
+    head, whole = specimen_answer(specimen_study).record(), result.record()
+    assert head == whole | {"tables": [], "sections": []}
+
+
+def test_several_discrepancies_stand_in_one_table_that_marks_the_one_that_answers(result, specimen_study):
+    (table,) = result.tables
+    assert [row[0] for row in table.rows] == list(specimen_study.posteriors)
+    assert table.main == "auto"
+    assert table.picture.name == "marginals"
+    means = [1e3 * posterior.marginals["C10"].mean for posterior in specimen_study.posteriors.values()]
+    assert [float(row[1]) for row in table.rows] == pytest.approx(means, rel=0.02)
+    assert "The answer above is that of 'auto'." in table.note
+
+
+def test_every_title_of_the_terminal_is_a_section_of_the_page(result, tmp_path):
+    write_result(result, tmp_path, figures=False)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    titles = [section["title"] for section in read_record(tmp_path)["sections"]]
+    assert titles == [
+        "To what extent the material is wrong", "Predictive checks", "Where it is stable", "Every parameter",
+        "How it was computed", "The data and what intervals include",
+    ]  # fmt: skip
+    assert all(f"<h2>{title}</h2>" in page for title in titles)
+
+
+def test_the_parameters_for_people_are_those_for_programs(result, specimen_study):
+    section = next(section for section in result.sections if section.title == "Every parameter")
+    table = next(block for block in section.blocks if isinstance(block, Table))
+    assert len(table.rows) == sum(len(posterior.model.parameters) for posterior in specimen_study.posteriors.values())
+    row = next(row for row in table.rows if row[:2] == ["yeoh", "C10"])
+    marginal = specimen_study.posteriors["yeoh"].marginals["C10"]
+    assert row[2] == "kPa"
+    assert float(row[5]) == pytest.approx(1e3 * marginal.mean, rel=0.02)
+
+
+def test_nothing_is_drawn_and_no_band_computed_where_no_figures_are_wanted(
+    specimen_study, specimen_file, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("tissuq.report.specimen.described_curves", lambda _: pytest.fail("a band was computed"))
+    write_result(specimen_result(specimen_study, [specimen_file]), tmp_path, figures=False)
+    assert "chart-data" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "assessment.json").read_text())[0]["formulation"] == "constant"
