@@ -46,6 +46,10 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["complete_draws"] == 3
     assert summary["last_step"]["mean"] == pytest.approx(float(rows[-1]["mean"]))
+    free = {name: 1e3 * float(rows[-1][f"mesh_free_{name}"]) for name in ("mean", "low", "high")}  # mN
+    (number, *_) = json.loads((folder / "result.json").read_text(encoding="utf-8"))["numbers"]
+    assert (number["value"], number["low"], number["high"]) == pytest.approx(tuple(free.values()), rel=1e-6)
+    assert free["mean"] != pytest.approx(1e3 * float(rows[-1]["mean"]), rel=1e-6)
     with xr.open_dataset(folder / "curves.nc") as curves:
         assert curves["force_complete"].shape == (3, 2)
         assert curves["force_without"].mean("draw_without").values[-1] == pytest.approx(float(rows[-1]["without_mean"]))
@@ -70,6 +74,8 @@ def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others
     assert 0 < error < 0.05
     page = (here / "few" / "report.html").read_text(encoding="utf-8")
     assert "4 draws were computed in full" in page
+    assert "4 of 9 draws computed in full, the others to first order" in page
+    assert "For cells without size (Richardson" in page
     assert f"The error of such a force is {100 * error:.2g} %" in page
 
 

@@ -46,7 +46,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     """Run your own finite-element model with draws of a posterior; the same command resumes a stopped ensemble."""
     from tissuq.report.ensemble import ensemble_result
     from tissuq.report.run_folder import check_apart
-    from tissuq.report.simulation import check_source
+    from tissuq.report.source_run import check_source
     from tissuq.report.terminal import print_explanations
     from tissuq.studies.ensemble import prepare_ensemble, run_ensemble
     from tissuq.studies.ensemble_files import forget_failures
@@ -108,7 +108,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
 def _stored(prepared: PreparedEnsemble, sources: list[str], beside: Path) -> EnsembleSettings:
     """Return the settings with the names that runs and files have in the folder of the ensemble."""
     from tissuq.decks.model_files import MODEL, stored_place
-    from tissuq.report.simulation import SOURCE
+    from tissuq.report.source_run import SOURCE
 
     settings = prepared.settings
     places = {source: f"{POSTERIORS}/{number}/{SOURCE}" for number, source in enumerate(sources, start=1)}
@@ -126,7 +126,7 @@ def _write_inputs(
     """Write recipe and copies of all that an ensemble starts from, so that it can be repeated."""
     from tissuq.decks.model_files import copy_model
     from tissuq.report.ensemble import copy_functions
-    from tissuq.report.simulation import copy_source
+    from tissuq.report.source_run import copy_source
 
     folder.mkdir(parents=True, exist_ok=True)
     copy_model(prepared.deck, prepared.settings.also, beside, folder)

@@ -29,7 +29,8 @@ class StructureOptions(LawOfRun, Configured):
 def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     """Compute the force in a case with draws of a posterior; the same command resumes a stopped simulation."""
     from tissuq.report.run_folder import check_apart
-    from tissuq.report.simulation import SOURCE, check_source, copy_source, simulation_result
+    from tissuq.report.simulation import simulation_result
+    from tissuq.report.source_run import SOURCE, check_source, copy_source
     from tissuq.report.terminal import print_warnings
     from tissuq.studies.stream import open_pool
     from tissuq.studies.structure import load_posteriors, run_simulation

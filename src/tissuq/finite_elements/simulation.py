@@ -105,6 +105,13 @@ class Simulation:
     first_order_error: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
+    def in_full(self) -> NDArray[np.bool_]:
+        """Which draws (N,) were computed in full: the others follow to first order."""
+        if COMPLETE not in self.first_order_error:
+            return np.ones(len(self.forces[COMPLETE]), dtype=bool)
+        return np.asarray(np.isfinite(self.volume_beyond).any(axis=1))
+
+    @property
     def mesh_factor(self) -> FloatArray:
         """What forces (s,) are to be multiplied by for cells without size (Richardson): errors halve with the cells.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import filecmp
-import shutil
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -11,33 +9,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tissuq.errors import InputError
 from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.result import Number, Picture, Result, Section, Table
-from tissuq.report.run_folder import INPUT, RECIPE
 from tissuq.report.simulation_figures import (
     SHARES,
     force_figure,
     force_unit,
+    is_mesh_free,
+    mesh_ratio,
+    prefix_of,
     simulation_figures,
     write_collection,
     write_vtu,
 )
 from tissuq.report.tables import known_number, significant
-from tissuq.studies.earlier_run import POSTERIORS
 from tissuq.studies.structure import SimulationStudy
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["SOURCE", "check_source", "copy_source", "readable_forces", "simulation_result"]
+__all__ = ["readable_forces", "simulation_result"]
 
-SOURCE = "source"
-"""The folder with copies of the files of the run that the posterior comes from."""
 MUCH_BEYOND = 0.2
 """Share of the strain energy beyond the measurements from which these are to be extended."""
 CELL_FIELDS = {
@@ -48,54 +44,21 @@ CELL_FIELDS = {
 }
 
 
-def check_source(run: Path, folder: Path) -> None:
-    """Refuse a folder that holds a simulation with another run.
-
-    Raises
-    ------
-    InputError
-        When it does.
-    """
-    stored = folder / SOURCE
-    if stored.is_dir() and not all(
-        (run / name).is_file() and (stored / name).is_file() and filecmp.cmp(run / name, stored / name, False)
-        for name in _files(run)
-    ):
-        raise InputError(f"'{folder}' holds a simulation of another run; choose another folder with --out.")
-
-
-def _files(run: Path) -> list[Path]:
-    """Return the files of a run, relative to it, from which a simulation starts: its recipe and its posteriors."""
-    return [Path(RECIPE), *(file.relative_to(run) for file in sorted((run / POSTERIORS).glob("*.nc")))]
-
-
-def copy_source(run: Path, folder: Path) -> None:
-    """Copy the files of a run into the folder of a simulation, so that it can be repeated."""
-    stored = folder / SOURCE
-    if not stored.is_dir():
-        scratch = folder / f"{SOURCE}.new"
-        shutil.copytree(run / INPUT, scratch / INPUT, dirs_exist_ok=True)
-        for name in _files(run):
-            (scratch / name).parent.mkdir(exist_ok=True)
-            shutil.copyfile(run / name, scratch / name)
-        scratch.rename(stored)
-
-
 def simulation_result(study: SimulationStudy, folder: Path) -> Result:
     """Return what a simulation says; its folder holds the results of the draws and the recipe."""
     simulation, model = study.simulation, study.posteriors.fitted.model
     table = simulation.table()
     (folder / "failures.csv").unlink(missing_ok=True)
     failures = [vars(failure) for failure in simulation.failures]
-    draws, case = len(simulation.forces[COMPLETE]), simulation.case
-    complete = int(np.isfinite(simulation.forces[COMPLETE][:, -1]).sum())
+    case = simulation.case
     headers, rows = readable_forces(study)
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     caption = (
         f"Force over {case.travel_name}: mean and {percent} % band over draws of the posterior, without the noise of a "
-        f"measurement{against}."
+        f"measurement{against}.{_of_cells(table)}"
     )
+    titled = f"Case '{case.name}' with {study.settings.draws} draws"
     files = {
         "forces.csv": table,
         "summary.json": _summary(study, table),
@@ -106,15 +69,39 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
         command="structure",
         title="From the posterior to a force",
         subject=f"{case.description} · {model.experiment.name}, {model.material.name}, discrepancy "
-        f"{model.discrepancy.name} · {complete} of {draws} draws completed",
+        f"{model.discrepancy.name} · {_completed(simulation)}",
         numbers=_numbers(study, table),
         finding=_lead(simulation, table),
         next_step=_next_step(simulation),
         picture=Picture("answer", lambda: force_figure(simulation, table), "Band of the force", caption),
-        tables=(Table(headers, rows, f"Case '{case.name}' with {study.settings.draws} draws"),),
+        tables=(Table(headers, rows, titled, note=_of_cells(table).strip()),),
         sections=_sections(study, table),
         warnings=tuple(study.warnings),
         files=files | ({"failures.csv": failures} if failures else {}),
+    )
+
+
+def _completed(simulation: Simulation) -> str:
+    """Return how many draws got to the end, and how many of them were computed in full."""
+    forces = simulation.forces[COMPLETE]
+    reached = np.isfinite(forces[:, -1])
+    if COMPLETE not in simulation.first_order_error:
+        return f"{reached.sum()} of {len(forces)} draws completed"
+    in_full = simulation.in_full
+    stopped = int((in_full & ~reached).sum())
+    failed = f" ({stopped} of them not to the end)" if stopped else ""
+    return f"{in_full.sum()} of {len(forces)} draws computed in full{failed}, the others to first order"
+
+
+def _of_cells(table: pd.DataFrame) -> str:
+    """Return what was done for the size of the cells, as a sentence after others; nothing where nothing was."""
+    if not is_mesh_free(table):
+        return ""
+    last = _last_step(table)
+    change = 100 * (last["mesh_free_mean"] / last["mean"] - 1)
+    return (
+        f" For cells without size (Richardson, from a mesh of twice the fineness): at the end {change:+.1f} % beside "
+        "this mesh, of which a quarter is taken as the sd of its error, within the band."
     )
 
 
@@ -123,7 +110,7 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     simulation, last = study.simulation, _last_step(table)
     unit, factor = force_unit(table)
     percent = f"{100 * band_probability(int(last['draws'])):.0f} % band"
-    mean, low, high = (last[name] * factor for name in ("mean", "low", "high"))
+    mean, low, high = (last[f"{prefix_of(table)}{name}"] * factor for name in ("mean", "low", "high"))
     name = simulation.case.travel_name
     numbers = [Number(f"force at {name} {last[f'{name}_mm']:.3g} mm", mean, low, high, unit, percent)]
     shares = {name: last[name] for name in SHARES if name in last and np.isfinite(last[name])}
@@ -152,16 +139,18 @@ def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]
     headers = [f"{simulation.case.travel_name}, mm", "draws", f"force, {unit}", "sd", percent]
     headers += ["parameters", "discrepancy"] * is_shared + ["noise"]
     headers += ["without discrepancy", percent] * is_compared
+    prefix = prefix_of(table)
+    headers += ["on this mesh"] * bool(prefix)
     rows = []
     for row in table.to_dict("records"):
         numbers = {str(key): value for key, value in row.items()}
-        cells = [f"{row[f'{simulation.case.travel_name}_mm']:.3g}", str(row["draws"]), *_band(numbers, factor, "")]
+        cells = [f"{row[f'{simulation.case.travel_name}_mm']:.3g}", str(row["draws"]), *_band(numbers, factor, prefix)]
         for name in (["parameters", "discrepancy"] if is_shared else []) + ["noise"]:
             cells.append(_percent(numbers[name], numbers[f"{name}_error"]))
         if is_compared:
-            mean, _, ends = _band(numbers, factor, "without_")
+            mean, _, ends = _band(numbers, factor * mesh_ratio(numbers), "without_")
             cells += [mean, ends]
-        rows.append(cells)
+        rows.append([*cells, *[significant(numbers["mean"] * factor)] * bool(prefix)])
     return headers, rows
 
 
@@ -182,6 +171,7 @@ def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
         "sizes": vars(simulation.case),
         "draws": len(simulation.forces[COMPLETE]),
         "complete_draws": int(np.isfinite(simulation.forces[COMPLETE][:, -1]).sum()),
+        "full_draws": int(simulation.in_full.sum()),
         "probability_of_band": band_probability(int(table["draws"].iloc[-1])),
         "last_step": last,
         "beyond": _last_mean(simulation.volume_beyond),
@@ -265,8 +255,8 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
     forces = Picture(
         "forces", lambda: figures()["forces"], "Band of the force, and what is strained beyond the measurements",
         f"Left: force over {simulation.case.travel_name}: mean and {percent} % band over draws of the posterior, "
-        f"without the noise of a measurement{against}. Right: how much of the body is strained beyond the measured I1 "
-        "or I2, and how much of the strain energy is there.",
+        f"without the noise of a measurement{against}.{_of_cells(table)} Right: how much of the body "
+        "is strained beyond the measured I1 or I2, and how much of the strain energy is there.",
     )  # fmt: skip
     sections = [Section("What is strained beyond the measurements", (forces,))]
     if MATERIAL_ONLY in simulation.forces:
@@ -332,7 +322,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
 def _first_order(simulation: Simulation) -> Iterator[str]:
     """Yield which draws were not computed in full, and the error of their forces."""
     if COMPLETE in simulation.first_order_error:
-        in_full = int(np.isfinite(simulation.volume_beyond).any(axis=1).sum())
+        in_full = int(simulation.in_full.sum())
         error = simulation.first_order_error[COMPLETE][-1]
         size = "not known" if np.isnan(error) else f"{100 * error:.2g} % at the last step"
         yield (
@@ -353,13 +343,13 @@ def _lead(simulation: Simulation, table: pd.DataFrame) -> str:
     """Return the finding in a sentence or two."""
     unit, factor = force_unit(table)
     last_step = _last_step(table)
-    mean, _, ends = _band(last_step, factor, "")
+    mean, _, ends = _band(last_step, factor, prefix_of(table))
     percent = f"{100 * band_probability(int(last_step['draws'])):.0f} %"
     name = simulation.case.travel_name
     article, travel = "an" if name[0] in "aeiou" else "a", last_step[f"{name}_mm"]
     text = f"At {article} {name} of {travel:.3g} mm the force is {mean} {unit} ({percent}: {ends} {unit})."
     if WITHOUT in simulation.forces:
-        without, _, without_ends = _band(last_step, factor, "without_")
+        without, _, without_ends = _band(last_step, factor * mesh_ratio(last_step), "without_")
         text += f" Without discrepancy it is {without} {unit} ({without_ends} {unit})."
     return text
 

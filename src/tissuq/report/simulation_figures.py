@@ -21,7 +21,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SHARES", "draw_shares", "force_figure", "force_unit", "simulation_figures", "write_collection", "write_vtu"]
+__all__ = [
+    "SHARES",
+    "draw_shares",
+    "force_figure",
+    "force_unit",
+    "is_mesh_free",
+    "mesh_ratio",
+    "prefix_of",
+    "simulation_figures",
+    "write_collection",
+    "write_vtu",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -35,6 +46,21 @@ def force_unit(table: pd.DataFrame) -> tuple[str, float]:
     """Return the unit in which the largest mean force is a handy number, and how many of it are a newton."""
     largest = float(table["mean"].abs().max())
     return next((pair for pair in UNITS if largest * pair[1] >= 1), UNITS[-1])
+
+
+def is_mesh_free(table: pd.DataFrame) -> bool:
+    """Return whether there are bands for cells without size."""
+    return "mesh_free_mean" in table
+
+
+def prefix_of(table: pd.DataFrame) -> str:
+    """Return what the columns of the band begin with that is shown: that for cells without size, where there is one."""
+    return "mesh_free_" if is_mesh_free(table) else ""
+
+
+def mesh_ratio(row: Mapping[str, Any]) -> float:
+    """Return what a force on the mesh is multiplied with for cells without size; 1 where that is not known."""
+    return float(row["mesh_free_mean"] / row["mean"]) if "mesh_free_mean" in row else 1.0
 
 
 def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str, Figure]:
@@ -69,11 +95,15 @@ def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> Non
     unit, factor = force_unit(table)
     travel = _from_zero(table[f"{simulation.case.travel_name}_mm"])
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
-    bands = [("", "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)]
+    bands = [
+        (prefix_of(table), "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)
+    ]
     if WITHOUT in simulation.forces:
         bands.append(("without_", "fitted without discrepancy", TRUTH, "--", 0.15))
+    ratio = table["mesh_free_mean"] / table["mean"] if is_mesh_free(table) else 1.0
     for prefix, label, color, line, alpha in bands:
-        low, mean, high = (_from_zero(table[f"{prefix}{name}"]) * factor for name in ("low", "mean", "high"))
+        times = ratio if prefix == "without_" else 1.0
+        low, mean, high = (_from_zero(table[f"{prefix}{name}"] * times) * factor for name in ("low", "mean", "high"))
         pieces.band(axis, travel, low, high, color=color, strength=alpha, label=f"{label}, {percent}")
         pieces.line(axis, travel, mean, style=line, color=color, label="mean")
     axis.set_xlabel(f"{simulation.case.travel_name} [mm]")

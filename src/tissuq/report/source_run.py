@@ -1,0 +1,49 @@
+"""Copies of the files of a run that a posterior comes from, in the folder of what was computed with it."""
+
+from __future__ import annotations
+
+import filecmp
+import shutil
+from pathlib import Path
+
+from tissuq.errors import InputError
+from tissuq.report.run_folder import INPUT, RECIPE
+from tissuq.studies.earlier_run import POSTERIORS
+
+__all__ = ["SOURCE", "check_source", "copy_source"]
+
+SOURCE = "source"
+"""The folder with the copies."""
+
+
+def check_source(run: Path, folder: Path) -> None:
+    """Refuse a folder that holds a simulation with another run.
+
+    Raises
+    ------
+    InputError
+        When it does.
+    """
+    stored = folder / SOURCE
+    if stored.is_dir() and not all(
+        (run / name).is_file() and (stored / name).is_file() and filecmp.cmp(run / name, stored / name, False)
+        for name in _files(run)
+    ):
+        raise InputError(f"'{folder}' holds a simulation of another run; choose another folder with --out.")
+
+
+def _files(run: Path) -> list[Path]:
+    """Return the files of a run, relative to it, from which a simulation starts: its recipe and its posteriors."""
+    return [Path(RECIPE), *(file.relative_to(run) for file in sorted((run / POSTERIORS).glob("*.nc")))]
+
+
+def copy_source(run: Path, folder: Path) -> None:
+    """Copy the files of a run into the folder of a simulation, so that it can be repeated."""
+    stored = folder / SOURCE
+    if not stored.is_dir():
+        scratch = folder / f"{SOURCE}.new"
+        shutil.copytree(run / INPUT, scratch / INPUT, dirs_exist_ok=True)
+        for name in _files(run):
+            (scratch / name).parent.mkdir(exist_ok=True)
+            shutil.copyfile(run / name, scratch / name)
+        scratch.rename(stored)
