@@ -39,6 +39,7 @@ def test_draws_that_are_proportional_have_their_forces(ensemble_of, case):
         wanted = case_forces(case, "yeoh", row, case.steps(2))
         np.testing.assert_allclose(found.forces[number], wanted, rtol=1e-6)
     np.testing.assert_allclose(found.stiffening, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(found.unevenness, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("case", COARSE.values(), ids=COARSE)
@@ -61,13 +62,14 @@ def test_a_reference_that_does_not_get_there_is_told(ensemble_of):
         first_order_forces(replace(COARSE["bar"], elongation=8.0), ensemble, ensemble[0], 2, BULK_RATIO)
 
 
-def exact_law(count=24, steps=3, noise=0.0):
-    """First order and full forces whose relative difference is 0.3 (stiffening - 1)^2."""
+def exact_law(count=24, steps=3, noise=0.0, factors=(-1.2, -1.2)):
+    """First order and full forces, which differ by a factor times the unevenness, another for either side."""
     generator = np.random.default_rng(1)
     stiffening = 1 + np.linspace(0.2, 1.0, steps) * generator.normal(0, 0.1, (count, 1))
+    uneven = (stiffening - 1) ** 2 * generator.uniform(0.5, 2, (count, 1))
     forces = generator.uniform(1, 2, (count, 1)) * stiffening
-    lack = 0.3 * (stiffening - 1) ** 2 + noise * generator.normal(size=stiffening.shape)
-    return FirstOrder(forces, stiffening), forces * (1 + lack)
+    lack = np.where(stiffening < 1, factors[1], factors[0]) * uneven * (1 + noise * generator.normal(size=(count, 1)))
+    return FirstOrder(forces, stiffening, uneven), forces * (1 + lack)
 
 
 def test_the_correction_is_exact_where_second_order_is_all_that_lacks():
@@ -79,30 +81,47 @@ def test_the_correction_is_exact_where_second_order_is_all_that_lacks():
     assert (error < 1e-9).all()
 
 
+def test_draws_that_soften_lack_more_than_those_that_stiffen():
+    """With the factors -1.2 and -2.5 both are found; one factor for both would leave a quarter of what was lacking."""
+    first_order, full = exact_law(factors=(-1.2, -2.5))
+    numbers = draws_in_full(first_order, 8)
+    forces, _ = controlled(first_order, {number: full[number] for number in numbers})
+    lacking, left = (np.abs(each / full - 1).max(axis=0) for each in (first_order.forces, forces))
+    assert (left < 1e-9 * lacking).all()
+
+
 def test_the_error_that_is_told_is_that_of_the_others():
-    first_order, full = exact_law(count=200, noise=0.01)
+    first_order, full = exact_law(count=200, noise=0.2)
     numbers = draws_in_full(first_order, 24)
     forces, error = controlled(first_order, {number: full[number] for number in numbers})
     others = np.setdiff1d(np.arange(200), numbers)
     found = np.sqrt(((forces / full - 1)[others] ** 2).mean(axis=0))
-    assert error == pytest.approx(found, rel=0.6)
+    assert (found < 1.6 * error).all()
+    assert (error < 2 * found).all()
     np.testing.assert_array_equal(forces[numbers], full[numbers])
 
 
 def test_the_reference_for_which_first_order_is_exact_does_not_lower_the_error():
-    stiffening = np.array([[1.0], [1.1], [1.2], [1.4]])
-    first_order = FirstOrder(np.ones((4, 1)), stiffening)
-    lack = {0: 0.0, 1: 0.03, 2: 0.0, 3: 0.0}
-    _, error = controlled(first_order, {number: [1 + value] for number, value in lack.items()})
-    assert error == pytest.approx([0.03])  # of the nearer two only the second stands for others
+    first_order, full = exact_law(noise=0.2)
+    numbers = draws_in_full(first_order, 6)
+    arrays = first_order.forces, first_order.stiffening, first_order.unevenness
+    row = np.ones((1, full.shape[1]))
+    exact = FirstOrder(*(np.vstack([array, each * row]) for array, each in zip(arrays, (1, 1, 0), strict=True)))
+    chosen = {number: full[number] for number in numbers}
+    _, without = controlled(first_order, chosen)
+    _, error = controlled(exact, chosen | {len(full): np.ones(full.shape[1])})
+    assert error == pytest.approx(without, rel=1e-9)
 
 
 def test_the_draws_in_full_are_the_farthest_and_some_between():
     stiffening = 1 + np.arange(20)[:, None] / 100
-    numbers = draws_in_full(FirstOrder(stiffening, stiffening), 6)
+    found = FirstOrder(stiffening, stiffening, stiffening - 1)
+    numbers = draws_in_full(found, 6)
     assert {17, 18, 19} <= set(numbers)
     assert min(numbers) == 0
-    assert draws_in_full(FirstOrder(stiffening, stiffening), 99) == list(range(20))
+    both = FirstOrder(stiffening, 1 + np.where(np.arange(20) < 5, -1, 1)[:, None] * 0.1, stiffening - 1)
+    assert {4, 18, 19} <= set(draws_in_full(both, 6))
+    assert draws_in_full(found, 99) == list(range(20))
 
 
 def test_a_simulation_with_few_full_runs_has_the_band_of_one_with_all(posterior):
@@ -114,6 +133,22 @@ def test_a_simulation_with_few_full_runs_has_the_band_of_one_with_all(posterior)
     assert (np.sqrt(((found / wanted - 1) ** 2).mean(axis=0)) <= 2 * error + 1e-4).all()
     assert found.std(axis=0) == pytest.approx(wanted.std(axis=0), rel=0.05)
     assert np.isfinite(some.energy_beyond).any(axis=1).sum() == 5
+
+
+@pytest.mark.finite_elements
+def test_far_beyond_the_measurements_the_sd_is_still_that_of_full_runs():
+    """Brain measured to 10 %, punch as deep as half its radius: a quarter of the draws in full, sd within 5 %.
+
+    With a correction by the square of the stiffening it was 10 % and more too small.
+    """
+    found = tq.fit(tq.datasets.load("brain-cortex-uniaxial"))
+    case = Indentation(depth=0.4, fineness=0.5)
+    every, some = (
+        simulate(found, case, 32, steps=2, check_mesh=False, shares=False, full_runs=full).forces["complete"]
+        for full in (None, 8)
+    )
+    assert np.nanstd(some, axis=0) == pytest.approx(np.nanstd(every, axis=0), rel=0.05)
+    assert np.nanmean(some, axis=0) == pytest.approx(np.nanmean(every, axis=0), rel=0.01)
 
 
 @pytest.mark.finite_elements

@@ -3,6 +3,10 @@
 The force is the rate of the energy along an equilibrium. Where the energy changes from one draw's to another's, so does
 the deformation, but that changes the force in second order only: to first order it is the power of the other draw's
 stresses on the first one's rates of strain, an integral over its volume that needs no further solution.
+
+That is the force of a body whose strains do not give way where the other draw is softer: the arithmetic mean of how
+many times as stiff it is, as in Voigt's bound of a mixture. If they alone gave way, it would be the harmonic mean, as
+in Reuss's. What first order lacks is nearly in proportion to the distance of the two.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from numpy.typing import NDArray
 from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.case import Case
 from tissuq.finite_elements.material import distortional_energy
-from tissuq.finite_elements.solver import Solver, StrainPath
+from tissuq.finite_elements.solver import Solver
 from tissuq.inference.threads import one_thread
 from tissuq.mechanics.rays import through
 from tissuq.posterior.ensemble import EnergyDraw, Ensemble
@@ -25,8 +29,10 @@ __all__ = ["FirstOrder", "controlled", "draws_in_full", "first_order_forces"]
 
 FloatArray = NDArray[np.float64]
 
-EXACT = 1e-9
-"""Difference of the stiffening from one below which a draw is proportional to the reference."""
+EXACT = 1e-12
+"""Unevenness below which a draw is proportional to the reference."""
+LEAST_RATIO, LEAST_POWER = 0.02, 1e-9
+"""Smallest ratio of stresses over their mean, and smallest power of a point over the largest, that count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +44,15 @@ class FirstOrder:
     forces : (N, s) array, N
     stiffening : (N, s) array
         The force over the initial shear modulus, relative to that of the reference: one where a draw is proportional
-        to the reference, for which the forces are exact.
+        to the reference.
+    unevenness : (N, s) array
+        One minus the harmonic over the arithmetic mean, over the power of the reference's stresses, of how many times
+        as large the draw's stresses are: zero where a draw is proportional to the reference, whose force is exact.
     """
 
     forces: FloatArray
     stiffening: FloatArray
+    unevenness: FloatArray
 
 
 def first_order_forces(
@@ -68,7 +78,8 @@ def first_order_forces(
         When the reference does not reach the end.
     """
     moduli = np.array([distortional_energy(draw).initial_shear_modulus for draw in ensemble])
-    columns = []
+    number = [draw is reference for draw in ensemble].index(True)
+    columns, uneven = [], []
     with one_thread():
         solver = Solver(case, reference, None, bulk_ratio)
         for target in case.steps(steps):
@@ -79,29 +90,38 @@ def first_order_forces(
                     f"{solver.reached:.3g} mm ({problem}), so that the others cannot follow from it: compute all in "
                     "full (no --full-runs)."
                 )
-            columns.append(_forces(ensemble, moduli, solver.strain_path()))
+            path = solver.strain_path()
+            powers = ensemble.stresses_at(through(path.logs, path.rates)) * path.volumes
+            columns.append(powers.sum(axis=1) + moduli * path.volumetric_power)
+            uneven.append(_unevenness(powers / moduli[:, None], number))
     forces = np.stack(columns, axis=1)
     per_modulus = forces / moduli[:, None]
-    reference_row = per_modulus[[draw is reference for draw in ensemble].index(True)]
-    return FirstOrder(forces, per_modulus / reference_row)
+    return FirstOrder(forces, per_modulus / per_modulus[number], np.stack(uneven, axis=1))
 
 
-def _forces(ensemble: Ensemble, moduli: FloatArray, path: StrainPath) -> FloatArray:
-    """Return the power (N,) of the stresses of draws on the strain rates of a path."""
-    power = ensemble.stresses_at(through(path.logs, path.rates)) @ path.volumes
-    return np.asarray(power + moduli * path.volumetric_power)
+def _unevenness(powers: FloatArray, reference: int) -> FloatArray:
+    """Return the unevenness (N,) of draws from the powers (N, n) of their stresses at points, over their moduli."""
+    weights = np.abs(powers[reference])
+    used = weights > LEAST_POWER * weights.max()
+    weights = weights[used] / weights[used].sum()
+    ratios = powers[:, used] / powers[reference, used]
+    ratios = np.maximum(ratios, LEAST_RATIO * np.abs(ratios @ weights)[:, None])
+    return np.asarray(np.maximum(1 - 1 / ((1 / ratios) @ weights) / (ratios @ weights), 0.0))
 
 
 def draws_in_full(first_order: FirstOrder, count: int) -> list[int]:
     """Return the numbers of the draws that are to be computed in full.
 
-    Half of them are those whose last stiffening differs most from one, where first order is least exact; the others are
-    spread evenly over the order of all remaining ones.
+    Half of them are those whose last unevenness is largest, where first order is least exact, of draws that stiffen and
+    of draws that soften in turn; the others are spread evenly over the order of all remaining ones.
     """
-    order = np.argsort(-np.abs(first_order.stiffening[:, -1] - 1))
+    order = np.argsort(-first_order.unevenness[:, -1])
     if count >= len(order):
         return sorted(order.tolist())
-    far, remaining = order[: (count + 1) // 2], order[(count + 1) // 2 :]
+    is_soft = first_order.stiffening[order, -1] < 1
+    in_turn = np.argsort(np.where(is_soft, np.cumsum(is_soft), np.cumsum(~is_soft)), kind="stable")
+    far = order[in_turn[: (count + 1) // 2]]
+    remaining = order[~np.isin(order, far)]
     between = remaining[np.linspace(0, len(remaining) - 1, count - len(far)).round().astype(int)]
     return sorted({*far.tolist(), *between.tolist()})
 
@@ -109,10 +129,11 @@ def draws_in_full(first_order: FirstOrder, count: int) -> list[int]:
 def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> tuple[FloatArray, FloatArray]:
     """Return the forces (N, s) of all draws, corrected by those in full, and the error (s,) of one that is not in full.
 
-    What first order lacks is of second order in the stiffening: its relative error is c (stiffening - 1)^2, with c from
-    the draws in full, of which the farther ones count less. The error is what that leaves of the nearer half of the
-    draws in full, each left out of the estimate of c: root mean square, relative to the force. Those that are
-    proportional to the reference, for which nothing is lacking, say nothing about others.
+    What first order lacks is taken as c times the unevenness, relative to the force. Between the draws in full c is
+    interpolated over the logarithm of the unevenness, for draws that stiffen and for those that soften apart. The error
+    is that of c, from each draw in full left out, times the unevenness of the draws that are not in full, both as root
+    mean squares. Draws that are nearly proportional to the reference, for which nothing is lacking, say nothing of
+    others.
 
     Parameters
     ----------
@@ -123,22 +144,36 @@ def controlled(first_order: FirstOrder, full: Mapping[int, Sequence[float]]) -> 
     numbers = np.array(sorted(full))
     wanted = np.array([full[number] for number in numbers], dtype=np.float64)
     lack = wanted / first_order.forces[numbers] - 1
-    squares = (first_order.stiffening - 1) ** 2
-    near = squares[numbers]
-    weights = np.where(np.isfinite(lack), 1 / (near + near.mean(axis=0)), 0.0)
-    products, sizes = weights * near * np.nan_to_num(lack), weights * near**2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        factor = np.nan_to_num(products.sum(axis=0) / sizes.sum(axis=0))
-        without_one = np.nan_to_num((products.sum(axis=0) - products) / (sizes.sum(axis=0) - sizes))
-    forces = first_order.forces * (1 + factor * squares)
+    uneven, softens = first_order.unevenness, first_order.stiffening < 1
+    forces, errors = first_order.forces.copy(), np.zeros(len(lack.T))
+    for step, lack_then in enumerate(lack.T):
+        near, side = uneven[numbers, step], softens[numbers, step]
+        known = np.flatnonzero(np.isfinite(lack_then) & (near > EXACT))
+        factor = _factors(uneven[:, step], softens[:, step], near[known], lack_then[known], side[known])
+        forces[:, step] *= np.maximum(1 + factor * uneven[:, step], LEAST_RATIO)
+        apart = np.zeros(len(known))
+        for place, row in enumerate(known):
+            others = np.delete(known, place)
+            without = _factors(near[[row]], side[[row]], near[others], lack_then[others], side[others])
+            apart[place] = lack_then[row] / near[row] - without[0]
+        if len(known):
+            followed = np.delete(uneven[:, step], numbers) if len(numbers) < len(uneven) else near
+            of_factor = (apart[near[known] >= LEAST_RATIO * near[known].max()] ** 2).mean()
+            errors[step] = np.sqrt(of_factor * (followed**2).mean())
     forces[numbers] = wanted
-    left = (lack - without_one * near) * np.where(np.isfinite(lack), 1.0, np.nan)
-    return forces, np.sqrt(np.nanmean(_typical(left, near) ** 2, axis=0))
+    return forces, errors
 
 
-def _typical(left: FloatArray, near: FloatArray) -> FloatArray:
-    """Return what is left of the draws in full without the farther half, and those that lack nothing."""
-    order = np.argsort(near[:, -1])
-    typical = order[: max(1, len(left) // 2)]
-    lacking = typical[near[typical, -1] > EXACT**2]
-    return left[lacking] if len(lacking) else left[typical]
+def _factors(
+    uneven: FloatArray, softens: NDArray[np.bool_], near: FloatArray, lack: FloatArray, side: NDArray[np.bool_]
+) -> FloatArray:
+    """Return what draws (N,) lack in their unevenness, from that of some (n,); zero where there are none."""
+    factors = np.zeros(len(uneven))
+    for is_soft in (False, True):
+        used = side == is_soft if (side == is_soft).any() else np.ones(len(side), dtype=bool)
+        order = np.argsort(near[used])
+        if len(order):
+            logs = np.log(near[used][order])
+            own = np.interp(np.log(np.maximum(uneven, EXACT)), logs, (lack[used] / near[used])[order])
+            factors = np.where(softens == is_soft, own, factors)
+    return factors
