@@ -1,7 +1,8 @@
 """A program in the place of CalculiX: from the constants of a neo-Hookean card, result files in its form.
 
 The force on TOP is C10 times the time, at times 0.5 and 1. With a file "fails" beside it that holds a number of a draw,
-it fails there half way; with "slow" it takes its time; with "sometimes" it fails the first time that it is run.
+it fails there half way; with "stiff" it fails so where C10 is beyond the number in it; with "slow" it takes its time;
+with "sometimes" it fails the first time that it is run.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ def main(job: str) -> int:
         print(" *ERROR: no licence")
         return 1
     fails = (HERE / "fails").exists() and f"complete-{(HERE / 'fails').read_text().strip()}" in folder.name
+    fails = fails or ((HERE / "stiff").exists() and coefficient > float((HERE / "stiff").read_text()))
     times = (0.5,) if fails else (0.5, 1.0)
     tables = [
         f"\n total force (fx,fy,fz) for set TOP and time  {at:.7E}\n\n        0.0 {coefficient * at:.9E} 0.0\n"

@@ -3,7 +3,12 @@
 from tissuq import decks as decks
 from tissuq import finite_elements as finite_elements
 from tissuq.assessment import Assessment as Assessment, Average as Average, average as average, compare as compare
-from tissuq.emulation import Calibration as Calibration, Emulator as Emulator, UmbridgeForward as UmbridgeForward
+from tissuq.emulation import (
+    Calibration as Calibration,
+    DeckForward as DeckForward,
+    Emulator as Emulator,
+    UmbridgeForward as UmbridgeForward,
+)
 from tissuq.errors import (
     ConvergenceError as ConvergenceError,
     InputError as InputError,

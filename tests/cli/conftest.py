@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,6 +18,8 @@ import pytest
 import typer.main
 
 from tissuq.cli import main
+
+from .models import write_model
 
 
 @dataclass(frozen=True)
@@ -154,6 +157,27 @@ def fit_run(tmp_path_factory):
     said = run_in(folder, "fit", "specimen.csv", *chosen, "--noise-sd", 1, "--seed", 3)
     assert said.status == 0, said.err
     return folder / "runs" / "specimen", said
+
+
+@pytest.fixture(scope="session")
+def run_without_discrepancy(tmp_path_factory):
+    """The run folder of a fit without discrepancy."""
+    folder = tmp_path_factory.mktemp("without_discrepancy")
+    write_specimen(folder / "specimen.csv")
+    options = ["--noise-sd", 1, "--discrepancy", "none", "--no-figures", "--out", "run"]
+    said = run_in(folder, "fit", "specimen.csv", *options)
+    assert said.status == 0, said.err
+    return folder / "run"
+
+
+@pytest.fixture
+def model(run_without_discrepancy, here):
+    """A run, a deck and a stub of CalculiX in the current folder: the words after ``tissuq ensemble``."""
+    shutil.copytree(run_without_discrepancy, here / "run")
+    return [
+        "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", "--solver", "ccx",
+        "--command", write_model(here), "--draws", 6, "--max-jobs", 1, "--out", "out",
+    ]  # fmt: skip
 
 
 def without_wall_times(folder: Path) -> dict[str, bytes | None]:

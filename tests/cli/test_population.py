@@ -8,12 +8,14 @@ import tomllib
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import tissuq as tq
 from tissuq.studies import population
 from tissuq.studies.population import PopulationSettings
 
 from .conftest import STRETCH, command, run_in
+from .models import write_model
 
 MODULI_KPA = [40.0, 48.0, 52.0, 60.0, 75.0, 45.0]
 OPTIONS = ["--discrepancy", "none", "--noise-sd", 1]
@@ -95,6 +97,33 @@ def test_predictions_and_cards_start_from_a_new_patient(population_run):
     for arguments in (["predict", "run", "--mode", "planar", "--points", 3, "--no-figures"], ["export", "run"]):
         said = run_in(folder, *arguments)
         assert said.status == 0, said.err
+
+
+def test_a_new_patient_goes_into_a_model_of_the_user_and_into_a_case(population_run, tmp_path):
+    """The stub's force is the C10 that stands in the deck; that of a case is in proportion to C10."""
+    pytest.importorskip("felupe", reason="FElupe is not installed")
+    folder, _ = population_run
+    command_of_stub = write_model(tmp_path)
+    options = ["--command", command_of_stub, "--draws", 64, "--unit", "kPa", "--no-figures", "--max-jobs", 1]
+    words = ["ensemble", folder / "run", "model.inp", "--replace", "TISSUE", "--qoi", "force=RF2@TOP", *options]
+    said = run_in(tmp_path, *words, "--solver", "ccx", "--out", "forces")
+    assert said.status == 0, said.err
+    assert "those of a new patient of the population of 6 specimens" in " ".join(said.out.split())
+    forces = np.array([float(row["force"]) for row in table(tmp_path / "forces" / "draws.csv")])
+    row = next(row for row in table(folder / "run" / "population.csv") if row["quantity"] == "new patient")
+    assert np.median(forces) == pytest.approx(float(row["median"]), rel=0.05)
+    inside = (forces > float(row["hdi_low"])) & (forces < float(row["hdi_high"]))
+    assert 0.85 <= inside.mean() < 1
+    small = ["--case", "bar", "--draws", 4, "--steps", 1, "--size", "fineness=0.5", "--workers", 1, "--no-figures"]
+    said = run_in(tmp_path, "structure", folder / "run", *small, "--out", "bar")
+    assert said.status == 0, said.err
+    with xr.open_dataset(tmp_path / "bar" / "curves.nc") as curves:
+        ratio = curves["force_complete"].values[:, -1] / curves["parameter_C10"].values
+    assert ratio == pytest.approx(ratio[0], rel=1e-6)
+    assert "those of a new patient of the population" in (tmp_path / "bar" / "report.html").read_text()
+    again = ["structure", "--config", "bar/run.toml", "--workers", 1, "--no-figures", "--out", "again"]
+    assert run_in(tmp_path, *again).status == 0
+    assert (tmp_path / "again" / "forces.csv").read_bytes() == (tmp_path / "bar" / "forces.csv").read_bytes()
 
 
 def test_the_numbers_are_those_of_the_specimens(population_run):

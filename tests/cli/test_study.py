@@ -90,3 +90,40 @@ def test_real_tests_are_predicted_from_others_and_the_page_tells_how_well(cli, h
     assert refused.status == 2
     assert "'stres=10%' is not a tolerance" in refused.err
     assert not (here / "other").exists()
+
+
+@pytest.mark.finite_elements
+def test_structures_write_bands_and_go_on(cli, here):
+    small = ["--replicates", 2, "--truth", "gent", "--structure", "bar", "--draws", 8, "--full-runs", 4, "--steps", 1]
+    arguments = ("study", "structures", *small, "--measurements", 8, "--out", "out")
+    said = cli(*arguments)
+    assert said.status == 0, said.err
+    tasks = (here / "out" / "tasks.jsonl").read_bytes()
+    with (here / "out" / "bands.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["truth"], row["tests"], row["structure"]) for row in rows] == [
+        ("gent", "1", "bar"),
+        ("gent", "2", "bar"),
+    ]
+    for row in rows:
+        assert float(row["default_low"]) < float(row["default_mean"]) < float(row["default_high"])
+        assert float(row["force_N"]) == pytest.approx(float(row["oracle_mean"]), rel=0.5)
+    with (here / "out" / "summary.csv").open() as file:
+        (summary,) = csv.DictReader(file)
+    inside = [float(row["default_low"]) <= float(row["force_N"]) <= float(row["default_high"]) for row in rows]
+    assert float(summary["inside"]) == pytest.approx(sum(inside) / 2)
+    (here / "out" / "tasks.jsonl").write_bytes(tasks[: tasks.index(b"\n") + 20])
+    assert cli(*arguments).status == 0
+    assert (here / "out" / "tasks.jsonl").read_bytes() == tasks
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [(["--truth", "iron"], "no law 'iron'"), (["--structure", "bridge"], "no structure 'bridge'"),
+     (["--mode", "biaxial"], "several controls"), (["--estimand", "all"], "estimand")],
+)  # fmt: skip
+def test_structures_that_are_not_known_are_refused(cli, here, more, words):
+    said = cli("study", "structures", *more)
+    assert said.status == 2
+    assert words in said.err
+    assert not (here / "runs").exists()

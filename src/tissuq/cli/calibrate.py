@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from pathlib import Path
+from typing import Any
 
 from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
+from tissuq.cli.named_again import check_named_again, is_function
 from tissuq.cli.running import Written
 from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
@@ -18,6 +22,12 @@ class CalibrateOptions(Written):
     """How the model is run."""
 
     workers: int = option(1, "Processes that run the model.", ge=1)
+    max_jobs: int | None = option(
+        None, "With --model: runs of the solver at a time, as many as licences [one a core].", ge=1
+    )
+    timeout: float | None = option(None, "With --model: seconds after which a run is stopped [never].", unit="s", ge=0)
+    retries: int = option(0, "With --model: times that a failed run is made again, as for a licence.", ge=0)
+    keep: bool = option(False, "With --model: keep the solver's files of every run.")
     runs_in: Path | None = option(
         None, "Folder of the runs of the model, which a repeated command reuses [OUT-forward-runs]."
     )
@@ -30,14 +40,19 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     from tissuq.studies.calibration import run_calibration
 
     call.check_source("file", "a FILE of controls and measured values", "run")
-    if not (call.config or "priors" in call.stated):
-        raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5).")
+    if not (call.config or "priors" in call.stated or "prior_run" in call.stated):
+        raise InputError("give the --prior of every parameter of the model, as in C10=uniform(0.1, 5), or --prior-run.")
     settings = call.loaded(rivals=("forward", "umbridge"))
     _check_named_again(call, settings)
     target = call.target(Path("runs") / Path(settings.file).stem)
     runs_in = call.how.runs_in or target.with_name(f"{target.name}-forward-runs")
+    how, running = call.how, dict[str, Any]()
+    workers = how.workers
+    if settings.model is not None:
+        workers = how.max_jobs or os.cpu_count() or 1
+        running = {"timeout": how.timeout, "retries": how.retries, "keep": how.keep}
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
-        study = run_calibration(settings, call.beside, runs_in=runs_in, workers=call.how.workers, step=step)
+        study = run_calibration(settings, call.beside, runs_in=runs_in, workers=workers, step=step, **running)
     print(f"Forward runs: {runs_in}")
     call.carried_out(target, lambda step: study, lambda study: calibration_result(study, call.beside))
     not_converged([] if study.calibration.converged else ["the calibration"])
@@ -55,3 +70,11 @@ def _check_named_again(call: Call[CalibrationSettings, CalibrateOptions], settin
             f"{call.config} names the UM-Bridge server {settings.umbridge}, which is asked only when you name it: add "
             f"--umbridge {settings.umbridge}"
         )
+    if call.config and settings.model:
+        functions = [
+            f"--{option} {shlex.quote(f'{name}={text}')}"
+            for option, setting in (("qoi", "quantities"), ("along", "along"))
+            for name, text in getattr(settings, setting).items()
+            if is_function(text) and name not in call.stated.get(setting, {})
+        ]
+        check_named_again(call.config, settings, call.stated, functions)

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
+from tissuq.cli.named_again import check_named_again, is_function
 from tissuq.cli.running import Configured, LawOfRun
 from tissuq.errors import InputError
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import once_each
-from tissuq.studies.settings import is_inside
 
 if TYPE_CHECKING:
     from tissuq.studies.ensemble import PreparedEnsemble
@@ -97,35 +96,19 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
             raise InputError(f"give {example}: what the model is asked for.")
     settings = call.loaded(model=model, materials=materials or None)
     if call.config:
-        _check_named_again(call.config, settings, stated, is_dry=call.how.dry_run)
+        functions = [
+            f"--qoi {shlex.quote(f'{name}={text}')}"
+            for name, text in settings.quantities.items()
+            if is_function(text) and name not in stated.get("quantities", {})
+        ]
+        check_named_again(call.config, settings, stated, functions, is_dry=call.how.dry_run)
     return settings
-
-
-def _check_named_again(config: Path, settings: EnsembleSettings, stated: Mapping[str, Any], *, is_dry: bool) -> None:
-    """Refuse to run programs, or to read files elsewhere, that a recipe names and the command line does not."""
-    from tissuq.mechanics.user_law import LAW
-
-    missing = []
-    if not is_dry:
-        if settings.command and not stated.get("command"):
-            missing.append(f"--command {shlex.quote(settings.command)}")
-        for name, text in settings.quantities.items():
-            if LAW.fullmatch(text) and name not in stated.get("quantities", {}):
-                missing.append(f"--qoi {shlex.quote(f'{name}={text}')}")
-    inside = config.parent.resolve()
-    if "also" not in stated and not all(is_inside(inside / file, inside) for file in settings.also):
-        missing += [f"--also {shlex.quote(file)}" for file in settings.also]
-    if missing:
-        raise InputError(
-            f"'{config}' names programs that would be run, or files outside of its folder. They are used only if named "
-            f"here, too; if you know them, add {' '.join(missing)}."
-        )
 
 
 def _stored(prepared: PreparedEnsemble, sources: list[str], beside: Path) -> EnsembleSettings:
     """Return the settings with the names that runs and files have in the folder of the ensemble."""
+    from tissuq.decks.model_files import MODEL, stored_place
     from tissuq.report.simulation import SOURCE
-    from tissuq.studies.ensemble_files import MODEL, stored_place
 
     settings = prepared.settings
     places = {source: f"{POSTERIORS}/{number}/{SOURCE}" for number, source in enumerate(sources, start=1)}
@@ -141,9 +124,9 @@ def _write_inputs(
     prepared: PreparedEnsemble, stored: EnsembleSettings, sources: list[str], beside: Path, folder: Path
 ) -> None:
     """Write recipe and copies of all that an ensemble starts from, so that it can be repeated."""
+    from tissuq.decks.model_files import copy_model
     from tissuq.report.ensemble import copy_functions
     from tissuq.report.simulation import copy_source
-    from tissuq.studies.ensemble_files import copy_model
 
     folder.mkdir(parents=True, exist_ok=True)
     copy_model(prepared.deck, prepared.settings.also, beside, folder)

@@ -14,7 +14,7 @@ from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import Command, command
 from tissuq.cli.running import Campaign
 from tissuq.errors import InputError
-from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, TissueOptions
+from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, StructureStudyOptions, TissueOptions
 from tissuq.studies.option import option
 
 __all__ = ["study"]
@@ -90,6 +90,19 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
     target = call.how.out or Path("runs") / (call.config.stem if call.config else "tissues")
     results = _carry_out(call, settings, target, len(tasks_of(settings)), run_benchmark)
     call.put_into(target, tissue_result(settings, results))
+
+
+@study.command("structures", cls=Command)
+@command(StructureStudyOptions, Campaign, "tissuq.validation.structures:StructureStudySettings")
+def structures(call: Call[StructureStudyOptions, Campaign]) -> None:
+    """Predict forces of structures from simple tests of a known law, and count how often bands hold; resumable."""
+    from tissuq.report.structures import structures_result
+    from tissuq.validation.structures import StructureStudySettings, run_structures, tasks_of
+
+    settings = call.loaded_as(StructureStudySettings)
+    target = call.how.out or Path("runs") / (call.config.stem if call.config else "structures")
+    results = _carry_out(call, settings, target, len(tasks_of(settings)), run_structures)
+    call.put_into(target, structures_result(settings, results))
 
 
 def _carry_out(

@@ -290,6 +290,12 @@ class FunctionQuantity(Quantity):
         return Curve(np.ones(1), curve.values) if len(curve.times) == 1 and np.isnan(curve.times).all() else curve
 
 
+def located(text: str, beside: Path) -> str:
+    """Return the text of a quantity, where it is a function with its file in a folder, by an absolute name."""
+    match = LAW.fullmatch(text)
+    return text if match is None else f"{(beside / match['path']).absolute()}:{match['name']}"
+
+
 def parse_quantity(name: str, text: str) -> Quantity:
     """Return a quantity from its name and a text like ``RF3@TOP`` or ``file.py:function``.
 

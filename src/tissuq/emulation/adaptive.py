@@ -75,7 +75,8 @@ def calibrated(
     """
     if emulator is None:
         _check_run_count(problem, settings)
-        runs = run(space_filling(problem.forward_priors, settings.runs, settings.seed, settings.design))
+        plan = settings.runs, settings.seed, settings.design, problem.correlation
+        runs = run(space_filling(problem.forward_priors, *plan))
         emulator = _emulator(runs, problem, settings)
     else:
         _check_fit(problem, emulator)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from importlib import import_module
@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import LAW, failures_of, run_file
 
-__all__ = ["DEFAULT_URL", "CallableForward", "FileForward", "Forward", "UmbridgeForward", "as_forward"]
+__all__ = [
+    "DEFAULT_URL",
+    "CallableForward",
+    "FileForward",
+    "Forward",
+    "UmbridgeForward",
+    "UnreadableError",
+    "as_forward",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -27,6 +35,10 @@ ADVICE = (
     "Write a function forward(parameters) of a dictionary of parameters by name, or forward(parameters, control), that "
     "returns an output for every measurement"
 )
+
+
+class UnreadableError(InputError):
+    """A fault of every run, such as a quantity that the model does not write: no further run is made."""
 
 
 class Forward(ABC):
@@ -55,6 +67,10 @@ class Forward(ABC):
 
     def check(self, symbols: Sequence[str]) -> None:  # noqa: B027  (most kinds have nothing to check)
         """Raise an InputError where no run with these parameters is possible."""
+
+    def prepared_in(self, folder: Path) -> Forward:
+        """Return the model as it runs with files in a folder, which exists and keeps its runs."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -133,6 +149,9 @@ class SeveralQuantities(Forward):
 
     def check(self, symbols: Sequence[str]) -> None:
         self.model.check(symbols)
+
+    def prepared_in(self, folder: Path) -> Forward:
+        return replace(self, model=self.model.prepared_in(folder))
 
 
 def as_forward(forward: Forward | Callable[..., Any]) -> Forward:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tissuq.emulation.emulator import Emulator, emulated
 from tissuq.emulation.length_scales import Kernel, Trend
+from tissuq.emulation.prior_correlation import PriorCorrelation
 from tissuq.emulation.problem import Problem, symbol_of
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import NOISE_SD
@@ -213,11 +214,13 @@ def _ratio(form: Form) -> Any:
 
 
 @lru_cache
-def log_posterior(form: Form, priors: tuple[Prior, ...]) -> Any:
+def log_posterior(form: Form, priors: tuple[Prior, ...], correlation: PriorCorrelation | None = None) -> Any:
     """Return the log posterior of parameters (D,) and data, up to a constant; the same function for the same form."""
 
     def density(values: Any, data: Any) -> Any:
         log_prior = sum(prior.log_density(value) for prior, value in zip(priors, values, strict=True))
+        if correlation is not None:
+            log_prior = log_prior + correlation.log_density([values[k] for k in range(form.forward)], jnp)
         return log_density(form, values, data) + log_prior
 
     return density

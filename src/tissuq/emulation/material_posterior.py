@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tissuq.assessment.stability import calibrated_range
 from tissuq.emulation.problem import Problem
 from tissuq.emulation.sampling import SampledPosterior
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
-from tissuq.experiments.modes import LoadingMode, loading_mode
+from tissuq.experiments.modes import LoadingMode, curve_modes, loading_mode
 from tissuq.experiments.units import stress_unit
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import Marginal
@@ -20,10 +22,11 @@ from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.model.noise import KnownNoise
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Prior
+from tissuq.posterior.ensemble import EnergyDraw, Ensemble
 from tissuq.posterior.posterior import Posterior
 from tissuq.posterior.solver import Solver
 
-__all__ = ["check_material", "material_posterior"]
+__all__ = ["card_material", "check_material", "material_posterior"]
 
 POINTS = 20
 """Number of stretches that stand for the range."""
@@ -69,23 +72,15 @@ def material_posterior(
     """
     law, priors = check_material(material, problem.forward_priors, unit)
     loading, factor = loading_mode(mode), stress_unit(unit).to_mpa
-    if len(loading.controls) != 1:
-        raise InputError(f"the mode '{loading.name}' has several controls: give the range in one with one control.")
-    low, high = map(float, stretch)
-    if not 0 < low < high:
-        raise InputError(f"the range of the stretch must be two rising positive numbers, not {low:g}:{high:g}.")
     symbols = list(priors)
     factors = {parameter.symbol: factor if parameter.unit else 1.0 for parameter in law.parameters}
     columns = [problem.symbols.index(symbol) for symbol in symbols]
     draws = sampled.draws[:, :, columns] * np.array([factors[symbol] for symbol in symbols])
     chains, count, _ = draws.shape
-    points = np.linspace(low, high, POINTS)
-    points = points[np.abs(points - 1) > 1e-9]
-    mean = engineering_stress(law, loading.paths[0], points, draws.reshape(chains * count, -1)).mean(axis=0)
-    experiment = Experiment(loading, points, mean).labelled(
+    experiment = _experiment(law, draws.reshape(chains * count, -1), loading, stretch).labelled(
         name="calibration", source="mean of a calibration of a forward model: nothing was measured", stress_unit=unit
     )
-    noise = KnownNoise(float(NOISE_SHARE * np.abs(mean).max()))
+    noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
     model = StatisticalModel(experiment, law, NoDiscrepancy(), noise, priors)
     by_symbol = {symbol: draws[:, :, k].ravel() for k, symbol in enumerate(symbols)}
     settings, linear = (
@@ -109,6 +104,35 @@ def material_posterior(
         is_of_data=False,
     )
     return Posterior(solution, Solver(seed=seed))
+
+
+def card_material(law: Material, values: tuple[float, ...], stretch: tuple[float, float], mode: str) -> Ensemble:
+    """Return a law with parameters (MPa) as an ensemble of one draw, which cards are made of, known over a range.
+
+    Raises
+    ------
+    InputError
+        When the range is none.
+    """
+    experiment = _experiment(law, np.array([values]), loading_mode(mode), stretch)
+    noise = KnownNoise(float(NOISE_SHARE * np.abs(experiment.measured).max()))
+    model = StatisticalModel(experiment, law, NoDiscrepancy(), noise)
+    ranges = {each.name: calibrated_range(experiment, each) for each in curve_modes()}
+    return Ensemble((EnergyDraw(0, ((law, values),), None),), model, (), 1, ranges)
+
+
+def _experiment(
+    law: Material, values: NDArray[np.float64], loading: LoadingMode, stretch: tuple[float, float]
+) -> Experiment:
+    """Return the mean stress of parameters (N, k) at points of a range, which stand for what was measured."""
+    if len(loading.controls) != 1:
+        raise InputError(f"the mode '{loading.name}' has several controls: give the range in one with one control.")
+    low, high = map(float, stretch)
+    if not 0 < low < high:
+        raise InputError(f"the range of the stretch must be two rising positive numbers, not {low:g}:{high:g}.")
+    points = np.linspace(low, high, POINTS)
+    points = points[np.abs(points - 1) > 1e-9]
+    return Experiment(loading, points, engineering_stress(law, loading.paths[0], points, values).mean(axis=0))
 
 
 def check_material(

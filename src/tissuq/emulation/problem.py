@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tissuq.emulation.prior_correlation import PriorCorrelation, correlated
 from tissuq.errors import InputError, ModelError
 from tissuq.model.discrepancy import Discrepancy, GaussianProcess, NoDiscrepancy, PinnedProcess
 from tissuq.model.noise import NOISE_SD
@@ -49,6 +50,8 @@ class Problem:
         Of every quantity that was measured; None where it is unknown.
     quantities : mapping of str to (int, int)
         First and last but one of the measurements of each quantity; the name of a single one is empty.
+    correlation : PriorCorrelation or None
+        Of the priors of the forward model's parameters.
     """
 
     control: FloatArray
@@ -58,6 +61,7 @@ class Problem:
     discrepancy: Discrepancy
     noise_sd: Mapping[str, float | None]
     quantities: Mapping[str, tuple[int, int]]
+    correlation: PriorCorrelation | None = None
 
     @cached_property
     def priors(self) -> dict[str, Prior]:
@@ -74,6 +78,16 @@ class Problem:
         """The parameters of the forward model."""
         return tuple(self.forward_priors)
 
+    def values_of(self, scores: FloatArray) -> FloatArray:
+        """Return parameters (N, D) whose joint prior is that of independent standard normal scores (N, D)."""
+        from scipy.special import ndtr
+
+        if self.correlation is not None:
+            count = len(self.forward_priors)
+            scores = np.hstack([self.correlation.scores(scores[:, :count]), scores[:, count:]])
+        pairs = zip(self.priors.values(), scores.T, strict=True)
+        return np.column_stack([prior.quantile(ndtr(column)) for prior, column in pairs])
+
 
 def pose(
     control: ArrayLike | Mapping[str, ArrayLike],
@@ -82,6 +96,7 @@ def pose(
     discrepancy: str | Discrepancy = "none",
     noise_sd: float | str | Mapping[str, float | str] = "unknown",
     zero_load: float = 0.0,
+    correlations: Mapping[tuple[str, str], float] | None = None,
 ) -> Problem:
     """Return the problem, checked, with the priors that were not given.
 
@@ -98,6 +113,8 @@ def pose(
         Standard deviation of the noise in the unit of what was measured, or ``"unknown"``.
     zero_load : float
         The control at zero load, where ``gp-pinned`` is zero with its slope.
+    correlations : mapping of (str, str) to float, optional
+        Of the priors of pairs of parameters: of their logarithms, where the prior is log-normal.
 
     Raises
     ------
@@ -131,6 +148,7 @@ def pose(
         form,
         {name: None if sd == "unknown" else float(sd) for name, sd in noises.items()},
         dict(zip(columns, pairwise(ends), strict=True)),
+        correlated(forward, correlations or {}),
     )
 
 

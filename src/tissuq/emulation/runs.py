@@ -12,7 +12,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.emulation.forward import Forward
+from tissuq.emulation.forward import Forward, UnreadableError
+from tissuq.emulation.prior_correlation import PriorCorrelation
 from tissuq.errors import InputError
 from tissuq.parameters.priors import Prior
 
@@ -27,7 +28,13 @@ TAIL_PROBABILITY = 0.001
 """Probability of an unbounded prior beyond either end of the run plan."""
 
 
-def space_filling(priors: Mapping[str, Prior], runs: int, seed: int = 0, design: PointSet = "sobol") -> FloatArray:
+def space_filling(
+    priors: Mapping[str, Prior],
+    runs: int,
+    seed: int = 0,
+    design: PointSet = "sobol",
+    correlation: PriorCorrelation | None = None,
+) -> FloatArray:
     """Return the parameters (runs, d) at which to run a model: evenly spread over the quantiles of their priors.
 
     Uniform and log-uniform priors are covered up to their ends, others up to their quantiles of 0.1 and 99.9 %.
@@ -42,6 +49,8 @@ def space_filling(priors: Mapping[str, Prior], runs: int, seed: int = 0, design:
         Seed of the points.
     design : str
         ``"sobol"`` (scrambled Sobol points) or ``"latin"`` (a Latin hypercube whose points are moved apart).
+    correlation : PriorCorrelation, optional
+        Of the priors.
 
     Raises
     ------
@@ -55,6 +64,7 @@ def space_filling(priors: Mapping[str, Prior], runs: int, seed: int = 0, design:
     >>> points.shape, bool((points[:, 0] > 1).sum() == 8)
     ((16, 2), True)
     """
+    from scipy.special import ndtr, ndtri
     from scipy.stats import qmc
 
     if design not in get_args(PointSet):
@@ -66,6 +76,8 @@ def space_filling(priors: Mapping[str, Prior], runs: int, seed: int = 0, design:
         cube = qmc.Sobol(size, rng=generator).random_base2(int(np.ceil(np.log2(max(runs, 2)))))[:runs]
     else:
         cube = qmc.LatinHypercube(size, optimization="random-cd", rng=generator).random(runs)
+    if correlation is not None:
+        cube = ndtr(correlation.scores(ndtri(np.clip(cube, TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))))
     columns = zip(priors.values(), cube.T, strict=True)
     return np.column_stack([_quantiles(prior, column) for prior, column in columns])
 
@@ -123,6 +135,8 @@ def carry_out(run: ForwardRun) -> dict[str, Any]:
     result: dict[str, Any] = {"outputs": [], "error": ""}
     try:
         outputs = run.forward.run(dict(run.parameters), np.array(run.control))
+    except UnreadableError:
+        raise
     except Exception as error:  # a failed run is a result, which is listed
         result["error"] = f"{type(error).__name__}: {error}".strip().splitlines()[0][:300]
     else:

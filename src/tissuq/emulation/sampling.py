@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.emulation.likelihood import Likelihood, log_posterior
-from tissuq.emulation.problem import Method, Problem
+from tissuq.emulation.problem import Method
 from tissuq.errors import ConvergenceError, InputError
 from tissuq.inference.enumerators.nuts import NutsSettings, sample_nuts
 from tissuq.inference.marginal import Marginal, marginal_of_points
@@ -118,7 +118,7 @@ def _by_importance(likelihood: Likelihood, seed: int) -> SampledPosterior:
         f"effective (at least {MIN_EFFECTIVE_POINTS}); the heaviest has {heaviest:.2g} of the weight (less than "
         f"{MAX_POINT_WEIGHT})."
     )
-    values = _values(problem, scores)
+    values = problem.values_of(scores)
     order = np.random.default_rng([seed, 47]).permutation(systematic(weights[None], CHAINS * DRAWS)[0])
     return SampledPosterior(
         symbols=problem.symbols,
@@ -170,16 +170,8 @@ def _weighted_scores(likelihood: Likelihood, seed: int) -> tuple[FloatArray, Flo
 
 def _log_target(likelihood: Likelihood, scores: FloatArray) -> FloatArray:
     """Return the log of the posterior (N,) at scores (N, D), up to the evidence."""
-    height = likelihood.log_density(_values(likelihood.problem, scores)) + log_normal(scores)
+    height = likelihood.log_density(likelihood.problem.values_of(scores)) + log_normal(scores)
     return np.where(np.isfinite(height), height, -np.inf)
-
-
-def _values(problem: Problem, scores: FloatArray) -> FloatArray:
-    """Return the parameters (N, D) whose prior probabilities are those of a standard normal at scores (N, D)."""
-    from scipy.special import ndtr
-
-    priors = problem.priors.values()
-    return np.column_stack([prior.quantile(ndtr(column)) for prior, column in zip(priors, scores.T, strict=True)])
 
 
 def _components(scores: FloatArray, logs: FloatArray) -> list[tuple[float, Proposal]]:
@@ -227,10 +219,10 @@ def _by_nuts(likelihood: Likelihood, seed: int, search: SampledPosterior | None)
     problem = likelihood.problem
     lower, upper = np.array([prior.support for prior in problem.priors.values()]).T
     scattered = np.random.default_rng([seed, 53]).standard_normal((PRIOR_POINTS, len(problem.symbols)))
-    points = _values(problem, scattered) if search is None else search.values
+    points = problem.values_of(scattered) if search is None else search.values
     heights = likelihood.log_density(points) if search is None else search.weights
     start = points[int(np.argmax(np.where(np.isfinite(heights), heights, -np.inf)))]
-    density = log_posterior(likelihood.form, tuple(problem.priors.values()))
+    density = log_posterior(likelihood.form, tuple(problem.priors.values()), problem.correlation)
     chains = sample_nuts(density, lower, upper, start, NutsSettings(seed=seed), problem.symbols, likelihood.data)
     values = chains.values.reshape(-1, len(problem.symbols))
     sizes = np.minimum(chains.ess_bulk, chains.ess_tail)

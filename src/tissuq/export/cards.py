@@ -28,6 +28,7 @@ __all__ = [
     "draw_row",
     "ensemble_lines",
     "file_name",
+    "origin_sentences",
     "words_of",
 ]
 
@@ -203,6 +204,8 @@ def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
     model = ensemble.model
     names = f"{model.material.name}, discrepancy {model.discrepancy.name}"
     yield f"tissuq: equally probable draws of the posterior of {names}"
+    if ensemble.origin:
+        yield f"the draws are those of {ensemble.origin}"
     yield f"source: {settings.source or model.experiment.name}"
     yield (
         "energy of the draws: material and discrepancy" if ensemble[0].discrepancy else "energy of the draws: material"
@@ -216,6 +219,11 @@ def ensemble_lines(ensemble: Ensemble, settings: CardSettings) -> Iterator[str]:
         yield "admissible: not looked at, draws may be unstable"
     ends = (f"{mode} {low:.4g} to {high:.4g}" for mode, (low, high) in ensemble.ranges.items())
     yield f"calibrated stretches: {', '.join(ends)}; beyond, the card is an extrapolation"
+
+
+def origin_sentences(ensemble: Ensemble) -> tuple[str, ...]:
+    """Return what is to be said of draws that are no fit of measurements; nothing of others."""
+    return (f"The draws are those of {ensemble.origin}.",) if ensemble.origin else ()
 
 
 def draw_row(draw: EnergyDraw, settings: CardSettings, modulus: float) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from tissuq.export.cards import (
     draw_row,
     ensemble_lines,
     file_name,
+    origin_sentences,
     words_of,
 )
 from tissuq.export.draw_stresses import DrawStresses
@@ -126,7 +127,11 @@ class FECode(CardFormat):
             lines += judged.lines(draw_index)
             files[str(row["file"])] = self.wrapped(self._commented(lines), blocks[-1])
             index.append(row)
-        sentences = (*judged.sentences(self.name, rivals), *_softness(np.array(bulks) / shear))
+        sentences = (
+            *origin_sentences(ensemble),
+            *judged.sentences(self.name, rivals),
+            *_softness(np.array(bulks) / shear),
+        )
         return Cards(files, tuple(index), sentences, tuple(blocks))
 
     def form_of(self, law: Law) -> Form | None:

@@ -14,6 +14,7 @@ from tissuq.export.cards import (
     draw_row,
     ensemble_lines,
     file_name,
+    origin_sentences,
     words_of,
 )
 from tissuq.export.states import SeenStates, moduli
@@ -53,7 +54,7 @@ class Table(CardFormat):
             row = draw_row(ensemble[draw_index], settings, float(modulus))
             index.append({"file": name, **row})
         note = "The tables are exact: W1 and W2 of material and discrepancy at states whose invariants were measured."
-        return Cards(files, tuple(index), (note,))
+        return Cards(files, tuple(index), (*origin_sentences(ensemble), note))
 
 
 def _rows(states: SeenStates, stress: FloatArray) -> FloatArray:

@@ -152,6 +152,7 @@ def simulate(
     bulk_ratio: float = BULK_RATIO,
     check_mesh: bool = True,
     full_runs: int | None = None,
+    shares: bool = True,
     run: Run = run_in_turn,
 ) -> Simulation:
     """Return the forces of draws of a posterior in a case, with the discrepancy and without it.
@@ -178,6 +179,8 @@ def simulate(
     full_runs : int, optional
         Draws of every family that are computed in full; the others follow from the deformation of the one in the middle
         to first order, corrected by those (`tissuq.finite_elements.first_order`). Unless given, all.
+    shares : bool
+        Compute the draws without their discrepancy, too, for the shares of the variance.
     run : callable
         Carries out the tasks; `tissuq.studies.structure` has one that uses many processes.
 
@@ -202,7 +205,7 @@ def simulate(
     if draws < MIN_DRAWS or steps < 1:
         raise InputError(f"a simulation has {MIN_DRAWS} draws or more and one step or more, not {draws} and {steps}.")
     ensembles = {COMPLETE: posterior.ensemble(draws, seed)}
-    if any(draw.discrepancy is not None or len(draw.parts) > 1 for draw in ensembles[COMPLETE]):
+    if shares and any(draw.discrepancy is not None or len(draw.parts) > 1 for draw in ensembles[COMPLETE]):
         ensembles[MATERIAL_ONLY] = ensembles[COMPLETE].alone
         if without is not None:
             ensembles[WITHOUT] = without.ensemble(draws, seed)

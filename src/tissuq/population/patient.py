@@ -91,10 +91,12 @@ def patient_posterior(
     mixture = GaussianMixture.of_points(weights, settings, linear)
     support = {parameter.symbol: parameter.support for parameter in model.parameters}
     names = f"{count} specimens, pooled in {', '.join(coordinates.symbols)}"
+    is_exact = full.discrepancy.name == NoDiscrepancy.name
+    left_out = "" if is_exact else f", and their model error ({full.discrepancy.name}) is left out"
     solution = Solution(
         model,
         "population",
-        f"a new patient of the population of {names}; what is not pooled is that of a random specimen",
+        f"a new patient of the population of {names}; what is not pooled is that of a random specimen{left_out}",
         lambda: mixture,
         Marginals.of(model, lambda symbol: marginal_of_points(columns[symbol], weights, support[symbol])),
         sampled=linear.reshape(chains, draws, -1),

@@ -114,6 +114,8 @@ class Ensemble(Sequence[EnergyDraw]):
         Draws among which the admissible ones were found.
     ranges : mapping of str to (float, float)
         Stretches of each loading mode of one stretch between which both invariants were measured.
+    origin : str
+        Where the draws come from, in words, where that is no fit of measurements: a new patient of a population.
     """
 
     draws: tuple[EnergyDraw, ...]
@@ -121,6 +123,7 @@ class Ensemble(Sequence[EnergyDraw]):
     admissible_in: tuple[str, ...]
     tried: int
     ranges: Mapping[str, tuple[float, float]]
+    origin: str = ""
 
     @overload
     def __getitem__(self, index: int) -> EnergyDraw: ...
@@ -262,7 +265,8 @@ def drawn_ensemble(
         tried += int(accepted[-1]) + 1 if len(draws) == count else count
     ranges = {mode.name: calibrated_range(model.experiment, mode) for mode in modes}
     numbered = tuple(replace(draw, number=number) for number, draw in enumerate(draws))
-    return Ensemble(numbered, model, tuple(mode.name for mode in modes) if admissible else (), tried, ranges)
+    admissible_in = tuple(mode.name for mode in modes) if admissible else ()
+    return Ensemble(numbered, model, admissible_in, tried, ranges, "" if solution.is_of_data else solution.reason)
 
 
 def _stress(draws: Sequence[EnergyDraw], states: States) -> FloatArray:

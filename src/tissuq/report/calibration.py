@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import shlex
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tissuq.decks.model_files import MODEL, extra_files, stored_place
+from tissuq.decks.quantity import located
 from tissuq.drawing import pieces
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
-from tissuq.emulation import Calibration, FileForward
+from tissuq.emulation import Calibration, DeckForward, FileForward
 from tissuq.mechanics.user_law import LAW
 from tissuq.model.discrepancy import NoDiscrepancy
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT
 from tissuq.report.tables import Row, interval, known_number, significant
 from tissuq.report.writer import posterior_files
-from tissuq.studies.calibration import CalibrationStudy, Measured
+from tissuq.studies.calibration import CalibrationSettings, CalibrationStudy, Measured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,11 +68,10 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     """
     calibration, settings = study.calibration, study.settings
     copies, relocated = _copies(study, beside)
-    forward = relocated.get("forward")
     files = copies | _tables(study) | {"calibration.nc": calibration.save}
     if study.posterior is not None:
         files |= posterior_files({NoDiscrepancy.name: study.posterior})
-    model, runs = settings.forward_model.name, len(calibration.runs)
+    model, runs = study.forward.name, len(calibration.runs)
     has_discrepancy = calibration.problem.discrepancy.is_correlated
     inside_alone = calibration.predictive_coverage(discrepancy=False)
     alone = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
@@ -80,7 +82,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     ]
     inside = f"{calibration.predictive_coverage():.0%} of the measurements"
     return Result(
-        command=f"calibrate --forward {forward}" if forward else f"calibrate --umbridge {settings.umbridge}",
+        command=_repeated(settings.model_copy(update=relocated)),
         title="Parameters of an expensive forward model",
         subject=f"{len(study.data.control)} measurements · forward model {model} · {runs} runs · discrepancy "
         f"{settings.discrepancy}",
@@ -102,6 +104,20 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     )  # fmt: skip
 
 
+def _repeated(settings: CalibrationSettings) -> str:
+    """Return the command that repeats a run of stored settings, with what must be named again."""
+    words = []
+    if settings.forward:
+        words = ["--forward", settings.forward]
+    elif settings.umbridge:
+        words = ["--umbridge", settings.umbridge]
+    elif settings.command:
+        words = ["--command", settings.command]
+    for option, texts in (("--qoi", settings.quantities), ("--along", settings.along)):
+        words += [word for name, text in texts.items() if LAW.fullmatch(text) for word in (option, f"{name}={text}")]
+    return shlex.join(["calibrate", *words])
+
+
 def _next_step(study: CalibrationStudy) -> str:
     calibration = study.calibration
     if not calibration.converged:
@@ -120,6 +136,9 @@ def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict
     source = beside / study.settings.file
     copies: dict[str, Any] = {f"{INPUT}/{source.name}": source}
     relocated: dict[str, Any] = {"file": f"{INPUT}/{source.name}"}
+    if isinstance(study.forward, DeckForward):
+        of_model, relocated_model = _model_copies(study.forward, study.settings, beside)
+        return copies | of_model, relocated | relocated_model
     if study.settings.forward is None:
         return copies, relocated
     match, file = LAW.fullmatch(study.settings.forward), FileForward(study.settings.forward).file
@@ -127,6 +146,27 @@ def _copies(study: CalibrationStudy, beside: Path) -> tuple[dict[str, Any], dict
         copies[f"{INPUT}/{file.name}"] = file
         return copies, relocated | {"forward": f"{INPUT}/{file.name}:{match['name']}"}
     return copies, relocated | {"forward": study.settings.forward}
+
+
+def _model_copies(
+    forward: DeckForward, settings: CalibrationSettings, beside: Path
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the files of a finite-element model and of functions, and the settings that name their copies."""
+    deck, stored = forward.read_deck, f"{INPUT}/{MODEL}"
+    copies: dict[str, Any] = {f"{stored}/{name}": deck.root / name for name in deck.files}
+    copies |= {f"{stored}/{name}": file for name, file in extra_files(deck, forward.also, Path()).items()}
+    relocated: dict[str, Any] = {"model": f"{stored}/{deck.main}"}
+    places = [stored_place(deck, Path(file)) for file in forward.also]
+    relocated["also"] = [place if Path(place).is_absolute() else f"{INPUT}/{place}" for place in places]
+    for setting in ("quantities", "along"):
+        texts = dict(getattr(settings, setting))
+        for name, text in texts.items():
+            if match := LAW.fullmatch(located(text, beside)):
+                file = Path(match["path"])
+                copies[f"{INPUT}/{file.name}"] = file
+                texts[name] = f"{INPUT}/{file.name}:{match['name']}"
+        relocated[setting] = texts
+    return copies, relocated
 
 
 def _tables(study: CalibrationStudy) -> dict[str, Any]:
@@ -263,12 +303,37 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
     )
     priors = [[symbol, str(prior)] for symbol, prior in calibration.problem.priors.items()]
     blocks: list[Block] = [sentences, Table(["parameter", "prior"], priors, text_columns=(1,))]
+    if settings.prior_correlations:
+        named = (f"{pair.replace(',', ' and ')} {value:.2f}" for pair, value in settings.prior_correlations.items())
+        blocks.append(f"Correlations of priors (of log-normal ones: of the logarithms): {'; '.join(named)}.")
+    if study.prior_run is not None:
+        blocks.append(
+            f"These are the posterior of the run {Path(study.prior_run).name}, as normal and log-normal priors with "
+            "its means, sds and correlations; that run's discrepancy is left out."
+        )
+    if isinstance(study.forward, DeckForward):
+        blocks.append(_model_run(study.forward, study))
     if study.posterior is not None:
         blocks.append(
             f"The posterior of the material {study.posterior.model.material.name} is in posterior/none.nc: tissuq "
             "predict, export and structure take this run."
         )
     return tuple(blocks)
+
+
+def _model_run(forward: DeckForward, study: CalibrationStudy) -> tuple[str, ...]:
+    """Return how a finite-element model was run, and how its numbers became those of the file."""
+    settings, solver, data = study.settings, forward.program, study.data
+    ((name, quantity),) = settings.quantities.items()
+    controlled = "the time of the model" if forward.along is None else f"{next(iter(settings.along.values()))}"
+    return (
+        f"The material '{forward.replaced}' of {forward.read_deck.main} got the card of {forward.material} for every "
+        f"run. Solver: {solver.name}, `{solver.command or solver.template}`. Unit of stress of the model: "
+        f"{settings.unit} ({forward.cards.system.units}).",
+        f"{data.measured_label} of the file is {forward.factor:.6g} times {name} ({quantity}), {data.control_label} is "
+        f"{forward.along_factor:.6g} times {controlled}: units, signs and symmetry together. Between the increments of "
+        "the solver both are interpolated by monotone cubics.",
+    )
 
 
 def _lead(study: CalibrationStudy) -> str:

@@ -164,7 +164,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         subject=f"{count} specimens, {modes}, {measurements} measurements · discrepancy {settings.discrepancy}",
         numbers=_numbers(study),
         finding=_lead(study),
-        next_step="take a new patient into finite elements: tissuq export {run} --discrepancy new-patient",
+        next_step="take a new patient into finite elements: tissuq export, structure or ensemble {run}",
         picture=Picture(
             "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
         ),

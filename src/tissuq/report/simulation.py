@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tissuq.errors import InputError
+from tissuq.export.cards import origin_sentences
 from tissuq.finite_elements.response import CellFields, respond
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
@@ -314,6 +315,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         else ""
     )
     computed = (
+        *origin_sentences(simulation.ensembles[COMPLETE]),
         f"{draws} draws of the posterior, each stable in every loading mode over the measured range, each a complete "
         f"material including the discrepancy in the energy. Bulk modulus: {settings.bulk_ratio:g} times the draw's "
         "initial shear modulus.",

@@ -42,6 +42,7 @@ def calibrate(
     discrepancy: str | Discrepancy = "none",
     noise_sd: float | str | Mapping[str, float | str] = "unknown",
     zero_load: float = 0.0,
+    correlations: Mapping[tuple[str, str], float] | None = None,
     emulator: Emulator | None = None,
     workers: int = 1,
     folder: str | Path | None = None,
@@ -63,7 +64,7 @@ def calibrate(
     forward : callable or Forward
         ``forward(parameters)`` or ``forward(parameters, control)``, with a dictionary of parameters by name: returns n
         outputs; with several quantities control and outputs are dictionaries by their names. Or a
-        `tissuq.UmbridgeForward`.
+        `tissuq.UmbridgeForward`, or a `tissuq.DeckForward`.
     priors : mapping of str to Prior
         Of every parameter of the model: together they say where it is run. And, to replace the usual ones, of the
         discrepancy's ``c`` and ``psi`` and of ``noise_sd``.
@@ -74,6 +75,8 @@ def calibrate(
         Standard deviation of the noise.
     zero_load : float
         The control at zero load.
+    correlations : mapping of (str, str) to float, optional
+        Of the priors of pairs of the model's parameters, where these are normal or log-normal (then of logarithms).
     emulator : Emulator, optional
         That of an earlier calibration with the same model and controls, instead of new runs.
     workers : int
@@ -113,7 +116,7 @@ def calibrate(
     >>> bool(low < 1.5 < high), found.check.relative_error < 0.01
     (True, True)
     """
-    problem = pose(control, measured, priors, discrepancy, noise_sd, zero_load)
+    problem = pose(control, measured, priors, discrepancy, noise_sd, zero_load, correlations)
     unknown = set(choices) - {field.name for field in fields(EmulationSettings)}
     if unknown:
         names = ", ".join(field.name for field in fields(EmulationSettings))
@@ -165,7 +168,7 @@ def runs_of(model: Forward, problem: Problem, folder: str | Path | None, workers
         if folder is not None:
             _open(runs_folder, model, problem)
         try:
-            yield _Runs(model, problem, runs_folder, pool, step)
+            yield _Runs(model.prepared_in(runs_folder), problem, runs_folder, pool, step)
         except BaseException:
             _remove_if_fruitless(runs_folder, missing)
             raise

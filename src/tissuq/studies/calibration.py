@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.emulation import Calibration
+from tissuq.emulation import Calibration, Forward
 from tissuq.emulation.material_posterior import check_material
 from tissuq.errors import InputError
+from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
 from tissuq.posterior.posterior import Posterior
@@ -33,6 +35,8 @@ class Measured:
     measured: FloatArray
     control_label: str
     measured_label: str
+    units: tuple[str, str] = ("", "")
+    """Of both, where the file has them."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,12 @@ class CalibrationStudy:
     data: Measured
     calibration: Calibration
     seconds: float
+    forward: Forward
+    """What was run."""
     posterior: Posterior | None = None
     """That of the material in the forward model, where one is named."""
+    prior_run: str | None = None
+    """The run whose posterior the priors are."""
 
     @property
     def warnings(self) -> list[str]:
@@ -59,6 +67,7 @@ def run_calibration(
     runs_in: Path | None = None,
     workers: int = 1,
     step: Step = silent,
+    **running: Any,
 ) -> CalibrationStudy:
     """Read the file, run the model, and identify its parameters.
 
@@ -73,22 +82,28 @@ def run_calibration(
         Processes that run the model.
     step : callable
         Told of every run that is done.
+    **running
+        How a finite-element model is run: ``timeout``, ``retries``, ``keep``.
 
     Raises
     ------
     InputError, ModelError, ConvergenceError
         When file, settings or model cannot be used.
     """
+    prior_run = settings.prior_run
+    settings = with_priors_of_run(settings, folder)
     if settings.material is not None:
         check_material(settings.material, settings.parameter_priors, settings.unit)
     data = _read(settings, folder)
+    forward = settings.forward_model(folder, data.units, **running)
     start = perf_counter()
     names = ("discrepancy", "noise_sd", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
     calibration = calibrate(
         data.control,
         data.measured,
-        settings.forward_model,
+        forward,
         settings.parameter_priors,
+        correlations=settings.correlations,
         folder=runs_in,
         workers=workers,
         step=step,
@@ -99,14 +114,33 @@ def run_calibration(
         posterior = calibration.posterior_of(
             settings.material, settings.stretches, mode=settings.mode, unit=settings.unit
         )
-    return CalibrationStudy(settings, data, calibration, perf_counter() - start, posterior)
+    return CalibrationStudy(settings, data, calibration, perf_counter() - start, forward, posterior, prior_run)
+
+
+def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> CalibrationSettings:
+    """Return settings in which the posterior of a run stands as priors; what is stated of a parameter stays."""
+    from tissuq.studies.prior_of_run import priors_of_run
+
+    if settings.prior_run is None:
+        return settings
+    found, correlations = priors_of_run(folder / settings.prior_run, str(settings.material), settings.unit)
+    stated = settings.priors
+    pairs = {",".join(pair): value for pair, value in correlations.items() if not set(pair) & set(stated)}
+    changes = {
+        "priors": {symbol: prior.as_dict() for symbol, prior in found.items()} | stated,
+        "prior_correlations": pairs | settings.prior_correlations,
+        "prior_run": None,
+    }
+    return settings.model_copy(update=changes)
 
 
 def _read(settings: CalibrationSettings, folder: Path) -> Measured:
     table = read_table(folder / settings.file, settings.skip_rows, settings.sheet)
     columns = _places(table, (settings.control, settings.measured))
     control, measured = (column[:: settings.every] for column in table.numbers(columns))
-    return Measured(control, measured, *(_label(table, column_index) for column_index in columns))
+    control_label, measured_label = (_label(table, index) for index in columns)
+    units = declared_unit(table, columns[0]), declared_unit(table, columns[1])
+    return Measured(control, measured, control_label, measured_label, units)
 
 
 def _places(table: Table, requested: Sequence[str | int | None]) -> tuple[int, int]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import field_validator, model_validator
 
-from tissuq.studies.option import Settings, argument, option
-from tissuq.studies.option_texts import column, priors, sd_or_unknown
+from tissuq.studies.model_settings import ModelSettings
+from tissuq.studies.option import argument, option
+from tissuq.studies.option_texts import column, number_or_text, pairs_of, priors, sd_or_unknown
 from tissuq.studies.settings import positive_or_unknown
 from tissuq.studies.shared_options import seed
 
@@ -19,13 +20,17 @@ if TYPE_CHECKING:
 
 __all__ = ["CalibrationSettings"]
 
+OWN = "Your own finite-element model"
 NUMBER = r"\d+\.?\d*"
 RANGE = re.compile(rf"{NUMBER}:{NUMBER}")
 """Smallest and largest stretch."""
 
 
-class CalibrationSettings(Settings):
-    """Everything that a calibration depends on, in the units of the forward model."""
+class CalibrationSettings(ModelSettings):
+    """Everything that a calibration depends on, in the units of the forward model.
+
+    With ``model``, what was measured is in the units of the file.
+    """
 
     file: str = argument(
         ..., "CSV or Excel file with a column of controls and one of measured values.", takes=Path, parse=str
@@ -34,13 +39,51 @@ class CalibrationSettings(Settings):
         None, "Function of the model: file.py:function or package.module:function. Its code is run."
     )
     umbridge: str | None = option(None, "Instead: address of an UM-Bridge server, such as http://localhost:4242.")
-    model: str = option("forward", "Name of the model on that server.")
+    server_model: str = option("forward", "Name of the model on that server.")
+    model: str | None = option(
+        None, "Instead: your finite-element model, a deck as of tissuq ensemble.", takes=Path, parse=str, group=OWN
+    )
+    replaced: str | None = option(
+        None, "Name (ANSYS: number) of the material in it whose card follows the parameters.", name="replace", group=OWN
+    )
+    quantities: dict[str, str] = option(
+        default_factory=dict,
+        help="What was measured: NAME=RF3@SET and the like, as of tissuq ensemble.",
+        name="qoi",
+        parse=pairs_of("--qoi", "a quantity of interest", "NAME=WHAT, as in force=RF3@TOP"),
+        group=OWN,
+    )
+    along: dict[str, str] = option(
+        default_factory=dict,
+        help="What the controls are: NAME=U3@SET and the like [the time of the model].",
+        parse=pairs_of("--along", "what the controls are", "NAME=WHAT, as in depth=U3@TOP"),
+        group=OWN,
+    )
+    factors: dict[str, float] = option(
+        default_factory=dict,
+        help="What the model's value of --qoi or --along is multiplied with: NAME=-4 for the other sign and a quarter "
+        "of the body. Units of forces, lengths and stresses are converted without it.",
+        name="factor",
+        parse=pairs_of("--factor", "a factor", "NAME=NUMBER, as in force=-4", number_or_text),
+        group=OWN,
+    )
     priors: dict[str, dict[str, Any]] = option(
-        ...,
-        "Prior of a parameter in the model's units, such as C10=uniform(0.1,5); repeat for each.",
+        default_factory=dict,
+        help="Prior of a parameter in the model's units, such as C10=uniform(0.1,5); repeat for each.",
         name="prior",
         parse=priors,
-        min_length=1,
+    )
+    prior_correlations: dict[str, float] = option(
+        default_factory=dict,
+        help="Correlation of the priors of two parameters, normal or log-normal (then of logarithms): A,B=-0.5.",
+        name="prior-correlation",
+        parse=pairs_of("--prior-correlation", "a correlation", "A,B=NUMBER, as in mu1,alpha1=-0.5", number_or_text),
+    )
+    prior_run: str | None = option(
+        None,
+        "Run folder of tissuq fit: the priors of the parameters of --material are its posterior.",
+        takes=Path,
+        parse=str,
     )
     control: str | int | None = option(None, "Column of the control [the first of two].", parse=column)
     measured: str | int | None = option(None, "Column of the measured values [the second of two].", parse=column)
@@ -69,7 +112,6 @@ class CalibrationSettings(Settings):
     )
     range: str | None = option(None, "With --material: smallest and largest stretch, such as 0.7:1.3.")
     mode: str = option("uniaxial", "With --material: loading mode of the range.")
-    unit: str = option("MPa", "With --material: the model's unit of stress.")
     every: int = option(1, "Use only every N-th row.", ge=1)
     sheet: str | int | None = option(None, "Sheet of an Excel workbook, by name or number.", parse=column)
     skip_rows: int = option(0, "Lines to skip at the top of the file.", ge=0)
@@ -80,10 +122,27 @@ class CalibrationSettings(Settings):
     def _positive_or_unknown(cls, value: Any) -> Any:
         return positive_or_unknown(value, "the unit of the measured values")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _named_on_server(cls, values: Any) -> Any:
+        """Take the former name of the model on a server."""
+        if isinstance(values, dict) and values.get("umbridge") and values.get("model"):
+            return {name: value for name, value in values.items() if name != "model"} | {
+                "server_model": values["model"]
+            }
+        return values
+
     @model_validator(mode="after")
     def _one_model(self) -> Self:
-        if (self.forward is None) == (self.umbridge is None):
-            raise ValueError("give one forward model: a function in a file (forward) or a server (umbridge), not both")
+        if sum(source is not None for source in (self.forward, self.umbridge, self.model)) != 1:
+            raise ValueError("give one forward model: a function in a file (forward), a server (umbridge) or a deck "
+                             "(model)")  # fmt: skip
+        if not self.priors and self.prior_run is None:
+            raise ValueError("give the prior of every parameter of the model, as in C10=uniform(0.1, 5), or a run "
+                             "whose posterior they are (prior_run)")  # fmt: skip
+        if self.prior_run is not None and self.material is None:
+            raise ValueError("prior_run needs the law in the forward model (material), whose posterior it is")
+        self._check_deck()
         if (self.material is None) != (self.range is None):
             raise ValueError("material and range belong together: the law of the forward model, and its stretches, "
                              "such as 0.7:1.3")  # fmt: skip
@@ -91,18 +150,74 @@ class CalibrationSettings(Settings):
             raise ValueError(f"range must be the smallest and the largest stretch, such as 0.7:1.3, not {self.range!r}")
         return self
 
+    def _check_deck(self) -> None:
+        names = [*self.quantities, *self.along]
+        if self.model is None:
+            if named := [name for name in ("replaced", "quantities", "along", "factors") if getattr(self, name)]:
+                raise ValueError(f"{', '.join(named)} belong to a finite-element model: give it, too (model)")
+            return
+        missing = {"replaced": "--replace NAME", "quantities": "--qoi force=RF3@SET", "material": "--material LAW",
+                   "range": "--range 0.7:1.3"}  # fmt: skip
+        if lacking := [text for name, text in missing.items() if not getattr(self, name)]:
+            raise ValueError(f"a finite-element model needs {', '.join(lacking)}, too")
+        if len(self.quantities) != 1 or len(self.along) > 1:
+            raise ValueError("one quantity is calibrated: give one --qoi, and at most one --along")
+        if len(set(names)) < len(names):
+            raise ValueError(f"what was measured and its control are both called {names[0]}: rename one")
+        if unknown := [name for name in self.factors if name not in names]:
+            raise ValueError(f"factors are of {' and '.join(names)}, not of {', '.join(unknown)}")
+
     @property
     def stretches(self) -> tuple[float, float]:
         """The smallest and the largest stretch in the forward model."""
         low, high = str(self.range).split(":")
         return float(low), float(high)
 
-    @property
-    def forward_model(self) -> Forward:
-        """What is run."""
-        from tissuq.emulation import FileForward, UmbridgeForward
+    def forward_model(
+        self, beside: Path = Path(), units: tuple[str, str] = ("", ""), timeout: float | None = None, **running: Any
+    ) -> Forward:
+        """Return what is run.
 
-        return UmbridgeForward(self.umbridge, self.model) if self.umbridge else FileForward(str(self.forward))
+        Parameters
+        ----------
+        beside : Path
+            Where the files of a finite-element model lie, unless their names are absolute.
+        units : (str, str)
+            Of control and measured values in the file; empty where it does not say, which is refused for quantities
+            that have a unit in a finite-element model.
+        timeout, **running
+            How a finite-element model is run: fields of `tissuq.DeckForward`.
+        """
+        from tissuq.decks.quantity import located
+        from tissuq.emulation import DeckForward, FileForward, UmbridgeForward
+        from tissuq.emulation.deck_units import conversion
+
+        if self.umbridge:
+            return UmbridgeForward(self.umbridge, self.server_model)
+        if self.model is None:
+            return FileForward(str(self.forward))
+        ((name, quantity),) = self.quantities.items()
+        controlled, along = next(iter(self.along.items()), ("", None))
+        cards = self.card_settings()
+        return DeckForward(
+            beside / self.model,
+            str(self.replaced),
+            str(self.material),
+            located(quantity, beside),
+            self.stretches,
+            along=None if along is None else located(along, beside),
+            factor=self.factors.get(name, 1.0) * conversion(quantity, cards, units[1]),
+            along_factor=self.factors.get(controlled, 1.0) * (conversion(along, cards, units[0]) if along else 1.0),
+            mode=self.mode,
+            solver=self.solver,
+            command=self.command,
+            deck=self.deck,
+            card_format=self.card_format,
+            cards=cards,
+            also=tuple(str((beside / file).absolute()) for file in self.also),
+            timeout=timeout,
+            **running,
+        )
 
     @property
     def parameter_priors(self) -> dict[str, Prior]:
@@ -110,3 +225,9 @@ class CalibrationSettings(Settings):
         from tissuq.parameters.priors import prior_from
 
         return {symbol: prior_from(prior) for symbol, prior in self.priors.items()}
+
+    @property
+    def correlations(self) -> dict[tuple[str, str], float]:
+        """Of the priors of pairs of parameters."""
+        pairs = {pair.partition(","): value for pair, value in self.prior_correlations.items()}
+        return {(first.strip(), second.strip()): value for (first, _, second), value in pairs.items()}

@@ -10,7 +10,7 @@ from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.option_texts import priors, tolerances
 from tissuq.studies.shared_options import seed
 
-__all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "TissueOptions"]
+__all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions"]
 
 NoiseKnown = tuple[Literal["known", "unknown"], ...]
 NOISE = "known or unknown to the fits."
@@ -95,3 +95,27 @@ class TissueOptions(Settings):
         parse=tolerances,
     )
     predictions: int = option(12, "Predictions at most of a set and protocol.", ge=1)
+
+
+class StructureStudyOptions(Settings):
+    """A campaign on the force of structures whose law is known to us."""
+
+    truths: tuple[str, ...] = option(
+        ("gent", "ogden"), "Law of the truth; repeat for more.", name="truth", min_length=1
+    )
+    structures: tuple[str, ...] = option(
+        ("bar", "indentation"), "Structure; repeat for more [bar, indentation].", name="structure", min_length=1
+    )
+    replicates: int = option(60, "Sets of tests of every law.", ge=1, le=100_000)
+    modes: tuple[str, ...] = option(
+        ("uniaxial", "planar"), "Loading mode of a test; repeat for more [uniaxial, planar].", name="mode", min_length=1
+    )
+    low: float = option(0.8, "Smallest stretch of uniaxial tests.", ge=0.3, lt=1)
+    high: float = option(1.25, "Largest stretch of all tests.", gt=1, le=1.3)
+    points: int = option(24, "Measurements of a test.", name="measurements", ge=6, le=10_000)
+    noise: float = option(0.01, "Noise over the largest stress of a test.", name="noise-share", gt=0, le=0.5)
+    estimand: str = option("specimen", "Whose errors of tests are simulated and told to the fits, as of tissuq fit.")
+    draws: int = option(64, "Draws of a posterior.", ge=8)
+    full_runs: int | None = option(8, "Draws computed in full; the others follow to first order, much faster.", ge=4)
+    steps: int = option(2, "Steps of the force.", ge=1)
+    seed: int = seed()

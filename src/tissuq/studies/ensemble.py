@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -16,15 +16,16 @@ if TYPE_CHECKING:
 
 from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
+from tissuq.decks.model_files import MODEL, extra_files
 from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out, sets_of
+from tissuq.decks.quantity import located
 from tissuq.errors import InputError
 from tissuq.export import Cards, card_format
 from tissuq.finite_elements.simulation import COMPLETE, MATERIAL_ONLY
 from tissuq.mechanics import Material
-from tissuq.mechanics.user_law import LAW
 from tissuq.posterior.ensemble import Ensemble
 from tissuq.studies.earlier_run import load
-from tissuq.studies.ensemble_files import DRAWS, MODEL, extra_files
+from tissuq.studies.ensemble_files import DRAWS
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
 
@@ -256,9 +257,4 @@ def _check_functions(quantities: tuple[Quantity, ...]) -> None:
 
 
 def _quantity(name: str, text: str, beside: Path) -> Quantity:
-    quantity = parse_quantity(name, text)
-    if isinstance(quantity, FunctionQuantity):
-        match = LAW.fullmatch(quantity.location)
-        assert match is not None  # noqa: S101 (it is one)
-        return replace(quantity, location=f"{(beside / match['path']).absolute()}:{match['name']}")
-    return quantity
+    return parse_quantity(name, located(text, beside))

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from tissuq.studies.option import Settings, argument, option
+from tissuq.studies.model_settings import ModelSettings
+from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import pairs_of
 from tissuq.studies.shared_options import sampling, seed
-
-if TYPE_CHECKING:
-    from tissuq.export import CardSettings
 
 __all__ = ["EnsembleSettings"]
 
 
-class EnsembleSettings(Settings):
+class EnsembleSettings(ModelSettings):
     """Everything that the results of an ensemble depend on.
 
     ``materials`` has the folder of a run for each material of the model, ``quantities`` what each quantity is.
@@ -43,39 +39,9 @@ class EnsembleSettings(Settings):
         parse=pairs_of("--qoi", "a quantity of interest", "NAME=WHAT, as in force=RF3@TOP"),
         min_length=1,
     )
-    solver: str | None = option(None, "ccx, febio4 or command [that of the deck].")
-    command: str = option("", "Command of the solver, such as 'abaqus job={job} ask=off', {deck} with suffix.")
-    deck: str | None = option(None, "abaqus, febio, ls-dyna or ansys [what the file is].")
-    card_format: str | None = option(None, "Format of cards [that of the solver].", name="format")
     discrepancy: str | None = option(None, "Which of the discrepancies of the run [auto, or the only one].")
     draws: int = option(64, "Draws of the posterior.", ge=2)
     sampling: str = sampling()
     all_draws: bool = option(False, "Keep draws that are not stable over the measured range.")
     shares: bool = option(True, "Run the draws without their discrepancy, too, for the shares of the variance.")
-    law: str | None = option(None, "Law of the cards, as of tissuq export.")
-    order: int | None = option(None, "Order or number of terms of that law.")
-    unit: str = option("MPa", "Unit of stress of the model: MPa, kPa or Pa.")
-    bulk_modulus: float | None = option(
-        None, "In that unit, of all draws [1000 times the mean initial shear modulus].", gt=0, lt=inf
-    )
-    poisson: float | None = option(None, "Instead: Poisson's ratio of all draws.")
-    also: list[str] = option(
-        default_factory=list,
-        help="Another file that the solver needs beside the deck; repeat for more.",
-        takes=list[Path],
-        parse=lambda files: list(map(str, files)),
-    )
     seed: int = seed()
-
-    def card_settings(self, **changes: Any) -> CardSettings:
-        """Return the settings of the cards.
-
-        Raises
-        ------
-        InputError
-            When they have no meaning.
-        """
-        from tissuq.export import CardSettings
-
-        names = "law", "order", "unit", "bulk_modulus", "poisson"
-        return CardSettings(**{name: getattr(self, name) for name in names}, **changes)

@@ -1,0 +1,223 @@
+"""A user's finite-element model as forward model: its material's card for every parameter value, and what it gives."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.decks import Deck, Quantity, Solver, parse_quantity, solver_for
+from tissuq.decks.model_files import MODEL, copy_model, extra_files
+from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out, sets_of
+from tissuq.decks.quantity import Component, Curve
+from tissuq.emulation.forward import Forward, UnreadableError
+from tissuq.emulation.material_posterior import card_material
+from tissuq.errors import ConvergenceError, InputError
+from tissuq.export import CardSettings, card_format
+from tissuq.mechanics import Material, material_named
+
+__all__ = ["DeckForward"]
+
+FloatArray = NDArray[np.float64]
+
+SOLVED = "solver"
+"""Folder with a folder for each run of the solver."""
+PLACES = 16
+"""Digits of a digest that name the folder of a run."""
+
+
+@dataclass(frozen=True)
+class DeckForward(Forward):
+    """A deck of which one material's card follows the parameters, as `tissuq ensemble` runs it.
+
+    Its output at a control is the quantity there: its curve over the time of the model, or over another quantity, from
+    increment to increment (monotone cubics; forces and displacements begin at zero).
+
+    Parameters
+    ----------
+    model : str or Path
+        The deck: CalculiX or Abaqus (.inp), FEBio (.feb), LS-DYNA (.k), ANSYS (.cdb).
+    replaced : str
+        Name (ANSYS: number) of the material in it.
+    material : str
+        The law, all parameters of which are calibrated under their names.
+    quantity : str
+        What was measured, such as ``RF2@PUNCH`` (`tissuq.decks.parse_quantity`).
+    stretch : (float, float)
+        Smallest and largest stretch in the model, over which the law's card is to hold where it is a projection.
+    along : str, optional
+        What the controls are, such as ``U2@PUNCH``; the time of the model, unless given.
+    factor, along_factor : float
+        What quantity and controls of the model are multiplied with to be those of the file: signs, symmetry, units.
+    mode : str
+        Loading mode of that stretch.
+    solver, command, deck, card_format : str, optional
+        As of `tissuq ensemble`: those of the deck, unless given.
+    cards : CardSettings
+        Unit of stress and bulk modulus of the model, law of the cards.
+    also : tuple of str
+        Other files that the solver needs beside the deck.
+    timeout : float, optional
+        Seconds after which a run is stopped.
+    retries : int
+        Times that a run which failed is made again.
+    keep : bool
+        Keep the solver's files of every run.
+    folder : Path, optional
+        Where it is run; `prepared_in` sets it.
+
+    Examples
+    --------
+    >>> import tissuq as tq
+    >>> punch = tq.DeckForward("indentation.inp", "TISSUE", "ogden-1", "RF2@PUNCH", (0.7, 1.2), along="U2@PUNCH",
+    ...                        factor=-180, along_factor=-1)
+    >>> found = tq.calibrate(depth, force, punch, priors, folder="runs/punch")  # doctest: +SKIP
+    """
+
+    model: str | Path
+    replaced: str
+    material: str
+    quantity: str
+    stretch: tuple[float, float]
+    along: str | None = None
+    factor: float = 1.0
+    along_factor: float = 1.0
+    mode: str = "uniaxial"
+    solver: str | None = None
+    command: str = ""
+    deck: str | None = None
+    card_format: str | None = None
+    cards: CardSettings = field(default_factory=CardSettings)
+    also: tuple[str, ...] = ()
+    timeout: float | None = None
+    retries: int = 0
+    keep: bool = False
+    folder: Path | None = None
+
+    @cached_property
+    def read_deck(self) -> Deck:
+        """The deck with the files that it includes."""
+        return Deck.read(self.model, self.deck, {Path(name).absolute() for name in self.also})
+
+    @cached_property
+    def program(self) -> Solver:
+        """The solver."""
+        return solver_for(self.read_deck.format.name, self.solver, self.command)
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What was measured, and what the controls are where that is not the time."""
+        controls = () if self.along is None else (parse_quantity("along", self.along),)
+        return (parse_quantity("quantity", self.quantity), *controls)
+
+    @property
+    def law(self) -> Material:
+        """The law of the material."""
+        return material_named(self.material)
+
+    @property
+    def identity(self) -> str:
+        deck = self.read_deck
+        extra = extra_files(deck, self.also, Path())
+        contents = [(name, sha256(text).hexdigest()) for name, text in sorted(deck.files.items())]
+        contents += [(name, sha256(file.read_bytes()).hexdigest()) for name, file in sorted(extra.items())]
+        asked = [quantity.identity for quantity in self.quantities], self.factor, self.along_factor
+        of_card = self.material, self.stretch, self.mode, self.card_format, self.cards
+        everything = (
+            contents,
+            self.replaced.upper(),
+            asked,
+            of_card,
+            self.program.name,
+            self.program.words("job", "deck"),
+        )
+        return f"{deck.main}:{self.replaced} {sha256(repr(everything).encode()).hexdigest()[:PLACES]}"
+
+    def check(self, symbols: Sequence[str]) -> None:
+        wanted = [parameter.symbol for parameter in self.law.parameters]
+        if set(symbols) != set(wanted):
+            raise InputError(
+                f"the material {self.law.name} in the model has the parameters {', '.join(wanted)}; those with priors "
+                f"are {', '.join(symbols)}."
+            )
+        if not self.law.is_isotropic:
+            raise InputError(f"material '{self.law.name}' has fibres, and cards are of isotropic ones: name another.")
+        self.read_deck.material(self.replaced)
+        self.program.check_installed()
+        extra_files(self.read_deck, self.also, Path())
+        for quantity in self.quantities:
+            quantity.check()
+        sets_of(self.read_deck, self.quantities)
+        if not (np.isfinite(self.factor) and self.factor and np.isfinite(self.along_factor) and self.along_factor):
+            raise InputError("a factor of a quantity must be a number other than zero.")
+
+    def prepared_in(self, folder: Path) -> DeckForward:
+        copy_model(self.read_deck, self.also, Path(), folder)
+        for unfinished in (folder / SOLVED).glob(f"{SCRATCH}*"):  # of a process that was killed
+            shutil.rmtree(unfinished, ignore_errors=True)
+        return replace(self, folder=folder.absolute())
+
+    def run(self, parameters: Mapping[str, float], control: FloatArray) -> FloatArray:
+        assert self.folder is not None  # noqa: S101 (where it is run, it is prepared)
+        deck = self.read_deck
+        block = self._block(parameters)
+        place = sha256(repr((block, sorted(parameters.items()))).encode()).hexdigest()[:PLACES]
+        task = ModelRun(
+            "run", 0, self.folder / MODEL, deck.main, deck.format.name, ((self.replaced, block),), self.program,
+            self.quantities, (), self.folder / SOLVED / f"run-{place}", self.timeout, self.retries,
+        )  # fmt: skip
+        result = carried_out(task)
+        if result["misread"] and not result["problem"]:
+            raise UnreadableError(result["misread"])
+        if not (self.keep or result["problem"]):
+            shutil.rmtree(task.folder, ignore_errors=True)
+        return self._at(control, result["curves"], str(result["problem"]))
+
+    def _block(self, parameters: Mapping[str, float]) -> str:
+        """Return the card of the material with parameters in the unit of the model."""
+        law, number = self.law, self.read_deck.material(self.replaced).number
+        in_mpa = {p.symbol: parameters[p.symbol] / (self.cards.factor if p.unit else 1.0) for p in law.parameters}
+        drawn = card_material(law, tuple(in_mpa.values()), self.stretch, self.mode)
+        name = self.card_format or self.program.card_format or self.read_deck.format.card_format
+        settings = replace(self.cards, number=int(number) if number.isdecimal() else 1)
+        blocks = card_format(name).cards(drawn, settings).blocks
+        if not blocks:
+            raise UnreadableError(f"cards of the format '{name}' do not go into a deck.")
+        return blocks[0]
+
+    def _at(self, control: FloatArray, curves: Mapping[str, Any], problem: str) -> FloatArray:
+        """Return the quantity at the controls."""
+        from scipy.interpolate import PchipInterpolator
+
+        quantity, *controls = (
+            self._from_rest(kind, Curve(*map(np.asarray, curves.get(name, ([], [])))))
+            for name, kind in zip(("quantity", "along"), self.quantities, strict=False)
+        )
+        count = min(len(curve.times) for curve in (quantity, *controls))
+        along = self.along_factor * (controls[0].values if controls else quantity.times)[:count]
+        values = self.factor * quantity.values[:count]
+        reached = float(along[-1]) if count else 0.0
+        if count < 2 or reached < control.max() * (1 - 1e-9):
+            why = f"{problem}; " if problem else ""
+            raise ConvergenceError(f"{why}the control came to {reached:.4g}, and {control.max():.4g} was measured")
+        if (np.diff(along) <= 0).any() or control.min() < along[0]:
+            raise UnreadableError(
+                f"the control of the model goes from {along[0]:.4g} to {reached:.4g}, and must rise from the smallest "
+                f"measured one, {control.min():.4g}, or below to the largest: give the sign, as --factor NAME=-1."
+            )
+        return np.asarray(PchipInterpolator(along, values)(np.minimum(control, reached)))
+
+    @staticmethod
+    def _from_rest(quantity: Quantity, curve: Curve) -> Curve:
+        """Return a curve with its beginning at rest, where that is known."""
+        is_known = isinstance(quantity, Component) and quantity.kind in ("U", "RF")
+        if not is_known or not len(curve.times) or curve.times[0] <= 0:
+            return curve
+        return Curve(np.concatenate([[0.0], curve.times]), np.concatenate([[0.0], curve.values]))

@@ -1,0 +1,152 @@
+"""A campaign as small tasks: a set of tests, its fit and an oracle's, and the bands of the forces of structures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.errors import TissuqError
+from tissuq.finite_elements.response import respond
+from tissuq.finite_elements.simulation import COMPLETE, simulate
+from tissuq.finite_elements.spread import PROBABILITY, band_of
+from tissuq.mechanics import material_named
+from tissuq.posterior.fitting import fit
+from tissuq.posterior.posterior import Posterior
+from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES, StructureStudySettings
+from tissuq.validation.structures.simulated_tests import simulated_tests
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["DEFAULT", "ORACLE", "StructureTask", "carry_out", "run_structures", "summarise_structures", "tasks_of"]
+
+DEFAULT, ORACLE = "default", "oracle"
+"""The fit as it is unless anything is said, and one that knows the law."""
+
+
+@dataclass(frozen=True)
+class StructureTask:
+    """A set of tests of one truth."""
+
+    truth: str
+    replicate: int
+
+    @property
+    def key(self) -> str:
+        """What tells it from every other task of the campaign."""
+        return f"{self.truth}/{self.replicate}"
+
+    @property
+    def label(self) -> str:
+        """What is shown while it is carried out."""
+        return f"{self.truth}, tests {self.replicate + 1}"
+
+
+def tasks_of(settings: StructureStudySettings) -> list[StructureTask]:
+    """Return all tasks of a campaign, every truth's first before any second."""
+    return [StructureTask(truth, number) for number in range(settings.replicates) for truth in settings.truths]
+
+
+def run_structures(
+    settings: StructureStudySettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
+) -> list[dict[str, Any]]:
+    """Carry out what is not done yet of a campaign, and return the results of all tasks, in their order.
+
+    Parameters
+    ----------
+    settings : StructureStudySettings
+    folder : Path
+        Exists; holds the results so far, if any.
+    pool : Executor, optional
+        Workers from `tissuq.studies.stream.open_pool`.
+    step : callable
+        Told of every task that is done: its label, and whether it was done now or before.
+    """
+    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
+
+
+def carry_out(settings: StructureStudySettings, task: StructureTask) -> dict[str, Any]:
+    """Return true forces (N) and bands of the structures for a set of tests; ``failure`` says why there are none."""
+    truth = KNOWN_LAWS[task.truth]
+    tests = simulated_tests(settings, truth, [settings.seed, list(KNOWN_LAWS).index(task.truth), task.replicate])
+    row: dict[str, Any] = {"truth": task.truth, "replicate": task.replicate, "failure": "", "structures": {}}
+    try:
+        fits = {
+            DEFAULT: fit(tests, tolerances=settings.tolerances),
+            ORACLE: fit(
+                tests, tolerances=settings.tolerances, material=truth.material, discrepancy="none", priors=truth.priors
+            ),
+        }
+        for name in settings.structures:
+            force = _true_force(name, task.truth)
+            bands = {kind: _band(settings, name, posterior) for kind, posterior in fits.items()}
+            row["structures"][name] = {"force": force, **bands}
+    except TissuqError as error:
+        row["failure"] = str(error)
+    return row
+
+
+@lru_cache
+def _true_force(structure: str, truth: str) -> float:
+    """Return the force of a structure of a known law at the end, N."""
+    law = KNOWN_LAWS[truth]
+    return float(respond(STRUCTURES[structure], material_named(law.material), law.values, steps=4).force[-1])
+
+
+def _band(settings: StructureStudySettings, structure: str, posterior: Posterior) -> dict[str, float]:
+    """Return mean, sd and 95 % band of the force at the end, N, and the error of first order in a draw."""
+    found = simulate(
+        posterior, STRUCTURES[structure], settings.draws, steps=settings.steps, seed=settings.seed, check_mesh=False,
+        shares=False, full_runs=settings.full_runs,
+    )  # fmt: skip
+    forces = found.forces[COMPLETE][:, -1]
+    band = band_of(forces[np.isfinite(forces), None])
+    error = found.first_order_error.get(COMPLETE)
+    return {
+        **{name: float(getattr(band, name)[0]) for name in ("mean", "sd", "low", "high")},
+        "completed": int(np.isfinite(forces).sum()),
+        "first_order_error": 0.0 if error is None or not np.isfinite(error[-1]) else float(error[-1]),
+    }
+
+
+def summarise_structures(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Return a row for each truth and structure.
+
+    Columns truth, structure, replicates (that did not fail), failed, inside (share of bands that hold the true force),
+    inside_error (its standard error), oracle_inside, half_width (median, over the true force), width_ratio (median of
+    the band's width over the oracle's), and error (median distance of the mean from the truth, over the truth).
+    """
+    import pandas as pd
+
+    rows = []
+    names = dict.fromkeys((row["truth"], structure) for row in results for structure in row["structures"])
+    for truth, structure in names:
+        of_truth = [row for row in results if row["truth"] == truth]
+        found = [row["structures"][structure] for row in of_truth if structure in row["structures"]]
+        force = np.array([each["force"] for each in found])
+        default, oracle = (
+            {name: np.array([each[kind][name] for each in found]) for name in ("mean", "low", "high")}
+            for kind in (DEFAULT, ORACLE)
+        )
+        inside, oracle_inside = ((each["low"] <= force) & (force <= each["high"]) for each in (default, oracle))
+        width, oracle_width = (each["high"] - each["low"] for each in (default, oracle))
+        count = len(found)
+        share = (inside.sum() + 1) / (count + 2)  # so that the error of 0 or 100 % is not zero
+        rows.append({
+            "truth": truth, "structure": structure, "replicates": count, "failed": len(of_truth) - count,
+            "inside": inside.mean(), "inside_error": np.sqrt(share * (1 - share) / count),
+            "oracle_inside": oracle_inside.mean(), "half_width": np.median(width / 2 / force),
+            "width_ratio": np.median(width / oracle_width), "error": np.median(np.abs(default["mean"] / force - 1)),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+NOMINAL = PROBABILITY
+"""Share of the bands that are to hold the truth."""

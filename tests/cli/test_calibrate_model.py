@@ -1,0 +1,195 @@
+"""``tissuq calibrate --model``: a deck as forward model, with a program in the place of CalculiX."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+from .conftest import run_in, write_specimen
+from .models import rows_of, started, write_model
+
+TIMES = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0])
+TRUTH, NOISE_SD = 3.0, 0.1
+PATIENCE_S = 120.0
+
+
+def forces(folder: Path) -> tuple[float, float]:
+    """Write a file of the force at times, mN; return mean and sd of C10 by least squares: the force is C10 t."""
+    measured = TRUTH * TIMES + NOISE_SD * np.random.default_rng(3).standard_normal(len(TIMES))
+    rows = "".join(f"{at:.3f},{force:.6f}\n" for at, force in zip(TIMES, measured, strict=True))
+    (folder / "punch.csv").write_text(f"time,force (mN)\n{rows}")
+    return float(TIMES @ measured / (TIMES @ TIMES)), float(NOISE_SD / np.sqrt(TIMES @ TIMES))
+
+
+@pytest.fixture
+def words(here):
+    """What is typed after ``tissuq``: the stub's force, of a model in kPa (mm, mN)."""
+    command = write_model(here)
+    return [
+        "calibrate", "punch.csv", "--model", "model.inp", "--replace", "TISSUE", "--material", "neo-hookean",
+        "--range", "0.7:1.3", "--qoi", "force=RF2@TOP", "--solver", "ccx", "--command", command, "--unit", "kPa",
+        "--noise-sd", NOISE_SD, "--runs", 8, "--max-jobs", 1, "--no-figures", "--out", "out",
+    ]  # fmt: skip
+
+
+WIDE = ["--prior", "C10=uniform(0.5,10)"]
+
+
+def c10(folder: Path) -> tuple[float, float]:
+    """Return mean and sd of C10 in a run."""
+    rows = {row["parameter"]: row for row in json.loads((folder / "summary.json").read_text())}
+    return rows["C10"]["mean"], rows["C10"]["sd"]
+
+
+def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, here, words):
+    mean, sd = forces(here)
+    said = cli(*words, *WIDE)
+    assert said.status == 0, said.err
+    found = c10(here / "out")
+    assert found[0] == pytest.approx(mean, abs=0.05 * sd)
+    assert found[1] == pytest.approx(sd, rel=0.03)
+    assert len(started(here)) == 8
+    said = cli("export", "out", "--format", "calculix", "--draws", 64, "--unit", "kPa", "--out", "cards")
+    assert said.status == 0, said.err
+    constants = [float(row["card_C10"]) for row in rows_of(here / "cards" / "index.csv")]
+    assert np.mean(constants) == pytest.approx(mean, abs=0.2 * sd)
+    page = (here / "out" / "report.html").read_text(encoding="utf-8")
+    assert "got the card of neo-hookean" in page
+
+
+@pytest.mark.parametrize(("heading", "factor"), [("force (N)", 1e-3), ("force (uN)", 1e3)])
+def test_units_signs_and_symmetry_are_made_those_of_the_file(cli, here, words, heading, factor):
+    mean, sd = forces(here)
+    table = np.loadtxt(here / "punch.csv", delimiter=",", skiprows=1)
+    rows = "".join(f"{at:.3f},{-4 * factor * force:.9g}\n" for at, force in table)
+    (here / "punch.csv").write_text(f"time,{heading}\n{rows}")
+    changed = [4 * factor * NOISE_SD if word == NOISE_SD else word for word in words]
+    assert cli(*changed, *WIDE, "--factor", "force=-4").status == 0
+    assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
+
+
+def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
+    mean, sd = forces(here)
+    (here / "stiff").write_text("8")
+    said = cli(*words, *WIDE, "--runs", 12)
+    assert said.status == 0, said.err
+    runs = rows_of(here / "out" / "forward_runs.csv")
+    assert all(bool(run["error"]) == (float(run["C10"]) > 8) for run in runs)
+    assert sum(bool(run["error"]) for run in runs) >= 2
+    assert "increment size smaller than minimum; the control came to 0.5" in next(
+        r["error"] for r in runs if r["error"]
+    )
+    assert "increment size smaller than minimum" in " ".join(said.out.split())
+    assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
+def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, words):
+    forces(here)
+    (here / "slow").write_text("0.3")
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from tissuq.cli import main; main()", *map(str, words), *WIDE],
+        cwd=here, env=dict(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    results, deadline = here / "out-forward-runs" / "batch-0" / "tasks.jsonl", time.monotonic() + PATIENCE_S
+    while not results.exists() or results.read_text(encoding="utf-8").count("\n") < 3:
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    done = results.read_text(encoding="utf-8").splitlines()[:3]
+    (here / "slow").unlink()
+    before = len(started(here))
+    said = cli(*words, *WIDE)
+    assert said.status == 0, said.err
+    assert results.read_text(encoding="utf-8").splitlines()[:3] == done
+    assert 3 <= before <= 4 + 1
+    assert len(started(here)) - before <= 8 - 3
+    assert not list((here / "out-forward-runs" / "solver").glob(".running-*"))
+    again = cli(*words[:-2], *WIDE, "--runs-in", "out-forward-runs", "--out", "whole")
+    assert again.status == 0, again.err
+    assert (here / "whole" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
+    assert len(started(here)) - before <= 8 - 3
+
+
+def test_the_posterior_of_simple_tests_is_the_prior(tmp_path):
+    """Normal prior and likelihood: precisions add up. The log-normal prior, 1 % wide, is nearly normal."""
+    write_specimen(tmp_path / "specimen.csv")
+    options = ["--noise-sd", 1, "--discrepancy", "none", "--tolerance", "none", "--no-figures", "--out", "fitted"]
+    assert run_in(tmp_path, "fit", "specimen.csv", *options).status == 0
+    before = tq.load(tmp_path / "fitted").marginals["C10"]  # MPa
+    centre = 1e3 * before.mean
+    measured = centre * 1.01 * TIMES
+    (tmp_path / "punch.csv").write_text(
+        "time,force (mN)\n" + "".join(f"{at},{force:.6f}\n" for at, force in zip(TIMES, measured, strict=True))
+    )
+    noise_sd = 1e3 * before.sd * np.sqrt(TIMES @ TIMES)  # as informative as the prior
+    said = run_in(
+        tmp_path, "calibrate", "punch.csv", "--model", "model.inp", "--replace", "TISSUE", "--material", "neo-hookean",
+        "--range", "0.7:1.3", "--qoi", "force=RF2@TOP", "--command", write_model(tmp_path), "--solver", "ccx",
+        "--unit", "kPa", "--prior-run", "fitted", "--noise-sd", noise_sd, "--runs", 8, "--max-jobs", 1, "--no-figures",
+        "--out", "out",
+    )  # fmt: skip
+    assert said.status == 0, said.err
+    mean, sd = c10(tmp_path / "out")
+    assert sd == pytest.approx(1e3 * before.sd / np.sqrt(2), rel=0.05)
+    assert mean == pytest.approx(1.005 * centre, abs=0.1 * sd)
+    assert "the posterior of the run fitted" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_run_is_repeated_from_its_own_folder_when_its_command_is_named(cli, here, words):
+    forces(here)
+    assert cli(*words, *WIDE).status == 0
+    repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--no-figures", "--out", "again"]
+    said = cli(*repeat)
+    assert said.status == 2
+    assert "--command" in said.err
+    assert len(started(here)) == 8
+    said = cli(*repeat, "--command", words[words.index("--command") + 1])
+    assert said.status == 0, said.err
+    assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "more", "told", "runs"),
+    [
+        ({"model.inp": "none.inp"}, [], ["none.inp", "cannot be read"], 0),
+        ({"TISSUE": "Muscle"}, [], ["no material 'Muscle'", "Tissue, Fat"], 0),
+        ({"force=RF2@TOP": "force=RF9@TOP"}, [], ["not a quantity"], 0),
+        ({"force=RF2@TOP": "force=RF2@BASE"}, [], ["RF2@BASE:sum is not in the results"], 1),
+        ({"neo-hookean": "yeoh"}, [], ["calibrated without C20"], 0),
+        ({}, ["--factor", "depth=-1"], ["factors are of force"], 0),
+        ({}, ["--qoi", "more=RF1@TOP"], ["give one --qoi"], 0),
+        ({}, ["--forward", "f.py:f"], ["give one forward model"], 0),
+        ({}, ["--along", "depth=U2@TOP"], ["in which unit the length is"], 0),
+        ({}, ["--prior-correlation", "C10,x=0.5"], ["two parameters of the model"], 0),
+        ({}, ["--prior-run", "nowhere"], ["no run folder 'nowhere'"], 0),
+    ],
+)
+def test_what_cannot_be_used_gets_one_message(cli, here, words, changes, more, told, runs):
+    forces(here)
+    said = cli(*(changes.get(word, word) for word in words), *WIDE, *more)
+    assert said.status == 2, said.out
+    assert "Traceback" not in said.err
+    assert all(word in " ".join(said.err.split()) for word in told), said.err
+    assert len(started(here)) == runs
+    assert not (here / "out").exists()
+
+
+def test_a_force_without_a_unit_is_refused(cli, here, words):
+    forces(here)
+    (here / "punch.csv").write_text((here / "punch.csv").read_text().replace("force (mN)", "force"))
+    said = cli(*words, *WIDE)
+    assert (said.status, "as in force [mN]" in said.err) == (2, True)
+    assert not started(here)

@@ -1,0 +1,123 @@
+"""A deck of CalculiX as forward model: the posterior against one by brute force, on a grid of runs of CalculiX."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+import tissuq as tq
+
+pytestmark = [
+    pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed: make system"),
+    pytest.mark.finite_elements,
+]
+
+DEPTH = np.linspace(0.05, 0.3, 8)
+TRUTH = {"mu1": 0.0015, "alpha1": -9.0}
+NOISE_SD = 2e-3
+"""N, a hundredth of the largest force."""
+PRIORS = {"mu1": tq.Uniform(0.0008, 0.003), "alpha1": tq.Uniform(-16.0, -3.0)}
+GRID = 11
+
+
+def write_block(path):
+    """Write a quarter of a block 2 x 2 x 1 mm of eight elements, bonded to plates, compressed by 30 %: mm, N, MPa."""
+    places = np.linspace(0, 1, 5)
+    numbers, lines = {}, ["*NODE, NSET=ALL"]
+    for i, j, k in product(range(5), repeat=3):
+        if (i % 2) + (j % 2) + (k % 2) < 2:
+            numbers[i, j, k] = len(numbers) + 1
+            lines.append(f"{numbers[i, j, k]}, {places[i]}, {places[j]}, {places[k]}")
+    corners = [(0, 0), (2, 0), (2, 2), (0, 2)]
+    middles = [(1, 0), (2, 1), (1, 2), (0, 1)]
+    lines.append("*ELEMENT, TYPE=C3D20R, ELSET=BLOCK")
+    for number, (i, j, k) in enumerate(product((0, 2), repeat=3), start=1):
+        of = [(a, b, 0) for a, b in corners] + [(a, b, 2) for a, b in corners]
+        of += [(a, b, 0) for a, b in middles] + [(a, b, 2) for a, b in middles] + [(a, b, 1) for a, b in corners]
+        nodes = [str(numbers[i + a, j + b, k + c]) for a, b, c in of]
+        lines += [f"{number}, {', '.join(nodes[:15])},", ", ".join(nodes[15:])]
+    for name, axis, end in (("X", 0, 0), ("Y", 1, 0), ("BASE", 2, 0), ("TOP", 2, 4)):
+        nodes = [str(number) for place, number in numbers.items() if place[axis] == end]
+        lines.append(f"*NSET, NSET={name}")
+        lines += [", ".join(nodes[start : start + 12]) for start in range(0, len(nodes), 12)]
+    path.write_text(
+        "\n".join(
+            [
+                "*HEADING", "Block", *lines, "*MATERIAL, NAME=TISSUE", "*HYPERELASTIC, NEO HOOKE", "0.0005, 2.0",
+                "*SOLID SECTION, ELSET=BLOCK, MATERIAL=TISSUE", "*STEP, NLGEOM, INC=100", "*STATIC",
+                "0.1, 1., 1e-4, 0.1", "*BOUNDARY", "X, 1, 1", "Y, 2, 2", "BASE, 1, 3", "TOP, 1, 2", "TOP, 3, 3, -0.3",
+                "*NODE PRINT, NSET=TOP, TOTALS=ONLY", "RF", "*NODE PRINT, NSET=TOP", "U", "*END STEP", "",
+            ]
+        )
+    )  # fmt: skip
+    return path
+
+
+@pytest.fixture(scope="module")
+def block(tmp_path_factory):
+    deck = write_block(tmp_path_factory.mktemp("deck") / "block.inp")
+    return tq.DeckForward(deck, "TISSUE", "ogden-1", "RF3@TOP", (0.6, 1.1), along="U3@TOP", factor=-4, along_factor=-1)
+
+
+@pytest.fixture(scope="module")
+def computed(block, tmp_path_factory):
+    """Return the force of parameters, by a run of CalculiX in a folder of its own."""
+    prepared = block.prepared_in(tmp_path_factory.mktemp("runs"))
+    return lambda mu, alpha: prepared.run({"mu1": mu, "alpha1": alpha}, DEPTH)
+
+
+@pytest.fixture(scope="module")
+def found(block, computed, tmp_path_factory):
+    noise = NOISE_SD * np.random.default_rng(5).standard_normal(len(DEPTH))
+    measured = computed(*TRUTH.values()) + noise
+    folder = tmp_path_factory.mktemp("calibrated") / "runs"
+    return measured, tq.calibrate(DEPTH, measured, block, PRIORS, noise_sd=NOISE_SD, runs=20, folder=folder)
+
+
+def test_the_intervals_hold_the_parameters_of_the_model_that_made_the_data(found):
+    """Of this seed; the chance that one of two 99 % intervals does not is 2 %."""
+    _, calibration = found
+    for symbol, value in TRUTH.items():
+        low, high = calibration.marginals[symbol].hdi(0.99)
+        assert low < value < high
+
+
+def test_the_posterior_is_that_on_a_grid_of_runs(found, computed):
+    """Means within 0.2 sd and sds within 10 %: a grid of 11 by 11 runs along the axes of the posterior, to 4 sd.
+
+    Sums over a grid with steps of 0.8 sd are right to 1e-6 for a Gaussian.
+    """
+    measured, calibration = found
+    draws = calibration.draws(4000)[:, :2]
+    steps = np.linspace(-4, 4, GRID)
+    root = np.linalg.cholesky(np.cov(draws.T))
+    points = draws.mean(axis=0) + np.array(list(product(steps, repeat=2))) @ root.T
+    misfits = np.array([((computed(*point) - measured) ** 2).sum() for point in points]) / NOISE_SD**2
+    low, high = np.array([prior.support for prior in PRIORS.values()]).T
+    inside = ((points > low) & (points < high)).all(axis=1)
+    weights = np.exp(-0.5 * (misfits - misfits.min())) * inside
+    weights /= weights.sum()
+    mean = weights @ points
+    sd = np.sqrt(weights @ points**2 - mean**2)
+    for column, symbol in enumerate(TRUTH):
+        marginal = calibration.marginals[symbol]
+        assert abs(marginal.mean - mean[column]) < 0.2 * sd[column]
+        assert marginal.sd == pytest.approx(sd[column], rel=0.1)
+
+
+def test_the_same_call_goes_on_and_another_model_is_refused(found, block, tmp_path):
+    measured, _ = found
+    folder = tmp_path / "runs"
+    few = {"noise_sd": NOISE_SD, "folder": folder}
+    done: list[bool] = []
+    priors = PRIORS | {"alpha1": tq.Uniform(-8.0, -3.0)}  # where no run fails
+    for is_new in (True, False):
+        done.clear()
+        tq.calibrate(DEPTH, measured, block, priors, runs=8, step=lambda label, is_new: done.append(is_new), **few)
+        assert done == [is_new] * 8
+    with pytest.raises(tq.InputError, match="another forward model"):
+        tq.calibrate(DEPTH, measured, replace(block, factor=-2.0), priors, runs=8, **few)

@@ -1,0 +1,87 @@
+"""Priors that go together, against SciPy's joint normal density, and in a posterior that no data change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+import tissuq as tq
+from tissuq.emulation.prior_correlation import correlated
+from tissuq.errors import InputError
+from tissuq.studies.prior_of_run import priors_of
+
+PRIORS = {"mu": tq.LogNormal(2.0, 0.3), "alpha": tq.Normal(-8.0, 1.5), "b": tq.Uniform(0.0, 1.0)}
+CORRELATION = -0.8
+COVARIANCE = np.array([[0.3**2, CORRELATION * 0.3 * 1.5], [CORRELATION * 0.3 * 1.5, 1.5**2]])
+DEPTH = np.linspace(0.1, 1.0, 6)
+
+
+def test_the_density_is_that_of_jointly_normal_scores():
+    found = correlated(PRIORS, {("mu", "alpha"): CORRELATION})
+    generator = np.random.default_rng(1)
+    for mu, alpha, b in zip(
+        np.exp(generator.normal(0.7, 0.4, 20)), generator.normal(-8, 2, 20), generator.uniform(0, 1, 20), strict=True
+    ):
+        priors = zip(PRIORS.values(), (mu, alpha, b), strict=True)
+        own = sum(prior.log_density(value) for prior, value in priors)
+        joint = multivariate_normal([np.log(2.0), -8.0], COVARIANCE).logpdf([np.log(mu), alpha]) - np.log(mu)
+        assert own + found.log_density((mu, alpha, b), np) == pytest.approx(joint, rel=1e-10)
+
+
+@pytest.mark.parametrize("method", ["importance", pytest.param("nuts", marks=pytest.mark.slow)])
+def test_where_the_data_say_nothing_the_posterior_is_the_prior(method):
+    """Within four standard errors of 800 effective draws."""
+    priors = {name: PRIORS[name] for name in ("mu", "alpha")}
+    found = tq.calibrate(
+        DEPTH, DEPTH, lambda p, x: p["mu"] * x - 0.01 * p["alpha"] * x**2, priors, noise_sd=1e3, runs=16, method=method,
+        correlations={("mu", "alpha"): CORRELATION},
+    )  # fmt: skip
+    draws = found.draws(4000)
+    line = np.stack([np.log(draws[:, 0]), draws[:, 1]])
+    assert np.corrcoef(line)[0, 1] == pytest.approx(CORRELATION, abs=4 * (1 - CORRELATION**2) / np.sqrt(800))
+    assert line.mean(axis=1) == pytest.approx([np.log(2), -8], abs=4 * 1.5 / np.sqrt(800))
+    assert line.std(axis=1) == pytest.approx([0.3, 1.5], rel=4 / np.sqrt(1600))
+
+
+def test_the_runs_lie_where_the_priors_are_together():
+    from tissuq.emulation.runs import space_filling
+
+    points = space_filling(PRIORS, 256, correlation=correlated(PRIORS, {("mu", "alpha"): CORRELATION}))
+    assert np.corrcoef(np.log(points[:, 0]), points[:, 1])[0, 1] == pytest.approx(CORRELATION, abs=0.06)
+    assert abs(np.corrcoef(points[:, 1], points[:, 2])[0, 1]) < 0.15
+
+
+def test_a_posterior_as_prior_has_its_means_sds_and_correlations():
+    """Linear model: the posterior is Gaussian with closed form; Mooney's constants may be negative in tissuq or not."""
+    stretch = np.linspace(0.75, 1.4, 14)
+    data = tq.simulate("ogden-1", {"mu1": 0.5, "alpha1": -5.0}, stretch, noise_sd=0.01, seed=2)
+    posterior = tq.fit(data, material="ogden-1", discrepancy="none", noise_sd=0.01)
+    priors, correlations = priors_of(posterior, "kPa")
+    draws = posterior.data_in("kPa")["posterior"]
+    mu, alpha = (draws[name].values.ravel() for name in ("mu1", "alpha1"))
+    assert priors["alpha1"].mean == pytest.approx(posterior.marginals["alpha1"].mean, abs=0.1 * alpha.std())
+    assert priors["alpha1"].sd == pytest.approx(posterior.marginals["alpha1"].sd, rel=0.05)
+    middle = priors["mu1"].median if priors["mu1"].name == "log-normal" else priors["mu1"].mean
+    assert middle == pytest.approx(1e3 * posterior.marginals["mu1"].mean, rel=0.02)
+    assert correlations["mu1", "alpha1"] == pytest.approx(np.corrcoef(mu, alpha)[0, 1], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "words"),
+    [
+        ({("mu", "b"): 0.5}, "can have no correlation"),
+        ({("mu", "x"): 0.5}, "two parameters of the model"),
+        ({("mu", "mu"): 0.5}, "two parameters of the model"),
+        ({("mu", "alpha"): 1.0}, "between -1 and 1"),
+    ],
+)
+def test_pairs_that_cannot_be_correlated_are_refused(pairs, words):
+    with pytest.raises(InputError, match=words):
+        correlated(PRIORS, pairs)
+
+
+def test_correlations_that_contradict_each_other_are_refused():
+    normal = {name: tq.Normal(0.0, 1.0) for name in "abc"}
+    with pytest.raises(InputError, match="contradict"):
+        correlated(normal, {("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9})
