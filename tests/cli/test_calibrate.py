@@ -157,7 +157,7 @@ def test_a_material_that_was_calibrated_is_predicted_and_exported_from_the_run(t
     material = ["--material", "neo-hookean", "--range", "0.7:1.2", "--unit", "kPa", "--no-figures"]
     said = run_in(tmp_path, "calibrate", "punch.csv", *usual, *material, "--out", "run")
     assert said.status == 0, said.err
-    said = run_in(tmp_path, "predict", "run", "--stretch", "1.1", "--out", "predicted", "--no-figures")
+    said = run_in(tmp_path, "predict", "run", "--at", "1.1", "--out", "predicted", "--no-figures")
     assert said.status == 0, said.err
     row = next(csv.DictReader((tmp_path / "predicted" / "prediction.csv").open()))
     median = next(float(value) for name, value in row.items() if "median" in name or name.endswith("[kPa]"))

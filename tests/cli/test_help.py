@@ -159,6 +159,50 @@ def test_every_former_name_stands_for_an_option_of_today_and_is_none_itself():
         assert not set(renamed) & by_name[name], name
 
 
+MEANINGS = {
+    "--config": "the file of settings",
+    "--discrepancy": "a discrepancy: of a fit to come, or of a run that has several",
+    "--draws": "a number of draws from the posterior",
+    "--estimand": "what intervals are of, which says which errors of a test they include",
+    "--force": "whether what is there may be replaced",
+    "--format": "a format of material cards",
+    "--full-runs": "how many draws are computed in full",
+    "--keep": "whether the files of a solver are kept",
+    "--law": "the law of material cards",
+    "--markdown": "whether a page of the documentation is printed",
+    "--material": "a law of the material",
+    "--max-jobs": "how many runs of a solver go on at a time",
+    "--measurements": "how many measurements a test has",
+    "--method": "how a posterior is computed",
+    "--mode": "a loading mode",
+    "--noise": "the kind of the noise",
+    "--noise-sd": "the standard deviation of the noise, or unknown",
+    "--out": "the folder that is written",
+    "--prior": "the prior of a parameter",
+    "--qoi": "a quantity of a finite-element model",
+    "--replace": "the material of a deck whose card is replaced",
+    "--replicates": "how many data sets are made of each kind",
+    "--retries": "how often a failed run of a solver is made again",
+    "--seed": "the seed of random numbers",
+    "--sheet": "a sheet of a workbook",
+    "--steps": "at how many steps a force is computed",
+    "--timeout": "after how many seconds a run of a solver is stopped",
+    "--tolerance": "the size of an error of a test",
+    "--unit": "the unit of stress of a finite-element model",
+    "--workers": "a number of processes",
+}
+"""What an option is in every command that has it, where its help is not the same in all: written by a person."""
+
+
+def test_an_option_has_one_meaning_wherever_it_stands():
+    helps = {}
+    for _, part in commands():
+        for parameter in part.params:
+            for option in set(parameter.opts) & options_of(part):
+                helps.setdefault(option, set()).add(parameter.help)
+    assert {option for option, texts in helps.items() if len(texts) > 1} <= {*MEANINGS}
+
+
 def test_an_option_under_its_former_name_is_the_same(cli):
     today = cli("design", "no-run", "--measurements", "no-number")
     former = cli("design", "no-run", "--points=no-number")

@@ -32,7 +32,7 @@ def rows_of(folder):
 
 
 def test_a_mode_is_predicted(cli, here, run):
-    said = cli("predict", run, "--mode", "planar", "--stretch", "0.9:2.5", "--points", 9, "--discrepancy", "none")
+    said = cli("predict", run, "--mode", "planar", "--at", "0.9:2.5", "--points", 9, "--discrepancy", "none")
     assert said.status == 0, said.err
     words = " ".join(said.out.split())
     assert "Stress in mode planar, kPa" in words
@@ -47,7 +47,7 @@ def test_a_mode_is_predicted(cli, here, run):
 
 def test_measurements_are_compared_with_and_the_prediction_repeats(cli, here, run, planar):
     options = ["--discrepancy", "none", "--points", 5, "--no-figures"]
-    said = cli("predict", run, "--data", planar, *options, "--stress-type", "cauchy")
+    said = cli("predict", run, "--data", planar, *options, "--stress", "cauchy")
     assert said.status == 0, said.err
     assert "Measurements of planar" in said.out
     scores = json.loads((here / "run-planar" / "scores.json").read_text())
@@ -81,7 +81,7 @@ def test_an_error_of_the_stress_is_said_to_be_left_out(cli, run):
 
 
 def test_two_controls_are_given_apart(cli, here, run):
-    words = ["--mode", "biaxial", "--stretch", "1:1.2", "--stretch2", "1.1", "--points", 3, "--discrepancy", "none"]
+    words = ["--mode", "biaxial", "--at", "1:1.2", "--at2", "1.1", "--points", 3, "--discrepancy", "none"]
     said = cli("predict", run, *words, "--no-figures")
     assert said.status == 0, said.err
     assert [row["stretch2"] for row in rows_of(here / "run-biaxial")] == ["1.1"] * 6
@@ -94,26 +94,26 @@ BAD = [
     (["RUN"], ["has several discrepancies", "constant, gp, none"]),
     (["RUN", "--discrepancy", "cubic"], ["'cubic'", "constant"]),
     (["RUN", "--discrepancy", "none", "--mode", "torsion"], ["'torsion'", "planar"]),
-    (["RUN", "--discrepancy", "none", "--stretch", "0.7-2"], ["'0.7-2'", "0.7:2.0"]),
-    (["RUN", "--discrepancy", "none", "--stretch", "2:0.7"], ["'2:0.7'", "LOW:HIGH"]),
-    (["RUN", "--discrepancy", "none", "--stretch", "-1:2"], ["stretch -1", "not positive"]),
-    (["RUN", "--discrepancy", "none", "--stretch2", "1"], ["one control", "--stretch2"]),
+    (["RUN", "--discrepancy", "none", "--at", "0.7-2"], ["'0.7-2'", "0.7:2.0"]),
+    (["RUN", "--discrepancy", "none", "--at", "2:0.7"], ["'2:0.7'", "LOW:HIGH"]),
+    (["RUN", "--discrepancy", "none", "--at", "-1:2"], ["stretch -1", "not positive"]),
+    (["RUN", "--discrepancy", "none", "--at2", "1"], ["one control", "--at2"]),
     (["RUN", "--discrepancy", "none", "--mode", "biaxial"], ["several controls", "stretch of axis 2"]),
     (["RUN", "--discrepancy", "none", "--points", "1"], ["points", "2"]),
     (["RUN", "--discrepancy", "none", "--prob", "1"], ["prob", "less than 1"]),
-    (["RUN", "--discrepancy", "none", "--stress-type", "kirchhoff"], ["stress_type", "'kirchhoff'"]),
+    (["RUN", "--discrepancy", "none", "--stress", "kirchhoff"], ["stress_type", "'kirchhoff'"]),
     (["RUN", "--discrepancy", "none", "--cycle", "1"], ["cycle", "only be used with --data"]),
     (["RUN", "--discrepancy", "none", "--data", "nowhere.csv"], ["nowhere.csv", "no such file"]),
     (["RUN", "--discrepancy", "none", "--data", "PLANAR", "--mode", "equibiaxial"],
      ["planar.csv", "measured in mode planar", "equibiaxial"]),
     (["RUN", "--discrepancy", "none", "--data", "PLANAR", "--stress-unit", "furlong"], ["'furlong'"]),
-    (["RUN", "--discrepancy", "none", "--mode", "equibiaxial", "--stretch", "1e160"], ["overflows"]),
+    (["RUN", "--discrepancy", "none", "--mode", "equibiaxial", "--at", "1e160"], ["overflows"]),
     (["--config", "nowhere.toml"], ["nowhere.toml"]),
     (["RUN", "--config", "run.toml"], ["RUN", "--config"]),
     (["RUN", "--discrepancy", "none", "--out", "RUN", "--force"], ["is the run itself or contains it"]),
     (["RUN", "--discrepancy", "none", "--out", "run/inside"], ["lies inside the run 'run'"]),
     (["RUN", "--discrepancy", "none", "--material", "yeoh"], ["law.py:Name", "'yeoh' is not"]),
-    (["RUN", "--discrepancy", "none", "--stretch", "1e-200"], ["too large for a number"]),
+    (["RUN", "--discrepancy", "none", "--at", "1e-200"], ["too large for a number"]),
     (["RUN", "--discrepancy", "none", "--out", "PLANAR"], ["is a file"]),
 ]  # fmt: skip
 

@@ -239,9 +239,9 @@ def test_other_texts_are_refused(text):
     ("mode", "stretch", "stretch2", "words"),
     [
         ("planar", "1:2", "1", "has one control"),
-        ("biaxial", "1:2", None, "both --stretch and --stretch2"),
-        ("biaxial", None, "1:2", "both --stretch and --stretch2"),
-        ("biaxial", "1,2,3", "1,2", "3 values and --stretch2 2"),
+        ("biaxial", "1:2", None, "both --at and --at2"),
+        ("biaxial", None, "1:2", "both --at and --at2"),
+        ("biaxial", "1,2,3", "1,2", "3 values and --at2 2"),
     ],
 )
 def test_every_control_needs_its_values(mode, stretch, stretch2, words):

@@ -17,7 +17,7 @@ OF_PAIRS = {"columns": "--column", "only": "--only", "tolerances": "--tolerance"
 OF_FILES = ("file", "name", "specimen", "direction", "condition", "noise_sd")
 """Settings of a test that are no options of reading."""
 FIT_OPTIONS = ("material", "laws", "discrepancies", "noise_sd", "noise", "estimand", "stable_in", "method", "seed")
-IN_SHELL = {"laws": "material", "discrepancies": "discrepancy"}
+IN_SHELL = {"laws": "material", "discrepancies": "discrepancy", "stretch": "at", "stretch2": "at2"}
 """Names of options that are not those of settings."""
 
 

@@ -10,15 +10,21 @@ __all__ = ["FORMER_NAMES", "todays_names"]
 FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "paper": {"--points": "--measurements", "--sampler": "--method"},
-        "predict": {"--points": "--grid-points", "--material": "--user-law"},
+        "predict": {
+            "--points": "--grid-points",
+            "--material": "--user-law",
+            "--stretch": "--at",
+            "--stretch2": "--at2",
+            "--stress-type": "--stress",
+        },
         "population": {"--specimen": "--specimen-column"},
         "design": {"--points": "--measurements", "--specimen": "--next-specimen", "--material": "--user-law"},
         "export": {"--material": "--user-law"},
         "ensemble": {"--material": "--replace"},
         "structure": {"--material": "--user-law"},
         "simulate": {"--material": "--user-law"},
-        "coverage": {"--noise": "--noise-sd"},
-        "sbc": {"--noise": "--noise-sd", "--formulation": "--discrepancy"},
+        "coverage": {"--noise": "--noise-is", "--noise-sd": "--noise-is"},
+        "sbc": {"--noise": "--noise-is", "--noise-sd": "--noise-is", "--formulation": "--discrepancy"},
         "tissues": {"--formulation": "--discrepancy"},
     }
 )

@@ -49,7 +49,7 @@ class CoverageOptions(Settings):
     """A campaign that counts how often intervals hold."""
 
     replicates: int = option(50, "Data sets of every family [50, or as the preset says].", ge=1, le=100_000)
-    noise: NoiseKnown = option(("known",), NOISE, name="noise-sd", takes=str, min_length=1)
+    noise: NoiseKnown = option(("known",), NOISE, name="noise-is", takes=str, min_length=1)
     seed: int = seed()
 
 
@@ -57,7 +57,7 @@ class SbcOptions(Settings):
     """A campaign of calibration by simulation."""
 
     replicates: int = option(300, "Data sets of every formulation.", ge=20, le=100_000)
-    noise: NoiseKnown = option(("known", "unknown"), NOISE, name="noise-sd", takes=str, min_length=1)
+    noise: NoiseKnown = option(("known", "unknown"), NOISE, name="noise-is", takes=str, min_length=1)
     seed: int = seed()
     material: str = option("neo-hookean", "The material that is calibrated.")
     formulations: tuple[str, ...] = option(

@@ -32,14 +32,16 @@ class PredictionSettings(RunSettings):
 
     mode: str = option("", "Loading mode to predict [that of the data, or of the run]; see tissuq modes.")
     stretch: str | None = option(
-        None, "Stretches (amounts of shear): a range 0.7:2.0, or a list 1.1,1.2,1.5 [where calibrated]."
+        None, "Stretches (amounts of shear): a range 0.7:2.0, or a list 1.1,1.2,1.5 [where calibrated].", name="at"
     )
     stretch2: str | None = option(
-        None, "Of the second control of a mode with two, such as biaxial; one number where it is held."
+        None, "Of the second control of a mode with two, such as biaxial; one number where it is held.", name="at2"
     )
     points: int = option(POINTS, "Stretches in a range.", name="grid-points", ge=2, le=10_001)
     prob: float = option(0.95, "Probability of the bands.", gt=0, lt=1)
-    stress_type: Literal["engineering", "cauchy"] = option("engineering", "Predict engineering or cauchy stress.")
+    stress_type: Literal["engineering", "cauchy"] = option(
+        "engineering", "Stress to predict: engineering or cauchy.", name="stress"
+    )
     data: ComparedFile | None = option(
         None,
         "Measurements of that mode to compare with: a file or a built-in data set. The options of reading, and "
@@ -90,19 +92,19 @@ class PredictionSettings(RunSettings):
 
         controls = loading_mode(mode).controls
         if self.stretch2 is not None and len(controls) == 1:
-            raise InputError(f"mode '{mode}' has one control, {controls[0].name}: leave --stretch2 out.")
+            raise InputError(f"mode '{mode}' has one control, {controls[0].name}: leave --at2 out.")
         if len(controls) == 1 or self.stretch is self.stretch2 is None:
             return None if self.stretch is None else stretches(self.stretch, self.points)
         if self.stretch is None or self.stretch2 is None:
             names = " and ".join(control.name for control in controls)
-            raise InputError(f"mode '{mode}' has two controls, {names}: give both --stretch and --stretch2.")
+            raise InputError(f"mode '{mode}' has two controls, {names}: give both --at and --at2.")
         axis1 = stretches(self.stretch, self.points)
         axis2 = stretches(self.stretch2, len(axis1))
         if len(axis1) == 1 or len(axis2) == 1:
             axis1, axis2 = np.broadcast_arrays(axis1, axis2)
         if len(axis1) != len(axis2):
             raise InputError(
-                f"--stretch has {len(axis1)} values and --stretch2 {len(axis2)}: give pairs of them, or one number "
+                f"--at has {len(axis1)} values and --at2 {len(axis2)}: give pairs of them, or one number "
                 "for an axis that is held."
             )
         return np.column_stack([axis1, axis2])
