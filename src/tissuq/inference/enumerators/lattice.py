@@ -143,6 +143,10 @@ class Directions:
     ratios : tuple of (G1,) and (G2,) arrays
         Of the first and the second block; a block that is missing has the one ratio zero.
     step : float
+    variance : (G2, G1, d) array
+        Of the stresses along the directions, in units of the noise.
+    log_size : (G2, G1) array
+        Half the log determinant of the covariance in units of the noise.
     """
 
     def __init__(
@@ -168,16 +172,19 @@ class Directions:
         values, vectors = np.linalg.eigh(second_block @ second_block.T)
         variance = 1 + self.ratios[1][:, None] ** 2 * np.maximum(values, 0.0)
         self._vectors, self._second_sd = vectors, np.sqrt(variance)
-        left_vectors, singular, _ = np.linalg.svd((vectors.T @ first_block) / self._second_sd[:, :, None])
-        self._left_vectors = left_vectors
-        no_stress = np.zeros((len(singular), variance.shape[1] - singular.shape[1]))
-        self.variance = 1 + (self.ratios[0][:, None] * np.hstack([singular, no_stress])[:, None]) ** 2
+        white_block = (vectors.T @ first_block) / self._second_sd[:, :, None]
+        self._left_vectors, singular, _ = np.linalg.svd(white_block, full_matrices=False)
+        self.variance = 1 + (self.ratios[0][:, None] * singular[:, None]) ** 2
         self.log_size = 0.5 * (np.log(variance).sum(axis=1)[:, None] + _log_product(self.variance))
 
-    def along(self, columns: FloatArray) -> FloatArray:
-        """Return columns (r, k), given in the features' basis, along the directions (G2, r, k) for unit noise."""
+    def along(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return columns (r, k), given in the features' basis, along the directions, and the rest.
+
+        Along the directions (G2, d, k), for unit noise; the rest (G2, r, k) is orthogonal to them, of unit variance.
+        """
         white = (self._vectors.T @ columns) / self._second_sd[:, :, None]
-        return np.asarray(self._left_vectors.swapaxes(1, 2) @ white)
+        along = self._left_vectors.swapaxes(1, 2) @ white
+        return along, white - self._left_vectors @ along
 
 
 class Lattice:
@@ -211,12 +218,13 @@ class Lattice:
         self._inverse, self._centre = fit.inverse, fit.centre
         inside = directions.basis.T @ fit.columns
         outside = fit.columns - directions.basis @ inside
-        inside, p = directions.along(inside), self.parameters
+        (along, remaining), p = directions.along(inside), self.parameters
         # A sum along the directions, for each of their variances, of every product that is needed.
-        products = _products(inside, p)
-        sums = (1 / directions.variance) @ products + _products(outside[None], p).sum(axis=1)
-        of_design, size = np.split(sums, [p * inside.shape[2]], axis=2)
-        of_design = of_design.reshape(*of_design.shape[:2], p, inside.shape[2])
+        products = _products(along, p)
+        of_unit_variance = _summed_products(remaining, p) + _summed_products(outside[None], p)
+        sums = (1 / directions.variance) @ products + of_unit_variance[:, None]
+        of_design, size = np.split(sums, [p * along.shape[2]], axis=2)
+        of_design = of_design.reshape(*of_design.shape[:2], p, along.shape[2])
         precision, pull = np.split(of_design, [p], axis=3)
         tiny = 1e-15 * np.trace(precision, axis1=2, axis2=3)[:, :, None, None] * np.eye(p)
         gaussian = integrated(precision + tiny, pull, size)
@@ -249,6 +257,13 @@ def _products(columns: FloatArray, count: int) -> FloatArray:
     with_design = columns[..., :count, None] * columns[..., None, :]
     shape = *columns.shape[:-1], count * columns.shape[-1]
     return np.concatenate([with_design.reshape(shape), columns[..., count:] ** 2], axis=-1)
+
+
+def _summed_products(columns: FloatArray, count: int) -> FloatArray:
+    """Return the `_products` of columns (..., m, p + B), summed over their m rows."""
+    with_design = columns[..., :count].swapaxes(-1, -2) @ columns
+    shape = *columns.shape[:-2], count * columns.shape[-1]
+    return np.concatenate([with_design.reshape(shape), (columns[..., count:] ** 2).sum(axis=-2)], axis=-1)
 
 
 def _log_product(variance: FloatArray) -> FloatArray:
