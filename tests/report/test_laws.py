@@ -21,3 +21,18 @@ def test_the_finding_is_said_whether_or_not_a_law_can_be_fitted_alone():
         words[name] = law_lead(SimpleNamespace(comparison=of_laws, unit=stress_unit("MPa"), settings=settings))
     assert "Alone, without discrepancy, neo-hookean comes nearest" in words["alone"]
     assert words["alone"].startswith(words["not alone"])
+
+
+def test_a_law_that_is_nearly_certain_is_not_called_one_of_those_that_the_data_do_not_tell_apart():
+    data = tq.simulate("neo-hookean", {"C10": 0.5}, np.linspace(0.9, 1.1, 12), noise_sd=0.01, seed=1)
+    laws = tq.fit_laws(data, ["neo-hookean", "mooney-rivlin"], discrepancy="none", noise_sd=0.01)
+    table = laws.table_in("MPa")
+    said = {}
+    for share in (0.6, 0.999):
+        known = table.assign(probability=[share, 1 - share], elpd_difference=[0.0, -0.1], elpd_difference_error=1.0)
+        of_laws = SimpleNamespace(table_in=lambda unit, known=known: known, modulus=laws.modulus, between=laws.between)
+        settings = SimpleNamespace(discrepancies=("none",))
+        said[share] = law_lead(SimpleNamespace(comparison=of_laws, unit=stress_unit("MPa"), settings=settings))
+    assert "equally well: the data do not tell these apart" in said[0.6]
+    assert "tell these apart" not in said[0.999]
+    assert f"that {table.index[0]} is the most probable (99.9 %)" in said[0.999]

@@ -27,6 +27,8 @@ MAX_DRAWN, LINE_POINTS = 6, 80
 """Laws of which curves are drawn, and points of each."""
 SIGNIFICANT_ERRORS = 2.0
 """Standard errors of a difference of elpd beyond which it counts."""
+DECIDED = 0.95
+"""Probability of a law from which the data tell it from the others."""
 MODULUS = ("modulus", "modulus_low", "modulus_high")
 """Columns that are stresses."""
 HOW_TO_READ = (
@@ -138,7 +140,7 @@ def law_lead(study: LawStudy) -> str:
         f"of {len(table)} laws, only {close[0]} describes the measurements so well that no other is as good"
         if len(close) == 1
         else f"{len(close)} of {len(table)} laws, with the discrepancy '{study.settings.discrepancies[0]}', predict "
-        f"left-out measurements equally well: the data do not tell these apart"
+        f"left-out measurements equally well{_though(table.probability)}"
     )
     nearest = table.nrmse.dropna().nsmallest(1)
     alone = [
@@ -150,6 +152,19 @@ def law_lead(study: LawStudy) -> str:
         f"The initial shear modulus, averaged over the laws, is {median} {unit.name}, 95 % HPD {low} to {high} "
         f"{unit.name}; {100 * comparison.between:.2g} % of its variance is between the laws. "
         f"{told[0].upper()}{told[1:]}." + "".join(alone)
+    )
+
+
+def _though(probability: Any) -> str:
+    """Return what the probabilities of the laws say beside predictions that are equally good."""
+    if probability.isna().all():
+        return ""
+    law, largest = str(probability.idxmax()), float(probability.max())
+    if largest < DECIDED:
+        return ": the data do not tell these apart"
+    return (
+        f"; that {law} is the most probable ({_percent(largest)}) is due to how many parameters a law has and how wide "
+        "their priors are, too"
     )
 
 
