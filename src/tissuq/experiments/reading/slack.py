@@ -90,9 +90,11 @@ def _gains(share: Column, load: Column, shortest: float) -> tuple[Column, Column
 
     Residuals that neighbours have in common count once.
     """
-    fits = {start: _fit(share, load, start, shortest) for start in STARTS.tolist()}
+    fits = _fits(share, load, STARTS, shortest)
     best = min(fits, key=lambda start: fits[start][0])
-    fits |= {start: _fit(share, load, start, shortest) for start in (best + FINER).tolist() if start > 0 < best}
+    if best > 0:
+        finer = best + FINER
+        fits |= _fits(share, load, finer[finer > 0], shortest)
     starts = sorted(fits)
     misfits = np.array([fits[start][0] for start in starts])
     residual = fits[starts[int(np.argmin(misfits))]][1]
@@ -101,21 +103,25 @@ def _gains(share: Column, load: Column, shortest: float) -> tuple[Column, Column
     return np.array(starts), independent * np.log(misfits[0] / misfits)
 
 
-def _fit(share: Column, load: Column, start: float, shortest: float) -> tuple[float, Column]:
-    """Return the mean square by which curves that begin at a share of the way miss the loads, and the misses (n,).
+def _fits(share: Column, load: Column, starts: Column, shortest: float) -> dict[float, tuple[float, Column]]:
+    """Return, of curves that begin at shares of the way, the mean square by which they miss the loads, and the misses.
 
     The stretch at the end of the way, counted from its beginning, is ``shortest`` in compression, or one.
     """
     from scipy.optimize import nnls
 
-    share_from_start = np.clip((share - start) / (1 - start), 0.0, None)
-    curves, shifted = _curves(share_from_start), 1 + load
+    begin = starts[:, None]
+    share_from_start = np.clip((share - begin) / (1 - begin), 0.0, None)
+    families, shifted = _curves(share_from_start), 1 + load  # shifted: the load may begin below zero
     if shortest < 1:
-        end = shortest / (1 + start * (shortest - 1))
+        end = shortest / (1 + begin * (shortest - 1))
         stiffening = _stiffening(1 + share_from_start * (end - 1)) / _stiffening(end)
-        curves = np.hstack([curves, curves[:, 1:] * stiffening[:, None]])
-    weights, distance = nnls(curves, shifted, maxiter=50 * curves.shape[1])  # shifted: the load may begin below zero
-    return float(distance**2 / len(share) + RESOLUTION**2), shifted - curves @ weights
+        families = np.concatenate([families, families[..., 1:] * stiffening[..., None]], axis=-1)
+    fits = {}
+    for start, curves in zip(starts.tolist(), families, strict=True):
+        weights, distance = nnls(curves, shifted, maxiter=50 * curves.shape[1])
+        fits[start] = float(distance**2 / len(share) + RESOLUTION**2), shifted - curves @ weights
+    return fits
 
 
 def _stiffening(stretch: Any) -> Any:
@@ -124,11 +130,11 @@ def _stiffening(stretch: Any) -> Any:
 
 
 def _curves(share: Column) -> Column:
-    """Return what loads are sums of (n, k): a constant, and curves that soften, go straight, stiffen or lock."""
+    """Return what loads are sums of (..., n, k): a constant, and curves that soften, go straight, stiffen or lock."""
     stiffening = [share**power for power in (1.5, 2, 2.5, 3, 4, 5, 7, 10)]
     stiffening += [np.expm1(rate * share) / np.expm1(rate) for rate in (1, 2, 3, 4, 5, 6, 8, 11, 16)]
     stiffening += [share * np.exp(rate * (share**2 - 1)) for rate in (1, 2, 4)]
     stiffening += [(1 - limit) * share / (1 - limit * share) for limit in (0.5, 0.7, 0.8, 0.9, 0.95, 0.99)]
     curves = [np.ones_like(share), share, *(LEAST_SLOPE * share + (1 - LEAST_SLOPE) * curve for curve in stiffening)]
     curves += [-np.expm1(-rate * share) for rate in (1, 2, 4, 8, 20)]
-    return np.column_stack(curves)
+    return np.stack(curves, axis=-1)
