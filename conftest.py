@@ -22,6 +22,12 @@ MEMORY_MAPS, MOST_MAPS = Path("/proc/self/maps"), 20_000
 """What a process has mapped (on Linux, where 65530 are allowed), and from how many on compiled functions are let go."""
 
 
+def pytest_collection_finish() -> None:
+    """Leave what is imported and collected out of every later search for garbage."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True, scope="module")
 def few_maps():
     """Let go of compiled functions after a module that has left many: each takes some pieces of memory."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
 
+from tissuq import registry
 from tissuq.validation.paper import PaperSettings
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -18,6 +20,14 @@ def gallery():
     yield
     if "gallery" in sys.modules:
         assert not sys.modules["gallery"].changed(), "a test has changed a posterior that others look at, too"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def installed_packages():
+    """Look for entry points of other packages once: what is installed stays so while tests run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(registry, "entry_points", cache(registry.entry_points))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -179,7 +179,8 @@ CLEAN: dict[str, Callable[[Planting], Curve]] = {"branch": Planting.clean, "cycl
 def kinds_found(curve: Curve, folder: Path) -> set[str]:
     """Return the kinds of regions that are found in a file of a curve."""
     path = folder / "test.csv"
-    np.savetxt(path, np.column_stack(curve), "%.6f", ",", header="stretch,stress [kPa]", comments="")
+    rows = [f"{stretch:.6f},{stress:.6f}\n" for stretch, stress in zip(*map(np.ndarray.tolist, curve), strict=True)]
+    path.write_text("stretch,stress [kPa]\n" + "".join(rows))
     return {region.kind for region in tq.inspect(path).reading.regions[0]}
 
 

@@ -7,10 +7,13 @@ import pytest
 import tissuq as tq
 from tissuq.next_test.candidates import target_named
 
-MODEL = tq.fit(
-    tq.simulate("mooney-rivlin", {"C10": 0.5, "C01": 0.1}, [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4], 0.02, seed=1),
-    material="mooney-rivlin",
-).model
+
+@pytest.fixture(scope="module")
+def model():
+    """A material of two parameters, and noise of unknown size."""
+    stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4]
+    data = tq.simulate("mooney-rivlin", {"C10": 0.5, "C01": 0.1}, stretch, 0.02, seed=1)
+    return tq.fit(data, material="mooney-rivlin").model
 
 
 @pytest.mark.parametrize(
@@ -23,10 +26,10 @@ MODEL = tq.fit(
         ("simple-shear:0.2", "simple-shear stress at 0.2", "MPa", True),
     ],
 )
-def test_a_text_names_a_target(text, title, unit, is_stiffness):
-    target = target_named(text, MODEL)
-    assert (target.name, target.title(MODEL), target.unit(MODEL)) == (text, title, unit)
-    assert target.is_stiffness(MODEL) == is_stiffness
+def test_a_text_names_a_target(model, text, title, unit, is_stiffness):
+    target = target_named(text, model)
+    assert (target.name, target.title(model), target.unit(model)) == (text, title, unit)
+    assert target.is_stiffness(model) == is_stiffness
 
 
 @pytest.mark.parametrize(
@@ -39,11 +42,11 @@ def test_a_text_names_a_target(text, title, unit, is_stiffness):
         ("c1", "no standard deviation"),
     ],
 )
-def test_what_is_no_target_is_refused(text, words):
+def test_what_is_no_target_is_refused(model, text, words):
     with pytest.raises(tq.InputError, match=words):
-        target_named(text, MODEL)
+        target_named(text, model)
 
 
-def test_a_mode_must_be_known():
+def test_a_mode_must_be_known(model):
     with pytest.raises(tq.ModelError, match="planer"):
-        target_named("planer:1.5", MODEL)
+        target_named("planer:1.5", model)
