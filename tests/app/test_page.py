@@ -288,6 +288,23 @@ def test_a_fit_that_is_cancelled_or_whose_page_is_closed_leaves_nothing(visit, s
     assert number_of(other)[1] < 10 < number_of(other)[2]
 
 
+def test_files_chosen_before_the_page_has_its_session_are_not_lost(browser, address, tmp_path):
+    path = tmp_path / "first.csv"
+    path.write_text("stretch,stress_kPa\n" + "".join(f"{1 + k / 50},{k}\n" for k in range(12)))
+    page = browser.new_page()
+    page.set_default_timeout(PATIENCE)
+    held = []
+    page.route("**/sessions", lambda route: held.append(route))
+    page.goto(address)
+    page.wait_for_function("document.getElementById('pick') !== null")
+    page.set_input_files("#pick", path)
+    page.wait_for_timeout(200)
+    held[0].continue_()
+    page.wait_for_selector("#tests .plot, #refusal .question")
+    assert "first.csv" in page.inner_text("#file-list")
+    page.close()
+
+
 def test_files_chosen_while_the_page_starts_are_not_lost(browser, address, tmp_path):
     path = tmp_path / "early.csv"
     path.write_text("stretch,stress_kPa\n" + "".join(f"{1 + k / 50},{k}\n" for k in range(12)))

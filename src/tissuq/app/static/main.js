@@ -193,18 +193,19 @@ const showChoices = choices => {
 };
 
 const start = safely(async () => {
+  let prepared;
+  state.prepared = new Promise(resolve => { prepared = resolve; });  // files chosen before wait for it
+  const drop = byId("drop"), pick = byId("pick"), choose = () => { upload([...pick.files]); pick.value = ""; };
+  pick.addEventListener("change", choose);
+  for (const kind of ["dragenter", "dragover"]) addEventListener(kind, event => { event.preventDefault(); drop.classList.add("over"); });
+  addEventListener("dragleave", event => { if (!event.relatedTarget) drop.classList.remove("over"); });
+  addEventListener("drop", event => { event.preventDefault(); drop.classList.remove("over"); upload([...event.dataTransfer.files]); });
+  if (pick.files.length) choose();  // chosen before this was loaded
   Object.assign(state, await request("sessions", { method: "POST" }));
   const news = new EventSource(own("news"));
   news.addEventListener("message", hear);
   news.addEventListener("error", () => { if (news.readyState === EventSource.CLOSED) alertOf("tissuq has ended, or this page was away for too long. Start 'tissuq app' again, or load the page again."); });
   addEventListener("pagehide", () => navigator.sendBeacon(own("end")));
-  let prepared;
-  state.prepared = new Promise(resolve => { prepared = resolve; });  // files chosen before wait for it
-  byId("pick").addEventListener("change", () => { upload([...byId("pick").files]); byId("pick").value = ""; });
-  const drop = byId("drop");
-  for (const kind of ["dragenter", "dragover"]) addEventListener(kind, event => { event.preventDefault(); drop.classList.add("over"); });
-  addEventListener("dragleave", event => { if (!event.relatedTarget) drop.classList.remove("over"); });
-  addEventListener("drop", event => { event.preventDefault(); drop.classList.remove("over"); upload([...event.dataTransfer.files]); });
   showChoices(await new Promise((resolve, reject) => {
     begin("choices", {}, (kind, data) => { if (kind === "done") resolve(data); else if (kind === "error") reject(new Error(data.text)); }).catch(reject);
   }));
