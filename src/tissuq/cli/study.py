@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -16,6 +15,9 @@ from tissuq.cli.running import Campaign
 from tissuq.errors import InputError
 from tissuq.studies.campaign_settings import CoverageOptions, SbcOptions, StructureStudyOptions, TissueOptions
 from tissuq.studies.option import option
+
+if TYPE_CHECKING:
+    from tissuq.studies.stream import Campaign as CampaignOfTasks
 
 __all__ = ["study"]
 
@@ -43,7 +45,6 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     """Count how often intervals contain the true value; the same command resumes a stopped campaign."""
     from tissuq.report.coverage import coverage_result
     from tissuq.validation.coverage import PRESETS, CoverageSettings, preset, run_campaign
-    from tissuq.validation.coverage.campaign import tasks_of
 
     name = call.how.preset
     if name == "sbc" and call.config is None:
@@ -54,7 +55,7 @@ def coverage(call: Call[CoverageOptions, CoverageRunning]) -> None:
     of_preset: dict[str, Any] = preset(name) if name else {}
     settings = call.loaded_as(CoverageSettings, **of_preset | call.stated)
     folder = call.how.out or Path("runs") / f"coverage-{name or (call.config or Path()).stem}"
-    results = _carry_out(call, settings, folder, len(tasks_of(settings)), run_campaign)
+    results = _carry_out(call, settings, folder, run_campaign)
     call.put_into(folder, coverage_result(settings, results))
 
 
@@ -68,13 +69,11 @@ def sbc(call: Call[SbcOptions, Campaign]) -> None:
 def _calibrate(call: Call[SbcOptions, Any]) -> None:
     """Carry out simulation-based calibration."""
     from tissuq.report.sbc import sbc_result
-    from tissuq.validation.sbc import SbcSettings, run_sbc, tasks_of
+    from tissuq.validation.sbc import SbcSettings, run_sbc
 
     settings, material = call.loaded_as(SbcSettings), call.stated.get("material")
-    folder = call.how.out or Path("runs") / (
-        call.config.stem if call.config else f"sbc-{material}" if material else "sbc"
-    )
-    results = _carry_out(call, settings, folder, len(tasks_of(settings)), run_sbc)
+    folder = _folder(call, f"sbc-{material}" if material else "sbc")
+    results = _carry_out(call, settings, folder, run_sbc)
     call.put_into(folder, sbc_result(settings, results))
 
 
@@ -84,11 +83,10 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
     """Predict real tests from others, and count how often bands hold; the same command resumes a stopped benchmark."""
     from tissuq.report.tissues import tissue_result
     from tissuq.validation.tissues import TissueSettings, run_benchmark
-    from tissuq.validation.tissues.benchmark import tasks_of
 
     settings = call.loaded_as(TissueSettings)
-    target = call.how.out or Path("runs") / (call.config.stem if call.config else "tissues")
-    results = _carry_out(call, settings, target, len(tasks_of(settings)), run_benchmark)
+    target = _folder(call, "tissues")
+    results = _carry_out(call, settings, target, run_benchmark)
     call.put_into(target, tissue_result(settings, results))
 
 
@@ -97,20 +95,24 @@ def tissues(call: Call[TissueOptions, Campaign]) -> None:
 def structures(call: Call[StructureStudyOptions, Campaign]) -> None:
     """Predict forces of structures from simple tests of a known law, and count how often bands hold; resumable."""
     from tissuq.report.structures import structures_result
-    from tissuq.validation.structures import StructureStudySettings, run_structures, tasks_of
+    from tissuq.validation.structures import StructureStudySettings, run_structures
 
     settings = call.loaded_as(StructureStudySettings)
-    target = call.how.out or Path("runs") / (call.config.stem if call.config else "structures")
-    results = _carry_out(call, settings, target, len(tasks_of(settings)), run_structures)
+    target = _folder(call, "structures")
+    results = _carry_out(call, settings, target, run_structures)
     call.put_into(target, structures_result(settings, results))
 
 
-def _carry_out(
-    call: Call[Any, Any], settings: Any, folder: Path, total: int, run: Callable[..., list[dict[str, Any]]]
-) -> list[dict[str, Any]]:
+def _folder(call: Call[Any, Any], name: str) -> Path:
+    """Return the folder of a campaign: that which is named, or one called as its configuration, or else ``name``."""
+    return call.how.out or Path("runs") / (call.config.stem if call.config else name)
+
+
+def _carry_out(call: Call[Any, Any], settings: Any, folder: Path, run: CampaignOfTasks[Any]) -> list[dict[str, Any]]:
     """Carry out a campaign in its folder; nothing is written before its workers are there."""
     from tissuq.studies.stream import open_pool
 
+    total = len(run.tasks_of(settings))
     check_folder(folder, settings)
     with open_pool(call.how.workers, call.how.scheduler) as pool, call.campaign_in(folder)(total) as step:
         write_campaign_recipe(folder, settings)

@@ -8,9 +8,10 @@ import numpy as np
 
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, TRUTH, new_figure
 from tissuq.errors import ConvergenceError
+from tissuq.finite_elements.spread import PROBABILITY
 from tissuq.report.result import MAX_NUMBERS, Number, Picture, Result, Section, Table
 from tissuq.validation.structures import StructureStudySettings, summarise_structures
-from tissuq.validation.structures.campaign import DEFAULT, NOMINAL, ORACLE
+from tissuq.validation.structures.campaign import DEFAULT, ORACLE
 from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def structures_result(settings: StructureStudySettings, results: list[dict[str, 
         f"{len(settings.structures)} structures",
         numbers=_numbers(summary),
         finding=f"Simple tests of a known law with errors of a laboratory, fitted by default, predict the force of a "
-        f"structure: a band that is right holds the true one in {100 * NOMINAL:.0f} %.",
+        f"structure: a band that is right holds the true one in {100 * PROBABILITY:.0f} %.",
         next_step="see whether predictions of real tests hold: tissuq study tissues",
         picture=Picture(
             "answer", lambda: _figure(results), "Bands of the force over the true one",

@@ -18,16 +18,18 @@ from concurrent.futures import (
 )
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, Generic, ParamSpec, Protocol, TypeVar
 
 from tissuq.errors import InputError
 
-__all__ = ["RESULTS", "Step", "WorkerProcesses", "open_pool", "read_results", "run_tasks", "silent"]
+__all__ = ["RESULTS", "Campaign", "Step", "WorkerProcesses", "open_pool", "read_results", "run_tasks", "silent"]
 
 Arguments = ParamSpec("Arguments")
 Value = TypeVar("Value")
@@ -179,6 +181,7 @@ class Task(Protocol):
 
 
 Kind = TypeVar("Kind", bound=Task)
+Settings = TypeVar("Settings")
 
 
 def run_tasks(
@@ -231,6 +234,28 @@ def run_tasks(
         scratch.write_text("".join(json.dumps(result_row) + "\n" for result_row in results), encoding="utf-8")
         scratch.replace(path)
     return results
+
+
+@dataclass(frozen=True)
+class Campaign(Generic[Settings]):
+    """Carries out what settings ask for, task by task: call it with settings and the folder of the results.
+
+    Parameters
+    ----------
+    tasks_of : callable
+        Returns the tasks of settings, in their order.
+    carry_out : callable
+        Returns the result of a task under settings, plain data.
+    """
+
+    tasks_of: Callable[[Settings], Sequence[Any]]
+    carry_out: Callable[[Settings, Any], dict[str, Any]]
+
+    def __call__(
+        self, settings: Settings, folder: Path, *, pool: Executor | None = None, step: Step = silent
+    ) -> list[dict[str, Any]]:
+        """Carry out what is not done yet, as `run_tasks` does; return the results of all tasks, in their order."""
+        return run_tasks(self.tasks_of(settings), partial(self.carry_out, settings), folder, pool=pool, step=step)
 
 
 def read_results(path: Path) -> dict[str, dict[str, Any]]:

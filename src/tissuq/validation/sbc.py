@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -23,7 +21,7 @@ from tissuq.model.scales import default_prior
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.parameters.priors import Flat, HalfCauchy, Normal, Prior, Uniform, prior_from
 from tissuq.studies.campaign_settings import SbcOptions
-from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.studies.stream import Campaign
 from tissuq.validation.coverage.fitted import fit_all, model_of, parameters_of
 from tissuq.validation.coverage.settings import BLOCK, Design
 
@@ -195,16 +193,6 @@ def tasks_of(settings: SbcSettings) -> list[Task]:
     ]
 
 
-def run_sbc(
-    settings: SbcSettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
-) -> list[dict[str, Any]]:
-    """Carry out what is not done yet, and return the results of all tasks, in their order.
-
-    Parameters and exceptions are those of `tissuq.studies.stream.run_tasks`.
-    """
-    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
-
-
 def carry_out(settings: SbcSettings, task: Task) -> dict[str, Any]:
     """Return the posterior probability below the true value of every parameter; null where a fit failed."""
     formulation, noise = settings.formulations[task.formulation], settings.noise[task.noise]
@@ -225,6 +213,10 @@ def carry_out(settings: SbcSettings, task: Task) -> dict[str, Any]:
                 marginal = fit.marginals[symbol]
                 ranks[symbol][index] = probability_below(marginal, truths[index][symbol], uniform)
     return {"formulation": task.formulation, "noise": task.noise, "below": ranks}
+
+
+run_sbc = Campaign(tasks_of, carry_out)
+"""Carries out simulation-based calibration."""
 
 
 def probability_below(marginal: Marginal, value: float, uniform: float) -> float:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
-from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +15,7 @@ from tissuq.experiments.experiment import Experiment
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.mechanics.invariants import farthest_stretch, largest_invariants
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.studies.stream import Campaign
 from tissuq.validation.coverage.fitted import fit_all
 from tissuq.validation.coverage.settings import BLOCK, CoverageSettings
 from tissuq.validation.coverage.truths import TRUTHS, Truth, draw_truth
@@ -115,24 +112,6 @@ def tasks_of(settings: CoverageSettings) -> list[Task]:
     ]
 
 
-def run_campaign(
-    settings: CoverageSettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
-) -> list[dict[str, Any]]:
-    """Carry out what is not done yet of a campaign, and return the results of all tasks, in their order.
-
-    Parameters
-    ----------
-    settings : CoverageSettings
-    folder : Path
-        Exists; holds the results so far, if any.
-    pool : Executor, optional
-        Workers from `tissuq.studies.stream.open_pool`.
-    step : callable
-        Told of every task that is done: its label, and whether it was done now or before.
-    """
-    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
-
-
 def carry_out(settings: CoverageSettings, task: Task) -> dict[str, Any]:
     """Return truths, intervals and moments of C10 in every replicate of a task; null where a fit failed.
 
@@ -169,6 +148,10 @@ def carry_out(settings: CoverageSettings, task: Task) -> dict[str, Any]:
         sd / float(np.linalg.norm(truth.law(mode, stretch))) for sd, truth in zip(noise_sd, truths, strict=True)
     ]
     return task.indices | {"truth": [truth.C10 for truth in truths], "oracle_sd": oracle_sd, **rows}
+
+
+run_campaign = Campaign(tasks_of, carry_out)
+"""Carries out a campaign of coverage."""
 
 
 def _interval(fit: Posterior | Average, prob: float) -> list[float]:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import lru_cache, partial
-from pathlib import Path
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +12,11 @@ import numpy as np
 from tissuq.errors import TissuqError
 from tissuq.finite_elements.response import respond
 from tissuq.finite_elements.simulation import COMPLETE, simulate
-from tissuq.finite_elements.spread import PROBABILITY, band_of
+from tissuq.finite_elements.spread import band_of
 from tissuq.mechanics import material_named
 from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
-from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.studies.stream import Campaign
 from tissuq.validation.structures.settings import KNOWN_LAWS, STRUCTURES, StructureStudySettings
 from tissuq.validation.structures.simulated_tests import simulated_tests
 
@@ -54,24 +52,6 @@ def tasks_of(settings: StructureStudySettings) -> list[StructureTask]:
     return [StructureTask(truth, number) for number in range(settings.replicates) for truth in settings.truths]
 
 
-def run_structures(
-    settings: StructureStudySettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
-) -> list[dict[str, Any]]:
-    """Carry out what is not done yet of a campaign, and return the results of all tasks, in their order.
-
-    Parameters
-    ----------
-    settings : StructureStudySettings
-    folder : Path
-        Exists; holds the results so far, if any.
-    pool : Executor, optional
-        Workers from `tissuq.studies.stream.open_pool`.
-    step : callable
-        Told of every task that is done: its label, and whether it was done now or before.
-    """
-    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
-
-
 def carry_out(settings: StructureStudySettings, task: StructureTask) -> dict[str, Any]:
     """Return true forces (N) and bands of the structures for a set of tests; ``failure`` says why there are none."""
     truth = KNOWN_LAWS[task.truth]
@@ -91,6 +71,10 @@ def carry_out(settings: StructureStudySettings, task: StructureTask) -> dict[str
     except TissuqError as error:
         row["failure"] = str(error)
     return row
+
+
+run_structures = Campaign(tasks_of, carry_out)
+"""Carries out a campaign on the force of structures."""
 
 
 @lru_cache
@@ -146,7 +130,3 @@ def summarise_structures(results: Sequence[dict[str, Any]]) -> pd.DataFrame:
             "width_ratio": np.median(width / oracle_width), "error": np.median(np.abs(default["mean"] / force - 1)),
         })  # fmt: skip
     return pd.DataFrame(rows)
-
-
-NOMINAL = PROBABILITY
-"""Share of the bands that are to hold the truth."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import lru_cache, partial
-from pathlib import Path
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +18,7 @@ from tissuq.posterior.fitting import fit
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import predictive_mixtures, speaks_of
 from tissuq.prediction.scores import interval_score, root_mean_square
-from tissuq.studies.stream import Step, run_tasks, silent
+from tissuq.studies.stream import Campaign
 from tissuq.validation.tissues.corpus import TissueSet, read_corpus
 from tissuq.validation.tissues.protocols import ESTIMAND_OF_PROTOCOL, PROTOCOLS, Split
 from tissuq.validation.tissues.settings import TissueSettings
@@ -88,24 +86,6 @@ def tasks_of(settings: TissueSettings) -> list[PredictionTask]:
     return tasks
 
 
-def run_benchmark(
-    settings: TissueSettings, folder: Path, *, pool: Executor | None = None, step: Step = silent
-) -> list[dict[str, Any]]:
-    """Carry out what is not done yet of a benchmark, and return the results of all tasks, in their order.
-
-    Parameters
-    ----------
-    settings : TissueSettings
-    folder : Path
-        Exists; holds the results so far, if any.
-    pool : Executor, optional
-        Workers from `tissuq.studies.stream.open_pool`.
-    step : callable
-        Told of every task that is done: its label, and whether it was done now or before.
-    """
-    return run_tasks(tasks_of(settings), partial(carry_out, settings), folder, pool=pool, step=step)
-
-
 def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
     """Return how one test was predicted; ``failure`` says why, where it was not."""
     split = _splits(settings.folder, task.tissue, task.protocol)[task.number]
@@ -134,6 +114,10 @@ def carry_out(settings: TissueSettings, task: PredictionTask) -> dict[str, Any]:
         return row
     except (TissuqError, np.linalg.LinAlgError) as error:
         return row | {"failure": str(error)}
+
+
+run_benchmark = Campaign(tasks_of, carry_out)
+"""Carries out a benchmark on real tissue."""
 
 
 def predicted(posterior: Posterior, test: Experiment) -> dict[str, float]:
