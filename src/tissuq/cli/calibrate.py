@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import shlex
 from pathlib import Path
 from typing import Any
 
 from tissuq.cli.call import Call, not_converged
 from tissuq.cli.command import command
-from tissuq.cli.named_again import check_named_again, is_function
+from tissuq.cli.named_again import check_named_again
 from tissuq.cli.running import Written
 from tissuq.errors import InputError
 from tissuq.studies.calibration_settings import CalibrationSettings
@@ -71,10 +70,4 @@ def _check_named_again(call: Call[CalibrationSettings, CalibrateOptions], settin
             f"--umbridge {settings.umbridge}"
         )
     if call.config and settings.model:
-        functions = [
-            f"--{option} {shlex.quote(f'{name}={text}')}"
-            for option, setting in (("qoi", "quantities"), ("along", "along"))
-            for name, text in getattr(settings, setting).items()
-            if is_function(text) and name not in call.stated.get(setting, {})
-        ]
-        check_named_again(call.config, settings, call.stated, functions)
+        check_named_again(call.config, settings, call.stated, {"quantities": "--qoi", "along": "--along"})

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
-from tissuq.cli.named_again import check_named_again, is_function
+from tissuq.cli.named_again import check_named_again
 from tissuq.cli.running import Configured, LawOfRun
 from tissuq.errors import InputError
 from tissuq.studies.ensemble_settings import EnsembleSettings
@@ -96,12 +95,7 @@ def _settings(call: Call[EnsembleSettings, EnsembleOptions]) -> EnsembleSettings
             raise InputError(f"give {example}: what the model is asked for.")
     settings = call.loaded(model=model, materials=materials or None)
     if call.config:
-        functions = [
-            f"--qoi {shlex.quote(f'{name}={text}')}"
-            for name, text in settings.quantities.items()
-            if is_function(text) and name not in stated.get("quantities", {})
-        ]
-        check_named_again(call.config, settings, stated, functions, is_dry=call.how.dry_run)
+        check_named_again(call.config, settings, stated, {"quantities": "--qoi"}, is_dry=call.how.dry_run)
     return settings
 
 

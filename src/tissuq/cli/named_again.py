@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +11,16 @@ from tissuq.errors import InputError
 from tissuq.studies.model_settings import ModelSettings
 from tissuq.studies.settings import is_inside
 
-__all__ = ["check_named_again", "is_function"]
-
-
-def is_function(text: str) -> bool:
-    """Return whether a quantity is a function in a file, which would be run."""
-    from tissuq.mechanics.user_law import LAW
-
-    return LAW.fullmatch(text) is not None
+__all__ = ["check_named_again"]
 
 
 def check_named_again(
-    config: Path, settings: ModelSettings, stated: Mapping[str, Any], functions: Sequence[str], *, is_dry: bool = False
+    config: Path,
+    settings: ModelSettings,
+    stated: Mapping[str, Any],
+    quantities: Mapping[str, str],
+    *,
+    is_dry: bool = False,
 ) -> None:
     """Refuse to run programs, or to read files elsewhere, that a recipe names and the command line does not.
 
@@ -33,8 +31,8 @@ def check_named_again(
     settings : ModelSettings
     stated : mapping of str to object
         What the command line names.
-    functions : sequence of str
-        Options with functions of the user's that it does not name.
+    quantities : mapping of str to str
+        Settings with quantities by name, which may be functions in files, and the options that they are typed as.
     is_dry : bool
         Whether nothing is to be run.
 
@@ -43,11 +41,16 @@ def check_named_again(
     InputError
         When there are some; the message has the options to type.
     """
+    from tissuq.mechanics.user_law import LAW
+
     missing = []
     if not is_dry:
         if settings.command and not stated.get("command"):
             missing.append(f"--command {shlex.quote(settings.command)}")
-        missing += functions
+        for setting, option in quantities.items():
+            for name, text in getattr(settings, setting).items():
+                if LAW.fullmatch(text) and name not in stated.get(setting, {}):
+                    missing.append(f"{option} {shlex.quote(f'{name}={text}')}")
     inside = config.parent.resolve()
     if "also" not in stated and not all(is_inside(inside / file, inside) for file in settings.also):
         missing += [f"--also {shlex.quote(file)}" for file in settings.also]

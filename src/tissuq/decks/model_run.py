@@ -22,7 +22,7 @@ from tissuq.decks.quantity import Component, Quantity, Results
 from tissuq.decks.solver import LOG, Solver
 from tissuq.errors import InputError
 
-__all__ = ["DONE", "FIELDS", "SCRATCH", "ModelRun", "carried_out", "sets_of"]
+__all__ = ["DONE", "FIELDS", "ModelRun", "carried_out", "clear_unfinished", "sets_of"]
 
 DONE = "run.json"
 """What is known of a run of the solver that has ended, in its folder."""
@@ -116,6 +116,12 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     if not task.keep:
         _strip(task.folder)
     return {**stored, "curves": curves, "misread": misread, "beyond": beyond, "folder": task.folder.name}
+
+
+def clear_unfinished(folder: Path) -> None:
+    """Delete what runs of a process that was killed have left in the folder of all runs."""
+    for unfinished in folder.glob(f"{SCRATCH}*"):
+        shutil.rmtree(unfinished, ignore_errors=True)
 
 
 def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tissuq.decks import Deck, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_files import MODEL, copy_model, extra_files
-from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out, sets_of
+from tissuq.decks.model_run import ModelRun, carried_out, clear_unfinished, sets_of
 from tissuq.decks.quantity import Component, Curve
 from tissuq.emulation.forward import Forward, UnreadableError
 from tissuq.emulation.material_posterior import card_material
@@ -160,8 +160,7 @@ class DeckForward(Forward):
 
     def prepared_in(self, folder: Path) -> DeckForward:
         copy_model(self.read_deck, self.also, Path(), folder)
-        for unfinished in (folder / SOLVED).glob(f"{SCRATCH}*"):  # of a process that was killed
-            shutil.rmtree(unfinished, ignore_errors=True)
+        clear_unfinished(folder / SOLVED)
         return replace(self, folder=folder.absolute())
 
     def run(self, parameters: Mapping[str, float], control: FloatArray) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 from tissuq.decks import Deck, FunctionQuantity, Quantity, Solver, parse_quantity, solver_for
 from tissuq.decks.model_ensemble import ModelEnsemble, gathered
 from tissuq.decks.model_files import MODEL, extra_files
-from tissuq.decks.model_run import SCRATCH, ModelRun, carried_out, sets_of
+from tissuq.decks.model_run import ModelRun, carried_out, clear_unfinished, sets_of
 from tissuq.decks.quantity import located
 from tissuq.errors import InputError
 from tissuq.export import Cards, card_format
@@ -217,8 +216,7 @@ def run_ensemble(
     InputError, ConvergenceError
         When a quantity cannot be read, or hardly any draw gets anywhere.
     """
-    for unfinished in (folder / DRAWS).glob(f"{SCRATCH}*"):  # of a process that was killed
-        shutil.rmtree(unfinished, ignore_errors=True)
+    clear_unfinished(folder / DRAWS)
     tasks = prepared.tasks(folder.absolute(), timeout=timeout, retries=retries, keep=keep)
     unique = list({task.key: task for task in tasks}.values())
     with progress(len(unique)) as step:
