@@ -151,19 +151,24 @@ def _predictive(study: SpecimenStudy, found: Any, *, discrepancy: bool) -> Figur
 def _sections(study: SpecimenStudy, summary: list[Row], predictive: Any) -> tuple[Section, ...]:
     """Return what a page folds: the material's faults, checks, stability, parameters, methods, data."""
     is_slim, is_single = len(summary) < 3, len(summary) == 1
-    checks: list[Block] = [CHECKS, *[_summary_table(study, summary)] * is_single]
+    checks: list[Block] = [CHECKS]
+    of_parameters: list[Block] = []
+    if is_single:  # several are compared above
+        checks.append(_summary_table(study, summary))
+        of_parameters.append(_marginals(study))
     for name, kind, alt, caption in (
         ("with_discrepancy", True, "Predictive bands with the discrepancy", WITH_DISCREPANCY),
         ("model_alone", False, "Predictive bands of the model alone", MODEL_ALONE),
     ):
         checks.append(Picture(name, partial(predictive, discrepancy=kind), alt, caption, is_slim))
-    parameters = parameter_table(study.posteriors)
+    of_parameters.append(parameter_table(study.posteriors))
     cautions = tuple(
         f"**{name}**: {posterior.model.discrepancy.caution}"
         for name, posterior in study.posteriors.items()
         if posterior.model.discrepancy.caution
     )
-    of_parameters: list[Block] = [*[_marginals(study)] * is_single, parameters, *[cautions] * bool(cautions)]
+    if cautions:
+        of_parameters.append(cautions)
     sections = [_extent(study.assessments)] if study.assessments else []
     sections.append(Section("Predictive checks", tuple(checks)))
     if rows := stability_rows(study.posteriors):
@@ -178,7 +183,9 @@ def _extent(assessments: Mapping[str, Assessment]) -> Section:
     """Return to what extent the material is wrong, by discrepancy where there are several."""
     blocks: list[Block] = []
     for name, assessment in assessments.items():
-        blocks += [*[f"**{name}**"] * (len(assessments) > 1), tuple(assessment.sentences)]
+        if len(assessments) > 1:
+            blocks.append(f"**{name}**")
+        blocks.append(tuple(assessment.sentences))
     return Section("To what extent the material is wrong", tuple(blocks))
 
 
