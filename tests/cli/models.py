@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import csv
+import os
 import shutil
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 STUB = Path(__file__).parents[1] / "stub_solver.py"
+PATIENCE_S = 120.0
+"""For the first results of a command."""
 DECK = """*HEADING
 *NODE, NSET=TOP
 1, 0., 0., 0.
@@ -40,3 +46,19 @@ def started(folder: Path) -> list[str]:
     """Return the folders in which the stub was run, in their order."""
     log = folder / "started"
     return log.read_text(encoding="utf-8").split() if log.exists() else []
+
+
+def killed_after(count: int, results: Path, folder: Path, *words: object) -> list[str]:
+    """Kill a command in a folder when so many lines stand in a file of results, and return these lines."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from tissuq.cli import main; main()", *map(str, words)],
+        cwd=folder, env=dict(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    deadline = time.monotonic() + PATIENCE_S
+    while not results.exists() or results.read_text(encoding="utf-8").count("\n") < count:
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    return results.read_text(encoding="utf-8").splitlines()[:count]

@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +11,10 @@ import pytest
 import tissuq as tq
 
 from .conftest import run_in, write_specimen
-from .models import rows_of, started, write_model
+from .models import killed_after, rows_of, started, write_model
 
 TIMES = np.array([0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0])
 TRUTH, NOISE_SD = 3.0, 0.1
-PATIENCE_S = 120.0
 
 
 def forces(folder: Path) -> tuple[float, float]:
@@ -97,18 +91,8 @@ def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
 def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, words):
     forces(here)
     (here / "slow").write_text("0.3")
-    process = subprocess.Popen(
-        [sys.executable, "-c", "from tissuq.cli import main; main()", *map(str, words), *WIDE],
-        cwd=here, env=dict(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    results, deadline = here / "out-forward-runs" / "batch-0" / "tasks.jsonl", time.monotonic() + PATIENCE_S
-    while not results.exists() or results.read_text(encoding="utf-8").count("\n") < 3:
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    done = results.read_text(encoding="utf-8").splitlines()[:3]
+    results = here / "out-forward-runs" / "batch-0" / "tasks.jsonl"
+    done = killed_after(3, results, here, *words, *WIDE)
     (here / "slow").unlink()
     before = len(started(here))
     said = cli(*words, *WIDE)

@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
 
-from .models import rows_of, started
-
-PATIENCE_S = 120.0
+from .models import killed_after, rows_of, started
 
 
 def test_what_is_done_is_not_done_again_and_another_quantity_needs_no_run(cli, here, model):
@@ -74,20 +67,8 @@ def test_the_files_of_the_solver_go_where_they_are_not_kept(cli, here, model):
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs Linux")
 def test_what_is_killed_in_the_middle_loses_nothing_that_was_done(cli, here, model):
     (here / "slow").write_text("0.5")
-    arguments = ["ensemble", *map(str, model), "--no-figures"]
-    process = subprocess.Popen(
-        [sys.executable, "-c", "from tissuq.cli import main; main()", *arguments],
-        cwd=here, env=dict(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    deadline = time.monotonic() + PATIENCE_S
     results = here / "out" / "tasks.jsonl"
-    while not results.exists() or results.read_text(encoding="utf-8").count("\n") < 3:
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    done = results.read_text(encoding="utf-8").splitlines()[:3]
+    done = killed_after(3, results, here, "ensemble", *model, "--no-figures")
     (here / "slow").unlink()
     said = cli("ensemble", *model, "--no-figures")
     assert said.status == 0, said.err
