@@ -1,0 +1,107 @@
+"""The figures of a calibration: bands over the measurements, the check of the emulator, marginal posteriors."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tissuq.drawing import pieces
+from tissuq.drawing.panels import legend_above
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
+from tissuq.emulation import Calibration
+from tissuq.studies.calibration import Measured
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["band_figure", "check_figure", "marginals_figure"]
+
+EXACT = "#D55E00"
+MAX_COLUMNS = 3
+"""Panels in a row of the figure of marginals."""
+
+
+def band_figure(calibration: Calibration, data: Measured, *, is_narrow: bool = False) -> Figure:
+    """Return the 95 % predictive band over the measurements: with the discrepancy, and of the forward model alone.
+
+    Where it is to be narrow, without the latter.
+    """
+    titles = {True: "with the discrepancy", False: "forward model alone"}
+    if not calibration.problem.discrepancy.is_correlated:
+        titles = {True: "forward model"}
+    elif is_narrow:
+        titles = {True: titles[True]}
+    with new_figure(ANSWER_WIDTH if is_narrow else 4.6 * len(titles) + 0.8, 3.9) as figure:
+        panels = figure.subplots(1, len(titles), squeeze=False, sharey=True)[0]
+        order = np.argsort(data.control, kind="stable")
+        for axis, (with_discrepancy, title) in zip(panels, titles.items(), strict=True):
+            band = calibration.predict(discrepancy=with_discrepancy).iloc[order]
+            pieces.band(axis, band["control"], band["low"], band["high"], label="95 % predictive band")
+            pieces.line(axis, band["control"], band["mean"], label="predicted mean")
+            pieces.points(axis, data.control, data.measured)
+            axis.set_title(f"{title}:  {calibration.predictive_coverage(discrepancy=with_discrepancy):.0%} inside")
+            axis.set_xlabel(data.control_label)
+        panels[0].set_ylabel(data.measured_label)
+        panels[0].legend(fontsize=9)
+    return figure
+
+
+def check_figure(calibration: Calibration) -> Figure:
+    """Return the validation of the emulator: every run predicted from the others, and new runs."""
+    trials = [(calibration.check, BAND, "o", "left out")]
+    trials += [(trial, EXACT, "s", "" if index else "in the posterior, before refinement")
+               for index, trial in enumerate(calibration.held_out)]  # fmt: skip
+    with new_figure(10.0, 3.9) as figure:
+        error_axis, standardised_axis = figure.subplots(1, 2)
+        for check, color, mark, label in trials:
+            computed, error = check.computed.ravel(), (check.predicted - check.computed).ravel()
+            size = np.abs(check.computed).max()
+            bars: dict[str, Any] = {"yerr": 1.96 * check.sd.ravel() / size, "ecolor": color, "elinewidth": 0.5}
+            error_axis.errorbar(computed, error / size, fmt=mark, ms=2.6, color=color, alpha=0.6, label=label, **bars)
+            standardised_axis.plot(computed, check.standardised.ravel(), mark, ms=2.6, color=color, alpha=0.6)
+        error_axis.axhline(0, color=INK, lw=0.8)
+        error_axis.set_title("Emulator minus model, over the largest output")
+        for end in (-1.96, 1.96):
+            standardised_axis.axhline(end, color=BASE, lw=1, ls="--")
+        standardised_axis.set_title("The same in standard deviations (dashed: 95 %)")
+        for axis in (error_axis, standardised_axis):
+            axis.set_xlabel("output of the model")
+        error_axis.legend(fontsize=9)
+    return figure
+
+
+def marginals_figure(calibration: Calibration) -> Figure:
+    """Return the marginal posterior of every parameter with its prior, and as if the emulator were exact."""
+    symbols = calibration.problem.symbols
+    columns = min(MAX_COLUMNS, len(symbols))
+    rows = ceil(len(symbols) / columns)
+    with new_figure(3.6 * columns + 0.6, 2.7 * rows + 0.7) as figure:
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axis, symbol in zip(panels, symbols, strict=False):
+            _draw_marginal(axis, calibration, symbol)
+        for spare in panels[len(symbols) :]:
+            spare.set_visible(False)
+        legend_above(figure, panels[:1])
+    return figure
+
+
+def _draw_marginal(axis: Axes, calibration: Calibration, symbol: str) -> None:
+    posterior, exact = calibration.marginals[symbol], calibration.without_emulator_error.marginals[symbol]
+    ends = np.array([marginal.quantile([0.001, 0.999]) for marginal in (posterior, exact)])
+    values = np.linspace(ends[:, 0].min(), ends[:, 1].max(), 500)
+    pieces.density(axis, values, posterior.pdf(values), label="posterior")
+    axis.plot(values, exact.pdf(values), color=EXACT, lw=1.2, ls="--", label="as if the emulator were exact")
+    low, high = calibration.problem.priors[symbol].support
+    inside = (values > low) & (values < high)
+    prior = np.exp(calibration.problem.priors[symbol].log_density(values[inside]))
+    axis.plot(values[inside], prior, ":", color=BASE, lw=1.4, label="prior")
+    axis.plot(posterior.hdi(), [0, 0], color=BAND, lw=4, solid_capstyle="butt")
+    top = max(posterior.density.max(), float(exact.pdf(values).max()))
+    axis.set_ylim(-0.02 * top, min(1.08 * top, 4 * float(posterior.density.max())))
+    axis.set_title(symbol)
+    axis.set_yticks([])
+    axis.spines["left"].set_visible(False)
+    axis.locator_params(axis="x", nbins=5)
