@@ -71,8 +71,8 @@ def structures_result(settings: StructureStudySettings, results: list[dict[str, 
     return Result(
         command="study structures",
         title="Do bands of the force of a structure hold?",
-        subject=f"{settings.replicates} sets of tests of each law, {len(settings.truths)} laws, "
-        f"{len(settings.structures)} structures",
+        subject=f"{settings.replicates} sets of tests of each law: {', '.join(settings.truths)}; structures: "
+        f"{', '.join(settings.structures)}",
         numbers=_numbers(summary),
         finding=f"Simple tests of a known law with errors of a laboratory, fitted by default, predict the force of a "
         f"structure: a band that is right holds the true one in {100 * PROBABILITY:.0f} %.",
