@@ -111,6 +111,6 @@ def continuations(
     from scipy.interpolate import Akima1DInterpolator
 
     log_invariant = np.broadcast_to(np.log(rays.end_invariant), energies.shape)
-    values = np.stack([log_invariant, energies, stresses / rays.end_rate, exponents, errors], axis=-1)
-    functions = Akima1DInterpolator(DIRECTIONS, values, axis=1)
-    return [Continuation(np.ascontiguousarray(np.moveaxis(draw, -1, 0))) for draw in np.moveaxis(functions.c, 2, 0)]
+    values = np.stack([log_invariant, energies, stresses / rays.end_rate, exponents, errors], axis=1)
+    functions = Akima1DInterpolator(DIRECTIONS, values, axis=2)
+    return [Continuation(draw) for draw in functions.c.transpose(2, 3, 0, 1).copy()]

@@ -57,9 +57,9 @@ def pieces(knots: FloatArray, slopes: FloatArray) -> list[Pieces]:
     from scipy.interpolate import CubicSpline
 
     functions = CubicSpline(knots, slopes).antiderivative()
-    coefficients = functions.c.copy()
-    coefficients[-1] -= functions(0.0)
-    return [Pieces(knots, coefficients[..., n]) for n in range(slopes.shape[1])]
+    coefficients = functions.c.transpose(2, 0, 1).copy()  # of a function together in memory, which is searched often
+    coefficients[:, -1] -= functions(0.0)[:, None]
+    return [Pieces(knots, own) for own in coefficients]
 
 
 class PiecewiseEnergy(NamedTuple):
