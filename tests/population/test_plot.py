@@ -7,7 +7,7 @@ import tissuq as tq
 
 @pytest.fixture(scope="module")
 def population():
-    stretch, moduli = np.linspace(0.8, 1.3, 8), {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45}
+    stretch, moduli = np.linspace(0.8, 1.3, 8), {"a": 0.4, "b": 0.5, "c": 0.6, "d": 0.7, "e": 0.45, "f": 0.55}
     specimens = {
         name: tq.simulate("neo-hookean", {"C10": modulus}, stretch, 0.01, seed=seed).labelled(stress_unit="kPa")
         for seed, (name, modulus) in enumerate(moduli.items())
