@@ -359,7 +359,7 @@ def test_a_file_that_cannot_be_opened_is_reported(written, monkeypatch, error, w
     assert words in message(path)
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\r\r\n"])
 def test_lines_may_end_in_any_way(tmp_path, end):
     path = tmp_path / "test.csv"
     path.write_bytes(end.join(["stretch,stress", "1.0,0.0", "", "1.1,x", "1.2,1"]).encode())
