@@ -99,6 +99,22 @@ def test_verbose_tells_how_long_every_stage_took(cli, specimen, monkeypatch):
     assert stages == ["none", "assessing", "writing"]
 
 
+def test_verbose_tells_how_long_reading_a_run_took(cli, specimen, monkeypatch):
+    monkeypatch.setattr(progress, "Timer", Endless)
+    assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
+    assert re.fullmatch(r"tissuq: reading: \d+\.\d s\n", cli("show", "run", "--verbose").err)
+    assert re.findall(r"tissuq: (\w+): \d+\.\d s\n", cli("compare", "run", "--verbose").err) == ["reading", "comparing"]
+
+
+def test_quiet_leaves_the_json_of_a_run_and_prints_the_numbers_of_a_comparison_alone(cli, specimen):
+    assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
+    assert cli("show", "run", "--json", "--quiet").out == cli("show", "run", "--json").out
+    loud, quiet = cli("compare", "run").out, cli("compare", "run", "--quiet")
+    assert quiet.status == 0
+    assert [line for line in quiet.out.splitlines() if line.partition(": ")[0] not in " ".join(loud.split())] == []
+    assert 0 < len(quiet.out.splitlines()) < len(loud.splitlines())
+
+
 def test_the_log_of_a_run_says_version_command_and_stages_and_nothing_of_the_machine(cli, here, specimen):
     assert cli("fit", specimen.name, *ALONE).status == 0
     text = (here / "runs" / "specimen" / LOG).read_text()
@@ -146,6 +162,7 @@ def test_quiet_prints_the_numbers_of_a_fit_alone(cli, here, specimen):
     assert (said.status, said.err) == (0, "")
     loud = " ".join(cli("show", "run").out.split())
     assert said.out
+    assert cli("show", "run", "--quiet") == said
     for line in said.out.splitlines():
         name, _, value = line.partition(": ")
         assert f"{name} {value}" in loud
