@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import noises, priors, tolerances
-from tissuq.studies.settings import looked_up
+from tissuq.studies.settings import SizesOfErrors, looked_up
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -76,7 +76,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         "What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a careful "
         "laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens].",
     )
-    tolerances: dict[str, float] | None = option(
+    tolerances: SizesOfErrors = option(
         None,
         "Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, length=2%, "
         "slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single "
@@ -98,14 +98,6 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         if ALL in names and names != (ALL,):
             raise ValueError(f"'{ALL}' cannot be combined with other names; give '{ALL}', or names")
         return names
-
-    @field_validator("tolerances")
-    @classmethod
-    def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        from tissuq.model.tolerances import Tolerances
-
-        looked_up(lambda given: Tolerances(**given), sizes or {})
-        return sizes
 
     @field_validator("estimand")
     @classmethod
