@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
     from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.experiments.units import StressUnit
+    from tissuq.mechanics import Material
     from tissuq.model.noise import Noise
     from tissuq.model.tolerances import Tolerances
 
@@ -97,6 +99,19 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     def _all_or_named(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         if ALL in names and names != (ALL,):
             raise ValueError(f"'{ALL}' cannot be combined with other names; give '{ALL}', or names")
+        from tissuq.model.discrepancy import discrepancy_named
+
+        for name in names:
+            if name != ALL:
+                looked_up(discrepancy_named, name)
+        return names
+
+    @field_validator("stable_in")
+    @classmethod
+    def _modes_there_are(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        from tissuq.assessment.stable_posterior import modes_named
+
+        looked_up(modes_named, names)
         return names
 
     @field_validator("estimand")
@@ -128,6 +143,12 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         tests = self.tests or (self,)
         of_tests = found or repeat(None, len(tests))
         return [test.reading(folder, of_test) for test, of_test in zip(tests, of_tests, strict=True)]
+
+    def fitted_laws(self, own: Mapping[str, Material] = MappingProxyType({})) -> dict[str, Material]:
+        """Return the laws that are fitted, by name; those in files of the user are given as ``own``."""
+        from tissuq.mechanics import material_named
+
+        return {self.material: own.get(self.material) or material_named(self.material)}
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements, of all tests together."""
@@ -170,3 +191,8 @@ class LawSettings(SpecimenSettings):
         if ALL in self.laws and self.laws != (ALL,):
             raise ValueError(f"'{ALL}' cannot be combined with other materials; give '{ALL}', or names")
         return self
+
+    def fitted_laws(self, own: Mapping[str, Material] = MappingProxyType({})) -> dict[str, Material]:
+        from tissuq.posterior.laws import laws_named
+
+        return laws_named(ALL if self.laws == (ALL,) else [own.get(name, name) for name in self.laws])
