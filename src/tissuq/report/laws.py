@@ -115,7 +115,7 @@ def readable_laws(study: LawStudy) -> list[list[str]]:
 
 def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
     median, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
-    difference = f"{row.elpd_difference:.1f} +- {row.elpd_difference_error:.1f}"
+    difference = f"{row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
     return [
         name,
         median,
