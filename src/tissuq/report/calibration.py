@@ -62,7 +62,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     inside_alone = calibration.predictive_coverage(discrepancy=False)
     alone = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
     numbers = [
-        Number(symbol, marginal.mean, *marginal.hdi(), interval_is="95 % HPD")
+        Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""), interval_is="95 % HPD")
         for symbol, marginal in calibration.marginals.items()
         if symbol in calibration.problem.forward_symbols
     ]
@@ -80,7 +80,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
         ),
         tables=(
-            Table(HEADERS, readable_calibration(calibration), f"{model}: {runs} runs",
+            Table(HEADERS, readable_calibration(study), f"{model}: {runs} runs",
                   note=f"{BY_EMULATOR} Emulator, {calibration.check}."),
         ),
         sections=_sections(study),
@@ -158,7 +158,11 @@ def _model_copies(
 def _tables(study: CalibrationStudy) -> dict[str, Any]:
     calibration, data = study.calibration, study.data
     rows: list[Row] = [
-        {"parameter": str(symbol), "prior": str(calibration.problem.priors[str(symbol)])}
+        {
+            "parameter": str(symbol),
+            "unit": study.units.get(str(symbol), ""),
+            "prior": str(calibration.problem.priors[str(symbol)]),
+        }
         | {str(name): known_number(value) for name, value in estimates.items()}
         for symbol, estimates in calibration.summary().iterrows()
     ]
@@ -198,22 +202,22 @@ def _rows(columns: dict[str, Any]) -> list[Row]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
-def readable_calibration(calibration: Calibration) -> list[list[str]]:
+def readable_calibration(study: CalibrationStudy) -> list[list[str]]:
     """Return the rows of the summary as text, under `HEADERS`, in the units of the forward model."""
-    rows = []
+    calibration, rows = study.calibration, []
     for symbol, marginal in calibration.marginals.items():
         low, high = marginal.hdi()
         mean, sd = interval(marginal.mean, marginal.sd, marginal.sd)
         ends = "[{}, {}]".format(*interval(low, high, marginal.sd))
         share = calibration.emulator_share[symbol]
-        rows.append([symbol, mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
+        rows.append([study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
     return rows
 
 
 def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     """Return what a page folds: posteriors, the emulator, what outputs depend on, failures, how it was computed."""
     calibration, runs = study.calibration, study.calibration.runs
-    symbols, held_out = list(runs.symbols), calibration.held_out
+    labels, held_out = list(map(study.label, runs.symbols)), calibration.held_out
     has_discrepancy = calibration.problem.discrepancy.is_correlated
     both = (
         " Left: forward model and discrepancy. Right: the forward model alone; where it misses, the model is wrong."
@@ -225,7 +229,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
         f"95 % predictive band of a new measurement, including noise.{both}", not has_discrepancy,
     )  # fmt: skip
     marginals = Picture(
-        "marginals", lambda: marginals_figure(calibration), "Marginal posteriors",
+        "marginals", lambda: marginals_figure(study), "Marginal posteriors",
         "Blue: marginal posterior and its 95 % HPD. Dashed: without the error of the emulator. Dotted: prior.",
     )  # fmt: skip
     alone = (
@@ -255,7 +259,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     sections = [
         Section("Posteriors and predictive checks", (band, coverage, marginals)),
         Section("The emulator", (EMULATOR, checks, errors, WORST,
-                Table([*symbols, "error", "sd", "standardised"], _worst_runs(calibration)))),
+                Table([*labels, "error", "sd", "standardised"], _worst_runs(calibration)))),
         Section("What the outputs depend on", (SOBOL, Table(["parameter", "first", "total"], sensitivity))),
     ]  # fmt: skip
     if runs.failure_summary:
@@ -264,7 +268,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
             for point, error in zip(runs.points, runs.errors, strict=True)
             if error
         ]
-        table = Table([*symbols, "reason"], failures)
+        table = Table([*labels, "reason"], failures)
         sections.append(Section("Runs that failed", (str(runs.failure_summary), table)))
     return (*sections, Section("How it was computed", _computed(study)))
 
@@ -287,7 +291,7 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
         f"Posterior by {calibration.posterior.method}. {calibration.posterior.verdict}{evidence} {study.seconds:.0f} s "
         "in all.",
     )
-    priors = [[symbol, str(prior)] for symbol, prior in calibration.problem.priors.items()]
+    priors = [[study.label(symbol), str(prior)] for symbol, prior in calibration.problem.priors.items()]
     blocks: list[Block] = [sentences, Table(["parameter", "prior"], priors, text_columns=(1,))]
     if settings.prior_correlations:
         named = (f"{pair.replace(',', ' and ')} {value:.2f}" for pair, value in settings.prior_correlations.items())
@@ -329,10 +333,12 @@ def _lead(study: CalibrationStudy) -> str:
     for symbol in calibration.problem.forward_symbols:
         marginal = calibration.marginals[symbol]
         low, high = interval(*marginal.hdi(), marginal.sd)
-        findings.append(f"{symbol} is {low} to {high}")
+        unit = f" {study.units[symbol]}" if symbol in study.units else ""
+        findings.append(f"{symbol} is {low} to {high}{unit}")
     share = max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols)
+    whose = "" if study.settings.material else ", in the units of the forward model"
     size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
     return (
-        f"With a probability of 95 % each, {', and '.join(findings)}, in the units of the forward model. The error of "
-        f"the emulator contributes {size} to their variance."
+        f"With a probability of 95 % each, {', and '.join(findings)}{whose}. The error of the "
+        f"emulator contributes {size} to their variance."
     )

@@ -11,7 +11,7 @@ from tissuq.drawing import pieces
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.emulation import Calibration
-from tissuq.studies.calibration import Measured
+from tissuq.studies.calibration import CalibrationStudy, Measured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,15 +73,16 @@ def check_figure(calibration: Calibration) -> Figure:
     return figure
 
 
-def marginals_figure(calibration: Calibration) -> Figure:
+def marginals_figure(study: CalibrationStudy) -> Figure:
     """Return the marginal posterior of every parameter with its prior, and as if the emulator were exact."""
-    symbols = calibration.problem.symbols
+    calibration, symbols = study.calibration, study.calibration.problem.symbols
     columns = min(MAX_COLUMNS, len(symbols))
     rows = ceil(len(symbols) / columns)
     with new_figure(3.6 * columns + 0.6, 2.7 * rows + 0.7) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, symbol in zip(panels, symbols, strict=False):
             _draw_marginal(axis, calibration, symbol)
+            axis.set_title(study.label(symbol))
         for spare in panels[len(symbols) :]:
             spare.set_visible(False)
         legend_above(figure, panels[:1])
@@ -101,7 +102,6 @@ def _draw_marginal(axis: Axes, calibration: Calibration, symbol: str) -> None:
     axis.plot(posterior.hdi(), [0, 0], color=BAND, lw=4, solid_capstyle="butt")
     top = max(posterior.density.max(), float(exact.pdf(values).max()))
     axis.set_ylim(-0.02 * top, min(1.08 * top, 4 * float(posterior.density.max())))
-    axis.set_title(symbol)
     axis.set_yticks([])
     axis.spines["left"].set_visible(False)
     axis.locator_params(axis="x", nbins=5)

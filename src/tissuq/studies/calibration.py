@@ -17,6 +17,8 @@ from tissuq.errors import InputError
 from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
+from tissuq.mechanics import material_named
+from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings
@@ -53,6 +55,18 @@ class CalibrationStudy:
     """That of the material in the forward model, where one is named."""
     prior_run: str | None = None
     """The run whose posterior the priors are."""
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of parameters where they are known: of the material that is named, and of the noise."""
+        material, of_noise = self.settings.material, self.data.units[1]
+        parameters = () if material is None else material_named(material).parameters
+        of_material = {parameter.symbol: self.settings.unit for parameter in parameters if parameter.unit}
+        return of_material | ({NOISE_SD.symbol: of_noise} if of_noise else {})
+
+    def label(self, symbol: str) -> str:
+        """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""
+        return f"{symbol} [{self.units[symbol]}]" if symbol in self.units else symbol
 
     @property
     def warnings(self) -> list[str]:

@@ -92,7 +92,7 @@ def run_design(
             "--measurements is for the default tests and a candidate states its own points: give only one of them."
         )
     step("loading the run")
-    posterior = load(folder / settings.run, settings.discrepancy, law)
+    posterior = load(folder / settings.run, settings.discrepancy, settings.law_of(law))
     targets = tuple(dict.fromkeys(target_named(name, posterior.model) for name in settings.targets))
     options = {"points": settings.points, "specimen": settings.specimen, "seed": settings.seed}
     table = rank_tests(posterior.solution, tests, targets, step=step, **options)  # type: ignore[arg-type]
