@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.running import Told
+from tissuq.cli.running import Verbosity
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.settings import DAMAGE
@@ -25,7 +25,7 @@ class ComparedRuns(Settings):
     runs: tuple[Path, ...] = argument(..., "Run folders, or files of posteriors in them.", takes=list[Path])
 
 
-class CompareOptions(Told):
+class CompareOptions(Verbosity):
     """Where a comparison is written, if at all."""
 
     out: Path | None = option(None, "Folder for table, figure and report.")

@@ -6,21 +6,21 @@ from pathlib import Path
 
 from tissuq.studies.option import Settings, option
 
-__all__ = ["Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Told", "Written"]
+__all__ = ["Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Verbosity", "Written"]
 
 
 class Running(Settings):
     """Options of a command on which its numbers do not depend."""
 
 
-class Told(Running):
+class Verbosity(Running):
     """A command that says as much as is asked for."""
 
     quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.")
     verbose: bool = option(False, "Tell how long every stage took.")
 
 
-class Configured(Told):
+class Configured(Verbosity):
     """A command that an earlier recipe repeats."""
 
     config: Path | None = option(None, "run.toml of an earlier run to repeat.")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.running import Told
+from tissuq.cli.running import Verbosity
 from tissuq.studies.option import Settings, argument, option
 
 __all__ = ["show"]
@@ -19,7 +19,7 @@ class ShownRun(Settings):
     run_folder: Path = argument(..., "Folder of a run.")
 
 
-class ShowOptions(Told):
+class ShowOptions(Verbosity):
     """How it is shown."""
 
     details: bool = option(False, "Also stability, what the discrepancy does, and all warnings.")

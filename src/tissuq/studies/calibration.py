@@ -95,7 +95,7 @@ def run_calibration(
     workers : int
         Processes that run the model.
     step : callable
-        Told of every run that is done.
+        Verbosity of every run that is done.
     **running
         How a finite-element model is run: ``timeout``, ``retries``, ``keep``.
 
