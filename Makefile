@@ -11,6 +11,8 @@ BENCH := .venv-bench
 APT := { apt-get install -qq -y calculix-ccx chromium || { apt-get update -qq && apt-get install -qq -y calculix-ccx chromium; }; }
 JAX_CACHE ?= .jax_cache
 
+unexport PYTHONDONTWRITEBYTECODE  # or each process compiles all tests, and each command that a test runs the package, anew
+
 .PHONY: demo test test-rest test-all mutants fuzz frozen architecture docs lint types check system lock bench clean help
 
 help:  ## List the targets

@@ -1,6 +1,6 @@
 """Labelled arrays as groups of a NetCDF file, which ArviZ and xarray open.
 
-Not through xarray, whose import takes longer than a fit.
+Not through xarray, whose import takes longer than a fit, nor h5netcdf, which takes longer than HDF5 itself.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ __all__ = ["Group", "LabelledGroup", "opened", "read_groups", "save_groups"]
 COMPRESSED_SIZE, SAMPLE_SIZE, MAX_SHRUNK_SHARE = 1000, 4000, 0.75
 """Number of values in an array from which it is compressed, if so many of its values then shrink to such a share."""
 COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable. {:9d}"
+"""Name of a scale that is a dimension without coordinates."""
 
 
 class Group(NamedTuple):
@@ -54,27 +56,31 @@ class LabelledGroup:
 
         return xr.Dataset(self.arrays, self.coordinates, self.attrs)
 
-    def write(self, file: Any) -> None:
-        """Write everything into a group of an open file of h5netcdf."""
+    def write(self, group: Any) -> None:
+        """Write everything into a group of an open file of HDF5, as NetCDF does: dimensions are scales."""
         import h5py
 
-        _write_attributes(file, self.attrs)
+        _write_attributes(group, self.attrs)
         scattered: dict[str, set[str]] = {}
         for name, described in (self.coordinates | self.arrays).items():
             along, values, *attributes = described if isinstance(described, tuple) else (name, described)
             dims, array = (along,) if isinstance(along, str) else tuple(along), np.asarray(values)
-            for dim, size in zip(dims, array.shape, strict=True):
-                if dim not in file.dimensions:
-                    file.dimensions[dim] = size
             array = array.astype(h5py.string_dtype()) if array.dtype.kind == "U" else array
             packed = COMPRESSION if array.size > COMPRESSED_SIZE and _shrinks(array) else {}
-            variable = file.create_variable(name, dims, array.dtype, array, **packed)
+            variable = group.create_dataset(name, data=array, **packed)
             _write_attributes(variable, *attributes)
-            if name not in self.coordinates:
+            if dims == (name,):
+                variable.make_scale(name)
+                continue
+            for axis, (dim, size) in enumerate(zip(dims, array.shape, strict=True)):
+                if dim not in group:
+                    group.create_dataset(dim, (size,), ">f4").make_scale(NO_VARIABLE.format(size))
+                variable.dims[axis].attach_scale(group[dim])
+            if name in self.coordinates:
+                scattered[name] = set(dims)
+            else:
                 beside = [key for key, labels in scattered.items() if labels <= set(dims)]
                 _write_attributes(variable, {"coordinates": " ".join(beside)} if beside else {})
-            elif dims != (name,):
-                scattered[name] = set(dims)
 
 
 def _shrinks(array: NDArray[Any]) -> bool:
@@ -92,20 +98,17 @@ def _write_attributes(file: Any, attributes: Mapping[str, str | float] | None = 
 
 def save_groups(groups: Mapping[str, LabelledGroup], path: Path) -> None:
     """Write groups by name, the root's ``"/"``, as one NetCDF file."""
-    import h5netcdf
+    import h5py
 
     content = BytesIO()  # the HDF5 library must not meet a full disk itself: it fails where no one can catch it
-    with h5netcdf.File(content, "w") as file:
+    with h5py.File(content, "w", track_order=True) as file:
         for name, group in groups.items():
-            group.write(file if name == "/" else file.create_group(name))
+            group.write(file if name == "/" else file.create_group(name, track_order=True))
     path.write_bytes(content.getvalue())
 
 
 def read_groups(path: Path, root: str) -> dict[str, Group]:
-    """Read a group of a file and all within it, by name; none where there is no such group. Coordinates are left out.
-
-    The attributes of a NetCDF file's dimensions take h5netcdf longer than HDF5 itself takes for all arrays.
-    """
+    """Read a group of a file and all within it, by name; none where there is no such group; without coordinates."""
     with opened(path) as file:
         return dict(_nested(file[root], root, root)) if root in file else {}
 
