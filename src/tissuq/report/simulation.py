@@ -311,7 +311,8 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         f"material including the discrepancy in the energy. Bulk modulus: {settings.bulk_ratio:g} times the draw's "
         "initial shear modulus.",
         f"{len(mesh.cells)} {'hexahedra' if mesh.is_solid else 'axisymmetric quadrilaterals'} with one pressure and "
-        f"one volume each (mean dilatation), FElupe's; Newton's method with load steps that are halved where it fails.{finer}",
+        "one volume each (mean dilatation), FElupe's; Newton's method with load steps that are halved where it fails."
+        f"{finer}",
         *_first_order(simulation),
         "Numbers after ± are bootstrap standard errors from the number of draws. "
         f"{simulation.seconds:.0f} s of one processor.",
