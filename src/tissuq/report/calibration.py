@@ -70,7 +70,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     return Result(
         command=_repeated(settings.model_copy(update=relocated)),
         title="Parameters of an expensive forward model",
-        subject=f"{len(study.data.control)} measurements · forward model {model} · {runs} runs · discrepancy "
+        subject=f"{len(calibration.problem.measured)} measurements · forward model {model} · {runs} runs · discrepancy "
         f"{settings.discrepancy}",
         numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=alone)),
         finding=_lead(study),
@@ -156,7 +156,7 @@ def _model_copies(
 
 
 def _tables(study: CalibrationStudy) -> dict[str, Any]:
-    calibration, data = study.calibration, study.data
+    calibration, problem = study.calibration, study.calibration.problem
     rows: list[Row] = [
         {
             "parameter": str(symbol),
@@ -167,9 +167,11 @@ def _tables(study: CalibrationStudy) -> dict[str, Any]:
         for symbol, estimates in calibration.summary().iterrows()
     ]
     bands = {name: calibration.predict(discrepancy=kind) for name, kind in (("", True), ("_model_alone", False))}
-    table: dict[str, Any] = {"control": data.control, "measured": data.measured}
+    table: dict[str, Any] = {"control": problem.control, "measured": problem.measured}
     for suffix, band in bands.items():
         table |= {f"{name}{suffix}": band[name].to_numpy() for name in ("mean", "low", "high")}
+    names = [name for name, (start, stop) in problem.quantities.items() for _ in range(stop - start)]
+    named = [{"quantity": name} if name else {} for name in names]
     runs = calibration.runs
     parameters = dict(zip(runs.symbols, runs.points.T, strict=True))
     outputs = {f"output_{number}": column for number, column in enumerate(runs.outputs.T, 1)}
@@ -177,7 +179,7 @@ def _tables(study: CalibrationStudy) -> dict[str, Any]:
     return {
         "summary.csv": rows,
         "summary.json": rows,
-        "prediction.csv": _rows(table),
+        "prediction.csv": [name | row for name, row in zip(named, _rows(table), strict=True)],
         "leave_one_out.csv": calibration.leave_one_out.to_dict("records"),
         "sensitivity.csv": calibration.sensitivity.reset_index().to_dict("records"),
         "forward_runs.csv": [{**row, "error": error} for row, error in zip(numbers, runs.errors, strict=True)],
@@ -280,10 +282,11 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
     refined = ", then points in the posterior" if calibration.held_out else ""
     whose = "The logarithms of the outputs" if emulator.basis.is_log else "The outputs"
     logarithms = f"; taken by logarithm: {', '.join(emulator.logarithms)}" if emulator.logarithms else ""
+    noise = ", ".join(f"{sd} ({name})" if name else str(sd) for name, sd in settings.noises.items())
     evidence = "" if calibration.log_evidence is None else f" Log evidence {calibration.log_evidence:.2f}."
     sentences = (
         "measured = emulator(parameters) + discrepancy(control) + noise (Kennedy & O'Hagan 2001), all Gaussian given "
-        f"the parameters; noise sd {settings.noise_sd}.",
+        f"the parameters; noise sd {noise}.",
         f"{len(runs)} runs ({settings.design} design{refined}), {significant(float(np.median(runs.seconds)))} s each. "
         f"{whose} vary in {directions} direction{'s' * (directions != 1)}, each a process with the kernel "
         f"{settings.kernel} and a {settings.trend} mean{logarithms}. The variation outside these directions is part of "
@@ -313,16 +316,20 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
 
 def _model_run(forward: DeckForward, study: CalibrationStudy) -> tuple[str, ...]:
     """Return how a finite-element model was run, and how its numbers became those of the file."""
-    settings, solver, data = study.settings, forward.program, study.data
-    ((name, quantity),) = settings.quantities.items()
+    settings, solver = study.settings, forward.program
+    quantities = zip(study.data.values(), settings.quantities.items(), forward.factors.values(), strict=True)
+    of_file = (
+        f"{data.measured_label} of the file is {factor:.6g} times {name} ({quantity})"
+        for data, (name, quantity), factor in quantities
+    )
+    control = next(iter(study.data.values())).control_label
     controlled = "the time of the model" if forward.along is None else f"{next(iter(settings.along.values()))}"
     return (
         f"The material '{forward.replaced}' of {forward.read_deck.main} got the card of {forward.material} for every "
         f"run. Solver: {solver.name}, `{solver.command or solver.template}`. Unit of stress of the model: "
         f"{settings.unit} ({forward.cards.system.units}).",
-        f"{data.measured_label} of the file is {forward.factor:.6g} times {name} ({quantity}), {data.control_label} is "
-        f"{forward.along_factor:.6g} times {controlled}: units, signs and symmetry together. Between the increments of "
-        "the solver both are interpolated by monotone cubics.",
+        f"{', '.join(of_file)}, {control} is {forward.along_factor:.6g} times {controlled}: units, signs and symmetry "
+        "together. Between the increments of the solver they are interpolated by monotone cubics.",
     )
 
 

@@ -105,7 +105,10 @@ class StructureStudyOptions(Settings):
         ("gent", "ogden"), "Law of the truth; repeat for more.", name="truth", min_length=1
     )
     structures: tuple[str, ...] = option(
-        ("bar", "indentation"), "Structure; repeat for more [bar, indentation].", name="structure", min_length=1
+        ("bar", "indentation", "plate"),
+        "Structure; repeat for more [bar, indentation, plate].",
+        name="structure",
+        min_length=1,
     )
     replicates: int = option(60, "Sets of tests of every law.", ge=1, le=100_000)
     modes: tuple[str, ...] = option(
