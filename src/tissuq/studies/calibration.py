@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tissuq.emulation import Calibration, Forward
 from tissuq.emulation.material_posterior import check_material
+from tissuq.emulation.problem import symbol_of
 from tissuq.errors import InputError
 from tissuq.experiments.reading.column_units import declared_unit
 from tissuq.experiments.reading.headings import heading, plain
@@ -61,10 +62,11 @@ class CalibrationStudy:
     @property
     def units(self) -> dict[str, str]:
         """The units of parameters where they are known: of the material that is named, and of the noise."""
-        material, of_noise = self.settings.material, self.data.units[1]
+        material = self.settings.material
         parameters = () if material is None else material_named(material).parameters
         of_material = {parameter.symbol: self.settings.unit for parameter in parameters if parameter.unit}
-        return of_material | ({NOISE_SD.symbol: of_noise} if of_noise else {})
+        of_noise = {symbol_of(NOISE_SD.symbol, name): measured.units[1] for name, measured in self.data.items()}
+        return of_material | {symbol: unit for symbol, unit in of_noise.items() if unit}
 
     def label(self, symbol: str) -> str:
         """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""
@@ -97,7 +99,7 @@ def run_calibration(
     workers : int
         Processes that run the model.
     step : callable
-        Verbosity of every run that is done.
+        Told of every run that is done.
     **running
         How a finite-element model is run: ``timeout``, ``retries``, ``keep``.
 

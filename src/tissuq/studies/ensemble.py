@@ -123,7 +123,7 @@ def prepare_ensemble(
     law : Material, optional
         The material of the runs, where it is a law in a file.
     step : callable
-        Verbosity what is being done.
+        Told what is being done.
     runs_here : bool
         Whether the solver is to be run by this machine.
     is_dry : bool

@@ -211,7 +211,7 @@ def run_tasks(
     limit : int, optional
         Tasks that are carried out at the same time, where they may be fewer than the pool has workers.
     step : callable
-        Verbosity of every task that is done: its label, and whether it was done now or before.
+        Told of every task that is done: its label, and whether it was done now or before.
     others_stay : bool
         Leave the results of other tasks in the file.
     """

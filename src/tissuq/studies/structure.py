@@ -73,7 +73,7 @@ def load_posteriors(
     law : Material, optional
         The material, where the run's is a law in a file.
     step : callable
-        Verbosity what is being done.
+        Told what is being done.
 
     Raises
     ------
