@@ -136,6 +136,29 @@ def test_fit_refuses_bad_options_and_leaves_the_folder_as_it_was(cli, here, file
     assert tree(here) == before
 
 
+MISNAMED = [
+    (["--discrepancy", "cubic"], ["(--discrepancy)", "no discrepancy named 'cubic'", "quadratic"]),
+    (["--material", "yeoh", "--material", "gent", "--discrepancy", "cubic"], ["no discrepancy named 'cubic'"]),
+    (["--stable-in", "tension"], ["(--stable-in)", "'tension'", "uniaxial"]),
+    (["--stable-in", "all", "--stable-in", "planar"], ["(--stable-in)", "'all' cannot be combined"]),
+    (["--prior", "D1=uniform(0,5)"], ["'D1'", "C10"]),
+    (["--material", "yeoh", "--material", "gent", "--prior", "D1=uniform(0,5)"], ["'D1'", "C20", "Jm"]),
+    (["--tolerance", "stress=2"], ["'stress=2' is not a tolerance"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "words"), MISNAMED, ids=lambda case: " ".join(case)[:60])
+def test_a_name_that_does_not_exist_is_told_before_that_the_folder_does(cli, here, files, arguments, words):
+    (here / "runs" / "specimen").mkdir(parents=True)
+    (here / "runs" / "specimen" / "notes.txt").touch()
+    refused = cli("fit", "specimen.csv")
+    assert_refused(refused, ["runs/specimen"])
+    for source in (["specimen.csv"], ["--config", "good.toml"]):
+        said = cli("fit", *source, *arguments)
+        assert_refused(said, words)
+        assert "runs/specimen" not in said.err
+
+
 @pytest.mark.parametrize(("arguments", "words"), PAPER, ids=lambda case: " ".join(case)[:60])
 def test_paper_refuses_bad_options_and_leaves_the_folder_as_it_was(cli, here, files, arguments, words):
     before = tree(here)

@@ -59,6 +59,11 @@ def test_the_posterior_is_that_of_least_squares_in_the_unit_of_the_model(cli, he
     assert np.mean(constants) == pytest.approx(mean, abs=0.2 * sd)
     page = (here / "out" / "report.html").read_text(encoding="utf-8")
     assert "got the card of neo-hookean" in page
+    assert "<td>C10 [kPa]" in page
+    (number,) = [n for n in json.loads((here / "out" / "result.json").read_text())["numbers"] if n["name"] == "C10"]
+    assert number["text"].split()[1] == "kPa"
+    units = {row["parameter"]: row["unit"] for row in rows_of(here / "out" / "summary.csv")}
+    assert units["C10"] == "kPa"
 
 
 @pytest.mark.parametrize(("heading", "factor"), [("force (N)", 1e-3), ("force (uN)", 1e3)])
@@ -70,6 +75,33 @@ def test_units_signs_and_symmetry_are_made_those_of_the_file(cli, here, words, h
     changed = [4 * factor * NOISE_SD if word == NOISE_SD else word for word in words]
     assert cli(*changed, *WIDE, "--factor", "force=-4").status == 0
     assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
+
+
+def test_several_quantities_of_a_deck_have_a_column_a_unit_and_a_noise_each(cli, here, words):
+    """Least squares with weights; a quantity counts where there is a value of it."""
+    forces(here)
+    table = np.loadtxt(here / "punch.csv", delimiter=",", skiprows=1)
+    second_sd, seen = 0.05, np.array([False, True, False, True, True, False, True])
+    again = TRUTH * TIMES + second_sd * np.random.default_rng(4).standard_normal(len(TIMES))
+    cells = (f"{-1e-3 * force:.9f}" if is_seen else "" for force, is_seen in zip(again, seen, strict=True))
+    rows = "".join(f"{at:.3f},{cell},{force:.6f}\n" for (at, force), cell in zip(table, cells, strict=True))
+    (here / "punch.csv").write_text(f"time,reaction (N),force (mN)\n{rows}")
+    weights = np.concatenate([np.full(len(TIMES), NOISE_SD**-2), np.full(seen.sum(), second_sd**-2)])
+    at, values = np.concatenate([TIMES, TIMES[seen]]), np.concatenate([table[:, 1], again[seen]])
+    mean, sd = weights * at @ values / (weights * at @ at), (weights * at @ at) ** -0.5
+    noise = f"force={NOISE_SD},reaction={1e-3 * second_sd}"
+    changed = [noise if word == NOISE_SD else word for word in words]
+    more = ["--qoi", "reaction=RF2@TOP", "--factor", "reaction=-1"]
+    said = cli(*changed, *WIDE, *more)
+    assert said.status == 0, said.err
+    assert c10(here / "out") == (pytest.approx(mean, abs=0.05 * sd), pytest.approx(sd, rel=0.03))
+    assert [row["quantity"] for row in rows_of(here / "out" / "prediction.csv")] == ["force"] * 7 + ["reaction"] * 4
+    page = " ".join((here / "out" / "report.html").read_text(encoding="utf-8").split())
+    assert "reaction (N) of the file is -0.001 times reaction (RF2@TOP)" in page
+    repeat = ["calibrate", "--config", "out/run.toml", "--max-jobs", 1, "--figures", "--out", "again"]
+    said = cli(*repeat, "--command", words[words.index("--command") + 1])
+    assert said.status == 0, said.err
+    assert (here / "again" / "summary.csv").read_bytes() == (here / "out" / "summary.csv").read_bytes()
 
 
 def test_runs_that_fail_are_listed_and_left_out(cli, here, words):
@@ -154,7 +186,12 @@ def test_a_run_is_repeated_from_its_own_folder_when_its_command_is_named(cli, he
         ({"force=RF2@TOP": "force=RF2@BASE"}, [], ["RF2@BASE:sum is not in the results"], 1),
         ({"neo-hookean": "yeoh"}, [], ["calibrated without C20"], 0),
         ({}, ["--factor", "depth=-1"], ["factors are of force"], 0),
-        ({}, ["--qoi", "more=RF1@TOP"], ["give one --qoi"], 0),
+        ({}, ["--qoi", "more=RF1@TOP"], ["--noise-sd force=SD,more=SD"], 0),
+        ({NOISE_SD: "unknown"}, ["--qoi", "more=RF1@TOP"], ["no column 'more'", "time, force (mN)"], 0),
+        ({NOISE_SD: "unknown"}, ["--qoi", "time=RF1@TOP"], ["has the columns", "name that of the control"], 0),
+        ({NOISE_SD: "more=1"}, ["--qoi", "more=RF1@TOP", "--measured", "force"], ["leave out measured"], 0),
+        ({NOISE_SD: "force=1"}, [], ["is of one quantity, and has no name"], 0),
+        ({NOISE_SD: "else=1"}, ["--qoi", "more=RF1@TOP"], ["is of force, more; it is given for else"], 0),
         ({}, ["--forward", "f.py:f"], ["give one forward model"], 0),
         ({}, ["--along", "depth=U2@TOP"], ["in which unit the length is"], 0),
         ({}, ["--prior-correlation", "C10,x=0.5"], ["two parameters of the model"], 0),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -34,6 +35,44 @@ def test_the_forces_are_those_of_the_draws_that_export_writes(cli, here, model):
     assert "too few for a 95 % band" in page
     assert page.count("data:image/svg+xml") == 2
     assert "HYPERELASTIC, NEO HOOKE" in page
+
+
+def test_the_next_test_is_for_a_quantity_of_the_model(cli, here, model):
+    """The stub's force is C10: what a test tells of the one it tells of the other."""
+    model[model.index("--draws") + 1] = 16
+    assert cli("ensemble", *model, "--no-figures").status == 0
+    said = cli("design", "run", "--target", "ensemble:out", "--target", "C10", "--out", "ranking", "--no-figures")
+    assert said.status == 0, said.err
+    assert "Force of the model model.inp" in said.out
+    rows = rows_of(here / "ranking" / "design.csv")
+    gains = {
+        target: [float(row["reduction"]) for row in rows if row["target"] == target]
+        for target in ("ensemble:out:force", "C10")
+    }
+    assert len(gains["C10"]) > 3
+    np.testing.assert_allclose(gains["ensemble:out:force"], gains["C10"], rtol=1e-5)
+    assert cli("design", "--config", "ranking/run.toml", "--out", "again", "--no-figures").status == 0
+    assert (here / "again" / "design.csv").read_bytes() == (here / "ranking" / "design.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [("ensemble:nowhere", "no complete ensemble in"), ("ensemble:out:moment", "ensemble:.*out:force")],
+)
+def test_a_quantity_that_no_ensemble_has_is_refused(cli, here, model, target, words):
+    assert cli("ensemble", *model, "--no-figures").status == 0
+    said = cli("design", "run", "--target", target)
+    assert said.status == 2
+    assert re.search(words, said.err)
+
+
+def test_an_ensemble_of_another_run_is_refused(cli, here, model):
+    assert cli("ensemble", *model, "--no-figures").status == 0
+    fit = "fit", write_specimen(here / "other.csv"), "--material", "yeoh", "--discrepancy", "none", "--no-figures"
+    assert cli(*fit, "--out", "another").status == 0
+    said = cli("design", "another", "--target", "ensemble:out")
+    assert said.status == 2
+    assert "none of the materials of the ensemble (TISSUE) is of this run" in said.err
 
 
 def test_the_decks_differ_from_the_model_in_the_material_alone(cli, here, model):

@@ -37,7 +37,8 @@ def test_a_draw_that_fails_is_listed_with_the_last_lines_and_made_again_on_reque
     (here / "fails").write_text("3")
     said = cli("ensemble", *model, "--no-figures")
     assert said.status == 0, said.err
-    assert "1 of 6 draws failed (3; first reason: increment size smaller than minimum)" in " ".join(said.out.split())
+    told = "1 of 6 draws failed (draw 3 at time 0.5; first reason: increment size smaller than minimum)"
+    assert told in " ".join(said.out.split())
     (row,) = rows_of(here / "out" / "failures.csv")
     assert (row["number"], row["reached"], row["problem"]) == ("3", "0.5", "increment size smaller than minimum")
     assert row["lines"] == "best residual |  *ERROR: increment size smaller than minimum"

@@ -76,7 +76,8 @@ def test_a_free_energy_is_projected_and_its_error_said(cli, here, run):
         (["--out", "runs", "--force"], "is the run itself or contains it"),
         (["--out", "runs/specimen/cards"], "lies inside the run"),
         (["--seed", "-1"], "seed must be a whole number from 0 to 4611686018427387904, not -1"),
-        (["--material", "yeoh"], "'yeoh' is not of the form law.py:Name"),
+        (["--user-law", "yeoh"], "'yeoh' is not of the form law.py:Name"),
+        (["--material", "yeoh"], "is of the material 'neo-hookean', and not of 'yeoh'"),
     ],
     ids=lambda each: " ".join(each) if isinstance(each, list) else "",
 )

@@ -112,7 +112,8 @@ BAD = [
     (["RUN", "--config", "run.toml"], ["RUN", "--config"]),
     (["RUN", "--discrepancy", "none", "--out", "RUN", "--force"], ["is the run itself or contains it"]),
     (["RUN", "--discrepancy", "none", "--out", "run/inside"], ["lies inside the run 'run'"]),
-    (["RUN", "--discrepancy", "none", "--material", "yeoh"], ["law.py:Name", "'yeoh' is not"]),
+    (["RUN", "--discrepancy", "none", "--user-law", "yeoh"], ["law.py:Name", "'yeoh' is not"]),
+    (["RUN", "--discrepancy", "none", "--material", "yeoh"], ["is of the material 'neo-hookean', and not of 'yeoh'"]),
     (["RUN", "--discrepancy", "none", "--at", "1e-200"], ["too large for a number"]),
     (["RUN", "--discrepancy", "none", "--out", "PLANAR"], ["is a file"]),
 ]  # fmt: skip

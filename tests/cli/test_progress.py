@@ -53,12 +53,41 @@ def test_a_long_step_is_told_in_a_line_where_there_is_no_terminal(monkeypatch, c
     carry_out(Monitor())
     said = capsys.readouterr()
     assert said.out == ""
-    lines = [re.sub(r"\d+:\d\d left, ", "TIME left, ", line) for line in said.err.splitlines()]
-    assert lines == [
-        "tissuq: 1 of 3: reading",
-        "tissuq: 2 of 3: TIME left, fitting",
-        "tissuq: 3 of 3: TIME left, writing",
-    ]
+    assert said.err.splitlines() == ["tissuq: 1 of 3: reading", "tissuq: 2 of 3: fitting", "tissuq: 3 of 3: writing"]
+
+
+class Bar:
+    """What a terminal shows beside the bar, text by text."""
+
+    def __init__(self):
+        self.texts = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def add_task(self, description, total):
+        self.texts.append(description)
+
+    def update(self, task, description, completed):
+        self.texts.append(description)
+
+
+def test_a_terminal_tells_the_time_left_of_tasks_that_are_alike_and_not_of_steps_that_are_not(monkeypatch):
+    steps, tasks = Bar(), Bar()
+    monkeypatch.setattr(progress, "monotonic", iter(range(0, 10_000, 50)).__next__)
+    monkeypatch.setattr(Monitor, "_bar", lambda self, total: steps)
+    carry_out(Monitor(is_quiet=True))
+    monkeypatch.setattr(Monitor, "_bar", lambda self, total: tasks)
+    with Monitor(is_quiet=True).campaign(3) as step:
+        for number in range(3):
+            step(f"task {number}", True)
+    assert steps.texts == ["starting", "reading", "fitting", "writing"]
+    assert [re.sub(r"\d+:\d\d left, ", "TIME left, ", text) for text in tasks.texts] == [
+        "", *(f"TIME left, task {number}" for number in range(3))
+    ]  # fmt: skip
 
 
 def test_nothing_is_said_of_short_steps_or_in_quiet(monkeypatch, capsys):
@@ -87,8 +116,8 @@ def test_the_time_left_is_that_of_the_tasks_so_far(monkeypatch, capsys):
         for number in range(4):
             step(f"task {number}", True)
     lines = capsys.readouterr().err.splitlines()
-    assert [re.match(r"tissuq: (\d) of 4, ", line)[1] for line in lines] == ["1", "2", "3", "4"]
-    assert lines[-1].startswith("tissuq: 4 of 4, 0:00 left, ")
+    times = ["1:00", "1:20", "0:47", "0:00"]  # 20 s at the first task, then 60 s more at each
+    assert lines == [f"tissuq: {n + 1} of 4, {left} left, task {n}" for n, left in enumerate(times)]
 
 
 def test_verbose_tells_how_long_every_stage_took(cli, specimen, monkeypatch):
@@ -97,6 +126,22 @@ def test_verbose_tells_how_long_every_stage_took(cli, specimen, monkeypatch):
     assert said.status == 0
     stages = re.findall(r"^tissuq: (.+): \d+\.\d s$", said.err, flags=re.MULTILINE)
     assert stages == ["none", "assessing", "writing"]
+
+
+def test_verbose_tells_how_long_reading_a_run_took(cli, specimen, monkeypatch):
+    monkeypatch.setattr(progress, "Timer", Endless)
+    assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
+    assert re.fullmatch(r"tissuq: reading: \d+\.\d s\n", cli("show", "run", "--verbose").err)
+    assert re.findall(r"tissuq: (\w+): \d+\.\d s\n", cli("compare", "run", "--verbose").err) == ["reading", "comparing"]
+
+
+def test_quiet_leaves_the_json_of_a_run_and_prints_the_numbers_of_a_comparison_alone(cli, specimen):
+    assert cli("fit", specimen, *ALONE, "--discrepancy", "constant", "--out", "run").status == 0
+    assert cli("show", "run", "--json", "--quiet").out == cli("show", "run", "--json").out
+    loud, quiet = cli("compare", "run").out, cli("compare", "run", "--quiet")
+    assert quiet.status == 0
+    assert [line for line in quiet.out.splitlines() if line.partition(": ")[0] not in " ".join(loud.split())] == []
+    assert 0 < len(quiet.out.splitlines()) < len(loud.splitlines())
 
 
 def test_the_log_of_a_run_says_version_command_and_stages_and_nothing_of_the_machine(cli, here, specimen):
@@ -146,6 +191,7 @@ def test_quiet_prints_the_numbers_of_a_fit_alone(cli, here, specimen):
     assert (said.status, said.err) == (0, "")
     loud = " ".join(cli("show", "run").out.split())
     assert said.out
+    assert cli("show", "run", "--quiet") == said
     for line in said.out.splitlines():
         name, _, value = line.partition(": ")
         assert f"{name} {value}" in loud

@@ -61,6 +61,22 @@ def test_it_leaves_tables_curves_fields_and_a_report(cli, here, run):
 
 
 @pytest.mark.finite_elements
+def test_a_plate_with_a_hole_has_the_same_files_of_a_solid(cli, here, run):
+    meshio = pytest.importorskip("meshio")
+    sizes = ["--size", "fineness=0.25", "--size", "elongation=1"]
+    said = cli(
+        "structure", "run", "--case", "plate", "--draws", 2, "--steps", 1, *sizes, "--workers", 1, "--out", "plate"
+    )
+    assert said.status == 0, said.err
+    mesh = meshio.read(here / "plate" / "fields.vtu")
+    assert mesh.cells_dict["hexahedron"].shape == (12, 8)
+    pulled = mesh.points[:, 1] == mesh.points[:, 1].max()
+    np.testing.assert_allclose(mesh.point_data["mean displacement"][pulled, 1], 0.5)
+    assert (here / "plate" / "figures" / "fields.png").stat().st_size > 1000
+    assert "12 hexahedra with one pressure" in (here / "plate" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.finite_elements
 def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others(cli, here, run):
     import xarray as xr
 

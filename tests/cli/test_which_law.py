@@ -42,8 +42,26 @@ def test_two_laws_are_compared_and_one_is_gone_on_with(cli, here, specimen):
         assert float(row["modulus [kPa]"]) == pytest.approx(1e3 * modulus, rel=1e-6)
     page = (here / "two" / "report.html").read_text()
     assert page.count("<svg") + page.count("data:image/svg+xml") == 2
-    predicted = cli("predict", "two", "--discrepancy", "mooney-rivlin", "--mode", "planar", "--no-figures")
-    assert predicted.status == 0, predicted.err
+    for number, option in enumerate(("--material", "--discrepancy")):  # the other one is its former name
+        predicted = cli(
+            "predict", "two", option, "mooney-rivlin", "--mode", "planar", "--no-figures", "--out", f"p{number}"
+        )
+        assert predicted.status == 0, predicted.err
+    assert (here / "p0" / "prediction.csv").read_bytes() == (here / "p1" / "prediction.csv").read_bytes()
+    again = cli("predict", "--config", "p0/run.toml", "--no-figures", "--out", "again")
+    assert (again.status, (here / "again" / "prediction.csv").read_bytes()) == (
+        0,
+        (here / "p0" / "prediction.csv").read_bytes(),
+    )
+    assert "--material" in said.out.partition("Next: ")[2].partition("Warning")[0]
+    for options, words in (
+        (["--material", "gent"], "has no law 'gent': choose one of mooney-rivlin, neo-hookean (--material)"),
+        (["--material", "mooney-rivlin", "--discrepancy", "auto"], "has no discrepancy 'auto': its laws are with none"),
+    ):
+        refused = cli("predict", "two", *options, "--mode", "planar", "--no-figures")
+        assert (refused.status, words in refused.err) == (2, True)
+    exported = cli("export", "two", "--material", "neo-hookean", "--draws", 2, "--format", "abaqus")
+    assert exported.status == 0, exported.err
     asked = cli("predict", "two", "--mode", "planar", "--no-figures", "--out", "other")
     assert (asked.status, asked.err.count("\n")) == (2, 1)
     assert "has several laws: choose one of mooney-rivlin, neo-hookean" in asked.err
@@ -67,6 +85,14 @@ def test_a_law_of_ones_own_takes_part(cli, here, specimen):
     folder = here / "runs" / "specimen"
     assert set(rows_of(folder)) == {"softening", "neo-hookean"}
     assert (folder / "input" / "law.py").read_text() == LAW
+    options = ("--mode", "planar", "--no-figures", "--out")
+    for number, named in enumerate((["--user-law", "law.py:softening"], ["--material", "law.py:softening"])):
+        predicted = cli("predict", "runs/specimen", *named, *options, f"p{number}")
+        assert predicted.status == 0, predicted.err
+        assert "softening" in predicted.out
+    two = ["--material", "neo-hookean", "--user-law", "law.py:softening"]
+    refused = cli("predict", "runs/specimen", *two, *options, "p2")
+    assert (refused.status, "give one law" in refused.err) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ from tissuq.decks.fields import element_invariants, final_fields, share_beyond
 from tissuq.decks.model_run import ModelRun, carried_out
 from tissuq.decks.solver import CalculiXSolver
 from tissuq.export import CardSettings, card_format
-from tissuq.finite_elements import FElupeMaterial
+from tissuq.finite_elements import FElupeMaterial, PlateWithHole, respond
+from tissuq.mechanics import material_named
 from tissuq.mechanics.laws import Rivlin
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
@@ -39,8 +40,6 @@ LAWS = {"yeoh": [0.0005, 0.0004, 0.0002], "ogden-2": [0.0009, 0.0002, 3.0, -4.0]
 def draws():
     """The laws as draws, on a model of their range."""
     from dataclasses import replace
-
-    from tissuq.mechanics import material_named
 
     stretch = [0.7, 0.8, 0.9, 1.1, 1.2, 1.3]
     data = tq.simulate("neo-hookean", {"C10": 0.0005}, stretch, noise_sd=2e-5, seed=1)
@@ -138,6 +137,25 @@ def test_the_plate_has_the_force_and_the_states_that_felupe_finds_on_its_mesh(dr
     assert shares.values[0] == 0
     assert share_beyond(frd, {"FAT": median}) is None
     assert element_invariants(frd, 0).shape == (40, 2)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_case_of_a_plate_has_the_force_that_calculix_finds_on_its_mesh(draws, tmp_path, law):
+    """Cells of eight nodes, for cells without size, against those of twenty with the same corners, which also err."""
+    pytest.importorskip("felupe")
+    force = run(draws(law), "plate.inp", "tissue", {"force": "RF2@TOP"}, tmp_path)["curves"]["force"][1][-1]
+    cases = PlateWithHole(fineness=0.5), PlateWithHole()
+    points, cells, _ = mesh_of("plate.inp")
+    corners = points[np.unique(cells[:, :8])][:, [1, 0, 2]]
+    apart = np.linalg.norm(corners[:, None] - cases[0].mesh().points, axis=-1)
+    assert apart.shape[0] == apart.shape[1]
+    assert apart.min(axis=1).max() < 2e-6
+    values = np.array(LAWS[law])
+    shear = 2 * values[0] if law == "yeoh" else values[:2].sum()
+    coarse, fine = (
+        respond(case, material_named(law), values, steps=2, bulk_ratio=BULK / shear).force[-1] for case in cases
+    )
+    assert 4 * force == pytest.approx(fine + (fine - coarse) / 3, rel=3e-3)
 
 
 @pytest.fixture(scope="module")

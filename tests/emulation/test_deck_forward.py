@@ -25,7 +25,7 @@ GRID = 11
 
 
 def write_block(path):
-    """Write a quarter of a block 2 x 2 x 1 mm of eight elements, bonded to plates, compressed by 30 %: mm, N, MPa."""
+    """Write a quarter of a block 2 x 2 x 1 mm of eight elements, pressed by 30 % between plates: mm, N, MPa."""
     places = np.linspace(0, 1, 5)
     numbers, lines = {}, ["*NODE, NSET=ALL"]
     for i, j, k in product(range(5), repeat=3):
@@ -40,8 +40,13 @@ def write_block(path):
         of += [(a, b, 0) for a, b in middles] + [(a, b, 2) for a, b in middles] + [(a, b, 1) for a, b in corners]
         nodes = [str(numbers[i + a, j + b, k + c]) for a, b, c in of]
         lines += [f"{number}, {', '.join(nodes[:15])},", ", ".join(nodes[15:])]
-    for name, axis, end in (("X", 0, 0), ("Y", 1, 0), ("BASE", 2, 0), ("TOP", 2, 4)):
-        nodes = [str(number) for place, number in numbers.items() if place[axis] == end]
+    sets = {"X": (0, None, None), "Y": (None, 0, None), "BASE": (None, None, 0), "TOP": (None, None, 4)}
+    for name, wanted in (sets | {"BULGE": (4, 0, 2)}).items():
+        nodes = [
+            str(number)
+            for place, number in numbers.items()
+            if all(end in (None, at) for at, end in zip(place, wanted, strict=True))
+        ]
         lines.append(f"*NSET, NSET={name}")
         lines += [", ".join(nodes[start : start + 12]) for start in range(0, len(nodes), 12)]
     path.write_text(
@@ -50,7 +55,8 @@ def write_block(path):
                 "*HEADING", "Block", *lines, "*MATERIAL, NAME=TISSUE", "*HYPERELASTIC, NEO HOOKE", "0.0005, 2.0",
                 "*SOLID SECTION, ELSET=BLOCK, MATERIAL=TISSUE", "*STEP, NLGEOM, INC=100", "*STATIC",
                 "0.1, 1., 1e-4, 0.1", "*BOUNDARY", "X, 1, 1", "Y, 2, 2", "BASE, 1, 3", "TOP, 1, 2", "TOP, 3, 3, -0.3",
-                "*NODE PRINT, NSET=TOP, TOTALS=ONLY", "RF", "*NODE PRINT, NSET=TOP", "U", "*END STEP", "",
+                "*NODE PRINT, NSET=TOP, TOTALS=ONLY", "RF", "*NODE PRINT, NSET=TOP", "U",
+                "*NODE PRINT, NSET=BULGE", "U", "*END STEP", "",
             ]
         )
     )  # fmt: skip
@@ -92,11 +98,16 @@ def test_the_posterior_is_that_on_a_grid_of_runs(found, computed):
     Sums over a grid with steps of 0.8 sd are right to 1e-6 for a Gaussian.
     """
     measured, calibration = found
+    hold_against_grid(calibration, lambda point: ((computed(*point) - measured) ** 2).sum() / NOISE_SD**2)
+
+
+def hold_against_grid(calibration, misfit):
+    """Hold means and sds against those of exp(-misfit / 2) on a grid along the axes of the posterior."""
     draws = calibration.draws(4000)[:, :2]
     steps = np.linspace(-4, 4, GRID)
     root = np.linalg.cholesky(np.cov(draws.T))
     points = draws.mean(axis=0) + np.array(list(product(steps, repeat=2))) @ root.T
-    misfits = np.array([((computed(*point) - measured) ** 2).sum() for point in points]) / NOISE_SD**2
+    misfits = np.array([misfit(point) for point in points])
     low, high = np.array([prior.support for prior in PRIORS.values()]).T
     inside = ((points > low) & (points < high)).all(axis=1)
     weights = np.exp(-0.5 * (misfits - misfits.min())) * inside
@@ -109,15 +120,44 @@ def test_the_posterior_is_that_on_a_grid_of_runs(found, computed):
         assert marginal.sd == pytest.approx(sd[column], rel=0.1)
 
 
+BULGE_DEPTH = DEPTH[3:]
+BULGE_SD = 1e-3
+"""mm."""
+SOFT = PRIORS | {"alpha1": tq.Uniform(-8.0, -3.0)}
+"""Where no run fails."""
+
+
+def test_force_and_displacement_of_a_point_together_are_those_on_a_grid_of_runs(block, tmp_path):
+    """Two curves, the second one at fewer depths."""
+    both = replace(block, quantity={"force": "RF3@TOP", "bulge": "U1@BULGE"}, factor={"force": -4})
+    controls = {"force": DEPTH, "bulge": BULGE_DEPTH}
+    prepared = both.prepared_in(tmp_path)
+
+    def computed(mu, alpha):
+        return prepared.run({"mu1": mu, "alpha1": alpha}, controls)
+
+    exact, generator = computed(0.0015, -5.5), np.random.default_rng(8)
+    sds = {"force": NOISE_SD, "bulge": BULGE_SD}
+    measured = {name: exact[name] + sds[name] * generator.standard_normal(len(at)) for name, at in controls.items()}
+    calibration = tq.calibrate(controls, measured, both, SOFT, noise_sd=sds, runs=20, folder=tmp_path / "calibrated")
+
+    def misfit(point):
+        found = computed(*point)
+        return sum((((found[name] - measured[name]) / sds[name]) ** 2).sum() for name in sds)
+
+    hold_against_grid(calibration, misfit)
+    with pytest.raises(tq.InputError, match="the model gives force, bulge; what was measured is one quantity"):
+        tq.calibrate(DEPTH, measured["force"], both, PRIORS)
+
+
 def test_the_same_call_goes_on_and_another_model_is_refused(found, block, tmp_path):
     measured, _ = found
     folder = tmp_path / "runs"
     few = {"noise_sd": NOISE_SD, "folder": folder}
     done: list[bool] = []
-    priors = PRIORS | {"alpha1": tq.Uniform(-8.0, -3.0)}  # where no run fails
     for is_new in (True, False):
         done.clear()
-        tq.calibrate(DEPTH, measured, block, priors, runs=8, step=lambda label, is_new: done.append(is_new), **few)
+        tq.calibrate(DEPTH, measured, block, SOFT, runs=8, step=lambda label, is_new: done.append(is_new), **few)
         assert done == [is_new] * 8
     with pytest.raises(tq.InputError, match="another forward model"):
-        tq.calibrate(DEPTH, measured, replace(block, factor=-2.0), priors, runs=8, **few)
+        tq.calibrate(DEPTH, measured, replace(block, factor=-2.0), SOFT, runs=8, **few)

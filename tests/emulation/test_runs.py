@@ -93,6 +93,12 @@ def runs_with(points, failed):
     return gathered(["a", "b"], results, 1)
 
 
+def test_a_single_failure_is_told_by_its_values():
+    points = np.array([[0.2, 3.0], [0.0018, 4.0], [0.5, 2.5]])
+    text = runs_with(points, np.array([False, True, False])).failure_summary
+    assert text == ("1 of 3 runs of the forward model failed, the one with a = 0.0018, b = 4. The reason: it broke.")
+
+
 def test_the_region_of_failure_is_told():
     points = np.random.default_rng(0).random((30, 2))
     beyond = points[:, 1] > 0.7
@@ -103,7 +109,11 @@ def test_the_region_of_failure_is_told():
     below = points[:, 0] < 0.3
     assert "all those with a up to" in runs_with(points, below).failure_summary
     corner = (points > 0.5).all(axis=1)
-    assert f"(where {0} others did not)" in runs_with(points, corner).failure_summary
+    (low, other_low), (high, other_high) = points[corner].min(axis=0), points[corner].max(axis=0)
+    ranges = f"with a from {low:.4g} to {high:.4g} and b from {other_low:.4g} to {other_high:.4g}"
+    assert f"{ranges}; no runs with values in these ranges succeeded" in runs_with(points, corner).failure_summary
+    scattered = np.arange(30) % 2 == 0
+    assert " runs with values in these ranges succeeded" in runs_with(points, scattered).failure_summary
     assert runs_with(points, np.zeros(30, bool)).failure_summary == ""
 
 

@@ -359,7 +359,7 @@ def test_a_file_that_cannot_be_opened_is_reported(written, monkeypatch, error, w
     assert words in message(path)
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\r\r\n"])
 def test_lines_may_end_in_any_way(tmp_path, end):
     path = tmp_path / "test.csv"
     path.write_bytes(end.join(["stretch,stress", "1.0,0.0", "", "1.1,x", "1.2,1"]).encode())
@@ -474,6 +474,27 @@ def test_an_amount_of_shear_and_its_stress_are_read(tmp_path, header, stress_typ
 def test_a_column_is_given_as_shear_by_name(tmp_path):
     data = read_experiment(shear_file(tmp_path, "k,stress"), mode="simple-shear", columns={"shear": "k"})
     assert data.stretch.tolist() == [-0.1, 0.0, 0.2]
+
+
+@pytest.mark.parametrize("header", ["stretch,stress [kPa]", "lambda [-],shear stress [kPa]"])
+@pytest.mark.parametrize("low", [0.0, -0.1])
+def test_an_amount_of_shear_under_the_name_of_a_stretch_is_read_and_told(tmp_path, header, low):
+    file = shear_file(tmp_path, header, [(low, 15 * low), (0.1, 1.5), (0.5, 7.5), (1.2, 18.0)])
+    with pytest.warns(UserWarning, match=r"check the column: .* was taken for the amount of shear") as told:
+        data = read_experiment(file, mode="simple-shear")
+    assert data.stretch.tolist() == [low, 0.1, 0.5, 1.2]
+    name = header.split(",")[0]
+    assert f"--column shear='{name}'" in str(told[0].message)
+    said = read_experiment(file, mode="simple-shear", columns={"shear": name})
+    assert said.stretch.tolist() == data.stretch.tolist()
+
+
+def test_a_true_stretch_is_not_taken_for_an_amount_of_shear(tmp_path):
+    file = shear_file(tmp_path, "stretch,stress [kPa]", [(1.0, 0.0), (1.1, 1.5), (1.5, 7.5)])
+    with pytest.raises(InputError, match=r"1 to 1.5.*--column shear=\"stretch\".*--mode uniaxial"):
+        read_experiment(file, mode="simple-shear")
+    with pytest.raises(InputError, match="give it so: --column shear=NAME"):
+        read_experiment(file, mode="simple-shear", columns={"stretch": "stretch"})
 
 
 @pytest.mark.parametrize(

@@ -128,10 +128,10 @@ def test_a_card_that_is_not_stable_is_told(given):
     ensemble = given([("yeoh", [0.5, -0.2, 0.0])], [("yeoh", [0.5, 0.1, 0.0])])
     own = card_format("abaqus").cards(ensemble, CardSettings())
     assert [row["card_is_stable"] for row in own.index] == [False, True]
-    assert any("draws 1 are NOT stable" in warning for warning in own.warnings)
+    assert any("draw 1 are NOT stable" in warning for warning in own.warnings)
     cards = card_format("abaqus").cards(ensemble, CardSettings(law="ogden", order=6))
     assert [row["card_is_stable"] for row in cards.index] == [False, True]
-    assert any("draws 1 are NOT stable" in warning for warning in cards.warnings)
+    assert any("draw 1 are NOT stable" in warning for warning in cards.warnings)
     assert "NOT stable" in cards.files["draw-1.inp"]
     assert "NOT stable" not in cards.files["draw-2.inp"]
 
@@ -141,7 +141,7 @@ def test_a_card_that_is_far_from_its_draw_is_told_with_what_would_be_nearer(give
     cards = card_format("abaqus").cards(ensemble, CardSettings(law="reduced-polynomial", order=2))
     assert "off in a state that was measured" in cards.files["draw-1.inp"]
     (told,) = [warning for warning in cards.warnings if "more than 1 % off" in warning]
-    assert "draws 1 of 1" in told
+    assert "draw 1 of 1" in told
     (law, order) = re.findall(r"--law (\S+) --order (\d+) 1 of all", told)[0]
     (row,) = card_format("abaqus").cards(ensemble, CardSettings(law=law, order=int(order))).index
     assert row["error_within_1_max"] < 0.01

@@ -7,7 +7,8 @@ import tissuq as tq
 from autoregression import autoregressive_errors
 from tissuq.experiments.modes import loading_mode
 from tissuq.model.tolerances import CONTRADICTION_SPREAD
-from tissuq.posterior.plug_in import FACTORS
+from tissuq.posterior.plug_in import FACTORS, LAG_GRID
+from tissuq.posterior.solver import Solver
 
 STRETCH = np.linspace(0.8, 1.3, 9)
 
@@ -71,8 +72,21 @@ def test_tests_in_different_modes_do_not_tell_how_far_they_are_apart():
 def test_consecutive_noise_needs_its_lag():
     posterior = tq.fit(specimens(1)[0], discrepancy="none", noise="autoregressive", tolerances="as-tested")
     errors = posterior.model.fitted_errors
-    assert errors.fits == 10
-    assert f"the lag-1 correlation of {errors.lag:.3g} estimated by 10 further fits" in posterior.how
+    assert errors.fits == 6
+    assert f"the lag-1 correlation of {errors.lag:.3g} estimated by 6 further fits" in posterior.how
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.5, 0.97])
+def test_the_lag_is_that_of_the_largest_evidence_of_all(lag):
+    stretch = np.linspace(1.02, 1.5, 40)
+    errors = 0.01 * autoregressive_errors(40, lag, seed=3)
+    experiment = tq.Experiment("uniaxial", stretch, 0.1 * (stretch - stretch**-2) + errors)
+    posterior = tq.fit(experiment, discrepancy="none", noise="autoregressive", tolerances="as-tested")
+    models = [posterior.model.with_errors(lag=other) for other in LAG_GRID]
+    evidences = [Solver().solve([model])[0].log_evidence for model in models]
+    best = int(np.argmax(evidences))
+    assert LAG_GRID[max(best - 1, 0)] <= posterior.model.fitted_errors.lag <= LAG_GRID[min(best + 1, len(LAG_GRID) - 1)]
+    assert posterior.log_evidence > max(evidences) - 0.05
 
 
 def test_tolerances_of_the_user_leave_the_spread_alone():

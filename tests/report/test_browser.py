@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 import tissuq as tq
 from browser import FIRST_SCREEN, needs_chromium, opened
 from tissuq.assessment.answer import Use, Verdict
+from tissuq.report.laws import HEADERS
 from tissuq.report.result import Number, Picture, Preformatted, Result, Section, Table
 from tissuq.report.specimen import specimen_result
 from tissuq.report.writer import write_result
@@ -70,6 +71,17 @@ def of_another_command(tmp_path_factory):
     folder = tmp_path_factory.mktemp("other")
     write_result(result, folder)
     return folder / "report.html"
+
+
+def test_a_table_of_laws_is_seen_whole_on_a_screen_of_1200_pixels(tmp_path):
+    widest = ["veronda-westmann", "1.496", "[1.253, 1.689]", "3", "0.202 %", "-15.3 ± 10.4", "0.9999", "0.941 %",
+              "29.7 %", "96.6 % / 95.8 %"]  # fmt: skip
+    headers = [HEADERS[0], "modulus [kPa]", *HEADERS[2:]]
+    result = Result(command="fit", title="which law", subject="a test", tables=(Table(headers, [widest], "Laws"),))
+    write_result(result, tmp_path)
+    with opened(tmp_path / "report.html") as page:
+        seen, whole = page.locator(".scroll").evaluate("table => [table.clientWidth, table.scrollWidth]")
+    assert whole <= seen
 
 
 def small_figure():

@@ -158,8 +158,8 @@ def test_what_is_known_of_the_curves_is_not_computed_anew(posterior, monkeypatch
     original = curves.predict_bands
     monkeypatch.setattr(curves, "predict_bands", lambda *args, **options: calls.append(1) or original(*args, **options))
     assert chart_data({"none": posterior}, "none", KPA, found) == expected
-    answer_figure(posterior, KPA, found=found["none"])
-    predictive_figure({"none": posterior}, discrepancy=True, unit=KPA, found=found)
+    answer_figure(posterior, KPA, computed=found["none"])
+    predictive_figure({"none": posterior}, discrepancy=True, unit=KPA, computed=found)
     assert calls == []
     chart_data({"none": posterior}, "none", KPA)
     assert calls == [1]

@@ -148,6 +148,18 @@ def test_a_page_without_measurements_says_the_stress_at_the_end_of_the_range(pos
     assert "<img" not in page
 
 
+@pytest.mark.parametrize("stretch", [[1.0, 1.1, 1.2], [1.0, 1.2, 9.0], [8.0, 9.0]])
+@pytest.mark.parametrize("mode", ["planar", "biaxial"])
+def test_the_finding_repeats_no_number_that_stands_above_it(posterior, tmp_path, mode, stretch):
+    points = np.column_stack([stretch, stretch]) if mode == "biaxial" else stretch
+    result = prediction_result(predicted(posterior, mode=mode, stretch=points), PredictionSettings(run="run"), tmp_path)
+    record = result.record()
+    shown = [number["text"].split()[0] for number in record["numbers"] if "stress" in number["name"]]
+    assert len(shown) == (2 if mode == "biaxial" else 1)
+    assert not [number for number in shown if f" {number} " in record["finding"]]
+    assert "95 %: " in record["finding"]
+
+
 @pytest.mark.parametrize(("mode", "reason"), [("uniaxial", "known here"), ("planar", "known elsewhere")])
 def test_the_page_repeats_what_the_fit_says_of_predicting_the_mode(posterior, tmp_path, mode, reason):
     uses = [

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from tissuq.finite_elements import PlateWithHole
 from tissuq.finite_elements.case import grid
 from tissuq.report.simulation_figures import write_collection, write_vtu
 
@@ -29,6 +30,23 @@ def test_a_mesh_is_written_with_its_fields(tmp_path):
     np.testing.assert_array_equal(arrays["temperature"].ravel(), temperature)
     np.testing.assert_array_equal(arrays["move"], np.c_[move[:, ::-1], np.zeros(6)])
     np.testing.assert_array_equal(arrays["size"].ravel(), [2, 4])
+
+
+def test_a_solid_is_written_with_cells_of_positive_volume_and_its_section_is_its_middle_plane(tmp_path):
+    mesh = PlateWithHole(fineness=0.25).mesh()
+    move = 0.1 * mesh.points
+    write_vtu(tmp_path / "solid.vtu", mesh, {"move": move}, {"size": np.arange(float(len(mesh.cells)))})
+    arrays = {each.get("Name"): numbers(each) for each in ElementTree.parse(tmp_path / "solid.vtu").iter("DataArray")}
+    np.testing.assert_allclose(arrays["move"], 0.1 * arrays["Points"], atol=1e-9)
+    np.testing.assert_array_equal(arrays["types"].ravel(), 12)
+    corners = arrays["Points"][arrays["connectivity"].astype(int).reshape(-1, 8)]
+    edges = corners[:, [1, 3, 4]] - corners[:, :1]
+    assert (np.linalg.det(edges) > 0).all()
+    faces, cells = mesh.section
+    assert (mesh.points[faces][..., 2] == 0).all()
+    assert sorted(cells) == [
+        number for number in range(len(mesh.cells)) if mesh.points[mesh.cells[number], 2].min() == 0
+    ]
 
 
 def test_cells_go_round_one_way():

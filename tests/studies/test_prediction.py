@@ -96,7 +96,7 @@ def test_the_share_of_the_variance_beyond_the_data_is_that_of_the_errors_of_thei
     found = predicted(fits["auto"], stretch=stretches)
     monkeypatch.setattr(moments, "scores", np.zeros_like)
     band, without = found.curves[0, True, False], predicted(fits["auto"], stretch=stretches).curves[0, True, False]
-    np.testing.assert_array_equal(without.high[0], band.high[0])
+    np.testing.assert_allclose(without.high[0], band.high[0], rtol=1e-14)  # a rounding error on some processors
     expected = 1 - ((without.high - without.low) / (band.high - band.low)) ** 2
     np.testing.assert_allclose(found.extrapolated[0], expected, rtol=1e-9, atol=1e-12)
     assert found.extrapolated[0][0] == 0

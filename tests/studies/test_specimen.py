@@ -137,12 +137,18 @@ def test_a_prior_of_a_parameter_that_no_discrepancy_has_is_refused(file):
         study(file, discrepancies=("none",), priors={"m0": {"low": 0, "high": 1}})
 
 
-def test_an_unknown_discrepancy_is_refused_before_any_is_fitted(file):
-    steps = []
-    settings = SpecimenSettings(file=str(file), discrepancies=("none", "cubic"))
-    with pytest.raises(ModelError, match="cubic"):
-        run_specimen(settings, step=steps.append)
-    assert steps == []
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"discrepancies": ("none", "cubic")}, "no discrepancy named 'cubic'"),
+        ({"stable_in": ("uniaxial", "tension")}, "no loading mode named 'tension'"),
+        ({"stable_in": ("biaxial",)}, "modes of one stretch and one stress"),
+        ({"tolerances": {"force": 0.1}}, "'force'"),
+    ],
+)
+def test_an_unknown_name_is_refused_before_anything_is_read(wrong, words):
+    with pytest.raises(ValidationError, match=words):
+        SpecimenSettings(file="nowhere.csv", **wrong)
 
 
 @pytest.mark.parametrize("noise", [0, -1.0, float("nan"), float("inf"), True, "small", None])

@@ -77,10 +77,11 @@ def test_counts_and_ratios_are_those_of_the_bands():
 
 
 @pytest.mark.finite_elements
-def test_the_true_force_of_the_bar_is_that_of_another_code_path():
-    """The power of the law's stresses along its own equilibria against the reaction of the plate."""
+@pytest.mark.parametrize("structure", ["bar", "plate"])
+def test_the_true_force_is_that_of_another_code_path(structure):
+    """The power of the law's stresses along its own equilibria against the reaction of what moves the body."""
     law = KNOWN_LAWS["gent"]
     ensemble = card_material(material_named(law.material), law.values, (0.8, 1.25), "uniaxial")
-    found = first_order_forces(STRUCTURES["bar"], ensemble, ensemble[0], 4, BULK_RATIO)
-    reaction = tq.finite_elements.respond(STRUCTURES["bar"], material_named(law.material), law.values, steps=4)
+    found = first_order_forces(STRUCTURES[structure], ensemble, ensemble[0], 4, BULK_RATIO)
+    reaction = tq.finite_elements.respond(STRUCTURES[structure], material_named(law.material), law.values, steps=4)
     assert found.forces[0] == pytest.approx(reaction.force, rel=1e-3)

@@ -18,7 +18,7 @@ from typer.core import TyperCommand
 from tissuq.cli.call import Call
 from tissuq.cli.former_names import todays_names
 from tissuq.cli.progress import Monitor
-from tissuq.cli.running import Configured, Running
+from tissuq.cli.running import Running, Verbosity
 from tissuq.cli.stopping import stopping
 from tissuq.studies.option import Option, Settings, options_of
 from tissuq.studies.settings import load_settings
@@ -93,10 +93,9 @@ def command(
         def run(**values: Any) -> None:
             how, typed_how = stated(of_running, values)
             checked = load_settings(running, None, how, typed=typed_how)
-            is_quiet = isinstance(checked, Configured) and checked.quiet
-            monitor = Monitor(is_quiet, isinstance(checked, Configured) and checked.verbose)
+            monitor = Monitor(checked.quiet, checked.verbose) if isinstance(checked, Verbosity) else Monitor()
             call = Call(settings, *stated(of_settings, values), checked, monitor)
-            with stopping(monitor), redirect_stdout(StringIO()) if is_quiet else nullcontext():
+            with stopping(monitor), redirect_stdout(StringIO()) if monitor.is_quiet else nullcontext():
                 carry_out(call)
 
         run.__doc__, run.__name__ = carry_out.__doc__, carry_out.__name__

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.running import Running
+from tissuq.cli.running import Verbosity
 from tissuq.errors import InputError
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.settings import DAMAGE
@@ -25,7 +25,7 @@ class ComparedRuns(Settings):
     runs: tuple[Path, ...] = argument(..., "Run folders, or files of posteriors in them.", takes=list[Path])
 
 
-class CompareOptions(Running):
+class CompareOptions(Verbosity):
     """Where a comparison is written, if at all."""
 
     out: Path | None = option(None, "Folder for table, figure and report.")
@@ -47,15 +47,20 @@ def compare(call: Call[ComparedRuns, CompareOptions]) -> None:
         if any(path.resolve().is_relative_to(out.resolve()) for path in runs):
             raise InputError(f"'{out}' holds one of the compared runs; choose another folder with --out.")
         check_target(out, force=force)
-    trees = _trees(runs)
-    table = compare_fits(trees)
+    with call.monitor.steps() as step:
+        step("reading")
+        trees = _trees(runs)
+        step("comparing")
+        table = compare_fits(trees)
     units = {str(tree.attrs.get("stress_unit", "MPa")) for tree in trees.values()}
     unit = stress_unit(units.pop() if len(units) == 1 else "MPa")
     result = comparison_result(table, [str(run) for run in runs], unit)
     if out is not None:
         with run_folder(out, force=force) as folder:
             write_result(result, folder)
-    print_result(result.record(), out, details=out is None)
+    record = result.record()
+    print_result(record, out, details=out is None)
+    call.answer(record["numbers"])
 
 
 def _trees(runs: tuple[Path, ...]) -> dict[str, xr.DataTree]:

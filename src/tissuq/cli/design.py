@@ -27,14 +27,21 @@ def design(call: Call[DesignSettings, DesignOptions]) -> None:
     """Rank tests that could be made next by how much less uncertain they make a parameter or a prediction."""
     from tissuq.report.design import design_result
     from tissuq.studies.design import run_design
+    from tissuq.studies.ensemble_target import with_folder
 
     stated = call.stated.get("run")
     if not (call.config or stated):
         raise InputError("give the RUN folder of a fit, or --config run.toml.")
-    settings = call.loaded(run=str(Path(stated).absolute()) if stated else None)
+    typed = tuple(with_folder(name, os.path.abspath) for name in call.stated.get("targets", ()))
+    settings = call.loaded(run=str(Path(stated).absolute()) if stated else None, targets=typed or None)
     run = (call.beside / settings.run).resolve()
     target = call.target(Path("runs") / f"{run.name}-design", apart_from=run)
-    recipe = settings.model_copy(update={"run": os.path.relpath(run, target.resolve())})
+
+    def from_target(name: str) -> str:
+        return os.path.relpath((call.beside / name).resolve(), target.resolve())
+
+    targets = tuple(with_folder(name, from_target) for name in settings.targets)
+    recipe = settings.model_copy(update={"run": from_target(settings.run), "targets": targets})
 
     call.carried_out(
         target,

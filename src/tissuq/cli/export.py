@@ -41,7 +41,7 @@ def export(call: Call[ExportSettings, ExportOptions]) -> None:
     check_target(target, force=force)
     of_cards = settings.model_dump(include={"law", "order", "unit", "bulk_modulus", "poisson", "name", "number"})
     CardSettings(**of_cards)
-    posterior = load(run, settings.discrepancy, call.law)
+    posterior = load(run, settings.discrepancy, settings.law_of(call.law))
     sampling = cast("Sampling", settings.sampling)
     ensemble = posterior.ensemble(settings.draws, settings.seed, sampling, admissible=not settings.all_draws)
     source = f"run {run.resolve().name} of tissuq, {sampling} draws from seed {settings.seed}"

@@ -38,7 +38,9 @@ class FitOptions(Written):
 @command(SpecimenSettings, FitOptions)
 def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     """Identify a material's parameters from files of stretches and stresses."""
+    from tissuq.experiments.experiment import Experiment
     from tissuq.mechanics import material_named
+    from tissuq.studies.specimen import priors_in_mpa
 
     paths: list[Path] = call.stated.pop("file", [])
     if call.config is None and [path.suffix for path in paths] == [".toml"]:
@@ -66,18 +68,20 @@ def fit(call: Call[SpecimenSettings, FitOptions]) -> None:
     sources = [call.beside / test.file for test in settings.tests or (settings,)]
     if files and call.config:
         _check_same(files[0], sources[0], call.config)
+    readings = settings.readings(call.beside, found)
+    priors_in_mpa(settings, settings.fitted_laws(own).values(), Experiment.of([of.experiment for of in readings]))
     target = call.target(Path("runs") / reading.run_name(paths, call.config, sources))
     if isinstance(settings, LawSettings):
-        _compare_laws(call, settings, own, found, sources, target)
+        _compare_laws(call, settings, own, readings, sources, target)
     else:
-        _fit_one(call, settings, next(iter(own.values()), None), found, sources, target)
+        _fit_one(call, settings, next(iter(own.values()), None), readings, sources, target)
 
 
 def _fit_one(
     call: Call[SpecimenSettings, FitOptions],
     settings: SpecimenSettings,
     law: Material | None,
-    found: list[Reading | None],
+    readings: list[Reading],
     sources: list[Path],
     target: Path,
 ) -> None:
@@ -87,7 +91,7 @@ def _fit_one(
 
     study = call.carried_out(
         target,
-        lambda step: run_specimen(settings, call.beside, step, law, found),
+        lambda step: run_specimen(settings, call.beside, step, law, readings),
         partial(specimen_result, sources=sources),
         steps_of(settings) + 1,
     )
@@ -98,7 +102,7 @@ def _compare_laws(
     call: Call[SpecimenSettings, FitOptions],
     settings: LawSettings,
     own: dict[str, Material],
-    found: list[Reading | None],
+    readings: list[Reading],
     sources: list[Path],
     target: Path,
 ) -> None:
@@ -108,7 +112,7 @@ def _compare_laws(
 
     study = call.carried_out(
         target,
-        lambda step: run_laws(settings, call.beside, step, own, found),
+        lambda step: run_laws(settings, call.beside, step, own, readings),
         partial(law_result, sources=sources),
     )
     _print_omissions(study)

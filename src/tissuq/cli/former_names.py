@@ -12,17 +12,13 @@ FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "paper": {"--points": "--measurements", "--sampler": "--method"},
         "predict": {
             "--points": "--grid-points",
-            "--material": "--user-law",
             "--stretch": "--at",
             "--stretch2": "--at2",
             "--stress-type": "--stress",
         },
         "population": {"--specimen": "--specimen-column"},
-        "design": {"--points": "--measurements", "--specimen": "--next-specimen", "--material": "--user-law"},
-        "export": {"--material": "--user-law"},
+        "design": {"--points": "--measurements", "--specimen": "--next-specimen"},
         "ensemble": {"--material": "--replace"},
-        "structure": {"--material": "--user-law"},
-        "simulate": {"--material": "--user-law"},
         "coverage": {"--noise": "--noise-is", "--noise-sd": "--noise-is"},
         "sbc": {"--noise": "--noise-is", "--noise-sd": "--noise-is", "--formulation": "--discrepancy"},
         "tissues": {"--formulation": "--discrepancy"},
@@ -31,8 +27,16 @@ FORMER_NAMES: Mapping[str, Mapping[str, str]] = MappingProxyType(
 """By command: the name today of every option that had another one."""
 
 
+OF_RUN = "predict", "design", "export", "structure", "simulate"
+"""Commands in which ``--material law.py:Name`` was what ``--user-law`` is; a law by its name is one of the run's."""
+
+
 def todays_names(command: str, arguments: Sequence[str]) -> list[str]:
     """Return what was typed after a command, with every option under its name today."""
     names = FORMER_NAMES.get(command, {})
     options = [argument.partition("=") for argument in arguments]
-    return [names.get(option, option) + equals + value for option, equals, value in options]
+    todays = []
+    for (option, equals, value), following in zip(options, [*arguments, ""][1:], strict=True):
+        is_own_law = command in OF_RUN and option == "--material" and ".py:" in (value if equals else following)
+        todays.append(("--user-law" if is_own_law else names.get(option, option)) + equals + value)
+    return todays

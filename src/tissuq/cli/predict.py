@@ -37,7 +37,7 @@ def predict(call: Call[PredictionSettings, PredictOptions]) -> None:
     settings, beside, law = call.settings, call.beside, call.law
     source = beside / settings.run
     named = source if source.name.strip(".") else source.resolve()  # "." and ".." have no name of their own
-    target = call.target(named.parent / f"{named.name}-{settings.mode_in(beside)}", apart_from=source)
+    target = call.target(named.parent / f"{named.name}-{settings.mode_in(beside, law)}", apart_from=source)
     prediction = call.carried_out(
         target,
         lambda step: run_prediction(settings, beside, step, law),

@@ -66,20 +66,21 @@ class Monitor:
 
     @contextmanager
     def steps(self, total: int | None = None) -> Iterator[Callable[[str], None]]:
-        """Show the steps of a run; give the function that announces the next one."""
-        done, begun = 0, self.seconds
+        """Show the steps of a run; give the function that announces the next one.
+
+        They are unlike, from a fit to the writing of a page, so that those done do not tell how long the others take.
+        """
+        done = 0
         with self._bar(total) as bar, _Timed(self._say) as timed:
             shown = bar.add_task("starting", total=total)
 
             def step(text: str) -> None:
                 nonlocal done
                 self._begin(text)
-                seconds_left = (self.seconds - begun) / done * (total - done) if total and done else None
-                bar.update(shown, description=f"{_left(seconds_left)}{text}", completed=done)
+                bar.update(shown, description=text, completed=done)
                 done += 1
-                number = f"{done} of {total}: " if total else ""
                 if self._tells_lines:
-                    timed.wait(f"{number}{_left(seconds_left)}{text}")
+                    timed.wait(f"{done} of {total}: {text}" if total else text)
 
             yield step
         self._end()

@@ -6,18 +6,23 @@ from pathlib import Path
 
 from tissuq.studies.option import Settings, option
 
-__all__ = ["Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Written"]
+__all__ = ["Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Verbosity", "Written"]
 
 
 class Running(Settings):
     """Options of a command on which its numbers do not depend."""
 
 
-class Configured(Running):
-    """A command that an earlier recipe repeats."""
+class Verbosity(Running):
+    """A command that says as much as is asked for."""
 
     quiet: bool = option(False, "Print nothing but the numbers of the answer; errors as ever.")
     verbose: bool = option(False, "Tell how long every stage took.")
+
+
+class Configured(Verbosity):
+    """A command that an earlier recipe repeats."""
+
     config: Path | None = option(None, "run.toml of an earlier run to repeat.")
 
 

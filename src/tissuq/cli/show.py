@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tissuq.cli.call import Call
 from tissuq.cli.command import command
-from tissuq.cli.running import Running
+from tissuq.cli.running import Verbosity
 from tissuq.studies.option import Settings, argument, option
 
 __all__ = ["show"]
@@ -19,7 +19,7 @@ class ShownRun(Settings):
     run_folder: Path = argument(..., "Folder of a run.")
 
 
-class ShowOptions(Running):
+class ShowOptions(Verbosity):
     """How it is shown."""
 
     details: bool = option(False, "Also stability, what the discrepancy does, and all warnings.")
@@ -36,9 +36,15 @@ def show(call: Call[ShownRun, ShowOptions]) -> None:
 
     folder = call.settings.run_folder
     if call.how.pdf is not None:
-        write_pdf(folder / "report.html", call.how.pdf)
+        with call.monitor.steps() as step:
+            step("printing")
+            write_pdf(folder / "report.html", call.how.pdf)
         print(call.how.pdf)
     elif call.how.as_json:
-        print(json.dumps(contents_for_programs(folder), indent=2))
+        print(json.dumps(contents_for_programs(folder), indent=2), file=call.out)
     else:
-        print_result(read_record(folder), folder, details=call.how.details)
+        with call.monitor.steps() as step:
+            step("reading")
+            record = read_record(folder)
+        print_result(record, folder, details=call.how.details)
+        call.answer(record["numbers"])

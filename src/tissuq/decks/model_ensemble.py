@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from tissuq.decks.model_run import ModelRun
 from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MIN_DRAWS
 from tissuq.finite_elements.spread import BAND, PROBABILITY, SHARES, band_probability, force_table
-from tissuq.finite_elements.warnings import MAX_DRAWS_NAMED
+from tissuq.posterior.draws_in_words import failed_draws
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -188,18 +187,8 @@ def _failures(pairs: Iterable[tuple[ModelRun, Mapping[str, Any]]]) -> Iterable[F
 
 
 def _failed(ensemble: ModelEnsemble) -> list[str]:
-    """Return a sentence for each family of draws of which some failed."""
-    texts = []
-    for family, count in Counter(failure.family for failure in ensemble.failures).items():
-        failures = [failure for failure in ensemble.failures if failure.family == family]
-        named = ", ".join(str(failure.number + 1) for failure in failures[:MAX_DRAWS_NAMED])
-        more = f" and {count - MAX_DRAWS_NAMED} more" if count > MAX_DRAWS_NAMED else ""
-        texts.append(
-            f"{count} of {ensemble.draws} {FAMILIES[family]} failed ({named}{more}; first reason: "
-            f"{failures[0].problem}). failures.csv has all of them with the solver's last lines; --again makes them "
-            "again. Each time shows only the draws that reached it, which may no longer be a fair sample."
-        )
-    return texts
+    advice = "failures.csv has all of them with the solver's last lines; --again makes them again."
+    return failed_draws(ensemble.failures, dict.fromkeys(FAMILIES, ensemble.draws), FAMILIES, "at time {:.3g}", advice)
 
 
 def _beyond(ensemble: ModelEnsemble) -> list[str]:

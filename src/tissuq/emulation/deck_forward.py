@@ -48,14 +48,16 @@ class DeckForward(Forward):
         Name (ANSYS: number) of the material in it.
     material : str
         The law, all parameters of which are calibrated under their names.
-    quantity : str
-        What was measured, such as ``RF2@PUNCH`` (`tissuq.decks.parse_quantity`).
+    quantity : str, or mapping of str to str
+        What was measured, such as ``RF2@PUNCH`` (`tissuq.decks.parse_quantity`); of several quantities each by its
+        name in the mappings that `tissuq.calibrate` gets.
     stretch : (float, float)
         Smallest and largest stretch in the model, over which the law's card is to hold where it is a projection.
     along : str, optional
         What the controls are, such as ``U2@PUNCH``; the time of the model, unless given.
     factor, along_factor : float
-        What quantity and controls of the model are multiplied with to be those of the file: signs, symmetry, units.
+        What quantity and controls of the model are multiplied with to be those of the file: signs, symmetry, units. Of
+        several quantities ``factor`` is a mapping, too.
     mode : str
         Loading mode of that stretch.
     solver, command, deck, card_format : str, optional
@@ -84,10 +86,10 @@ class DeckForward(Forward):
     model: str | Path
     replaced: str
     material: str
-    quantity: str
+    quantity: str | Mapping[str, str]
     stretch: tuple[float, float]
     along: str | None = None
-    factor: float = 1.0
+    factor: float | Mapping[str, float] = 1.0
     along_factor: float = 1.0
     mode: str = "uniaxial"
     solver: str | None = None
@@ -112,10 +114,22 @@ class DeckForward(Forward):
         return solver_for(self.read_deck.format.name, self.solver, self.command)
 
     @cached_property
+    def measured(self) -> Mapping[str, Quantity]:
+        """What was measured, by name; the name of a single quantity is empty."""
+        texts = {"": self.quantity} if isinstance(self.quantity, str) else self.quantity
+        return {name: parse_quantity(f"quantity{'-' * bool(name)}{name}", text) for name, text in texts.items()}
+
+    @cached_property
+    def factors(self) -> Mapping[str, float]:
+        """What the quantities of the model are multiplied with, by name."""
+        factors = self.factor if isinstance(self.factor, Mapping) else dict.fromkeys(self.measured, self.factor)
+        return {name: factors.get(name, 1.0) for name in self.measured}
+
+    @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """What was measured, and what the controls are where that is not the time."""
         controls = () if self.along is None else (parse_quantity("along", self.along),)
-        return (parse_quantity("quantity", self.quantity), *controls)
+        return (*self.measured.values(), *controls)
 
     @property
     def law(self) -> Material:
@@ -155,7 +169,7 @@ class DeckForward(Forward):
         for quantity in self.quantities:
             quantity.check()
         sets_of(self.read_deck, self.quantities)
-        if not (np.isfinite(self.factor) and self.factor and np.isfinite(self.along_factor) and self.along_factor):
+        if not all(np.isfinite(factor) and factor for factor in (*self.factors.values(), self.along_factor)):
             raise InputError("a factor of a quantity must be a number other than zero.")
 
     def prepared_in(self, folder: Path) -> DeckForward:
@@ -163,7 +177,13 @@ class DeckForward(Forward):
         clear_unfinished(folder / SOLVED)
         return replace(self, folder=folder.absolute())
 
-    def run(self, parameters: Mapping[str, float], control: FloatArray) -> FloatArray:
+    def of_quantities(self, ends: Mapping[str, tuple[int, int]]) -> Forward:
+        if set(ends) != set(self.measured):
+            asked, given = (", ".join(filter(None, names)) or "one quantity" for names in (self.measured, ends))
+            raise InputError(f"the model gives {asked}; what was measured is {given}.")
+        return super().of_quantities(ends)
+
+    def run(self, parameters: Mapping[str, float], control: FloatArray | Mapping[str, FloatArray]) -> Any:
         assert self.folder is not None  # noqa: S101 (where it is run, it is prepared)
         deck = self.read_deck
         block = self._block(parameters)
@@ -177,7 +197,9 @@ class DeckForward(Forward):
             raise UnreadableError(result["misread"])
         if not (self.keep or result["problem"]):
             shutil.rmtree(task.folder, ignore_errors=True)
-        return self._at(control, result["curves"], str(result["problem"]))
+        if not isinstance(control, Mapping):
+            return self._at(control, "", result["curves"], str(result["problem"]))
+        return {name: self._at(at, name, result["curves"], str(result["problem"])) for name, at in control.items()}
 
     def _block(self, parameters: Mapping[str, float]) -> str:
         """Return the card of the material with parameters in the unit of the model."""
@@ -191,17 +213,17 @@ class DeckForward(Forward):
             raise UnreadableError(f"cards of the format '{name}' do not go into a deck.")
         return blocks[0]
 
-    def _at(self, control: FloatArray, curves: Mapping[str, Any], problem: str) -> FloatArray:
-        """Return the quantity at the controls."""
+    def _at(self, control: FloatArray, name: str, curves: Mapping[str, Any], problem: str) -> FloatArray:
+        """Return a quantity at its controls."""
         from scipy.interpolate import PchipInterpolator
 
         quantity, *controls = (
-            self._from_rest(kind, Curve(*map(np.asarray, curves.get(name, ([], [])))))
-            for name, kind in zip(("quantity", "along"), self.quantities, strict=False)
+            self._from_rest(kind, Curve(*map(np.asarray, curves.get(kind.name, ([], [])))))
+            for kind in (self.measured[name], *self.quantities[len(self.measured) :])
         )
         count = min(len(curve.times) for curve in (quantity, *controls))
         along = self.along_factor * (controls[0].values if controls else quantity.times)[:count]
-        values = self.factor * quantity.values[:count]
+        values = self.factors[name] * quantity.values[:count]
         reached = float(along[-1]) if count else 0.0
         if count < 2 or reached < control.max() * (1 - 1e-9):
             why = f"{problem}; " if problem else ""

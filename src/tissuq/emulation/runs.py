@@ -213,9 +213,10 @@ class ForwardRuns:
             return ""
         reasons = [error for error in self.errors if error]
         most_frequent = max(set(reasons), key=reasons.count)
+        which = "The reason" if len(set(reasons)) == 1 else "The most frequent reason"
         return (
-            f"{len(reasons)} of {len(self)} runs of the forward model failed, {self._failure_region()}. The most "
-            f"frequent reason: {most_frequent}."
+            f"{len(reasons)} of {len(self)} runs of the forward model failed, {self._failure_region()}. {which}: "
+            f"{most_frequent}."
         )
 
     def _failure_region(self) -> str:
@@ -227,10 +228,15 @@ class ForwardRuns:
                     return f"all those with {symbol} from {failed.min():.4g} and none below {succeeded.max():.4g}"
                 if failed.max() < succeeded.min():
                     return f"all those with {symbol} up to {failed.max():.4g} and none above {succeeded.min():.4g}"
+        if len(bad) == 1:
+            return "the one with " + ", ".join(
+                f"{symbol} = {value:.4g}" for symbol, value in zip(self.symbols, bad[0], strict=True)
+            )
         columns = zip(self.symbols, bad.T, strict=True)
-        ranges = [f"{symbol} {column.min():.4g} to {column.max():.4g}" for symbol, column in columns]
-        inside = ((good >= bad.min(axis=0)) & (good <= bad.max(axis=0))).all(axis=1).sum()
-        return f"at {', '.join(ranges)} (where {inside} others did not)"
+        ranges = " and ".join(f"{symbol} from {column.min():.4g} to {column.max():.4g}" for symbol, column in columns)
+        inside = int(((good >= bad.min(axis=0)) & (good <= bad.max(axis=0))).all(axis=1).sum())
+        others = f"{inside or 'no'} run{'s' * (inside != 1)} with values in these ranges succeeded"
+        return f"with {ranges}; {others}"
 
 
 def gathered(symbols: Sequence[str], results: Sequence[Mapping[str, Any]], outputs: int) -> ForwardRuns:

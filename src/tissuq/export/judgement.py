@@ -13,6 +13,7 @@ from tissuq.export.laws import Form, Law
 from tissuq.export.nearest_law import WANTED_ERROR
 from tissuq.export.projection import Projection
 from tissuq.export.states import are_stable
+from tissuq.posterior.draws_in_words import named_draws
 
 __all__ = ["JudgedLaw"]
 
@@ -20,8 +21,6 @@ FloatArray = NDArray[np.float64]
 
 MIN_STABLE_SHARE = 0.9
 """Share of stable draws above which projections are compared by their error alone."""
-MAX_DRAWS_NAMED = 6
-"""Largest number of draws that a warning names; the index has all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +120,7 @@ class JudgedLaw:
         else:
             way = "none of this code's other laws is nearer to more of them; --format table is exact"
         yield (
-            f"The cards of {_named(far)} of {len(self.stable)} are more than {_percent(WANTED_ERROR)} off in some "
+            f"The cards of {named_draws(far)} of {len(self.stable)} are more than {_percent(WANTED_ERROR)} off in some "
             f"measured state: {way}."
         )
 
@@ -129,21 +128,15 @@ class JudgedLaw:
         lost = np.flatnonzero(~self.stable)
         if len(lost):
             yield (
-                f"The cards of {_named(lost)} are NOT stable over the whole calibrated range. Leave them out, or "
+                f"The cards of {named_draws(lost)} are NOT stable over the whole calibrated range. Leave them out, or "
                 "choose another law with --law."
             )
         lost = np.flatnonzero(self.stable & ~self.stable_beyond)
         if len(lost):
             yield (
-                f"The cards of {_named(lost)} are not stable up to {REACHES[-1]:g} times the measured invariants: a "
-                "model that goes so far may stop there."
+                f"The cards of {named_draws(lost)} are not stable up to {REACHES[-1]:g} times the measured invariants: "
+                "a model that goes so far may stop there."
             )
-
-
-def _named(draws: NDArray[np.intp]) -> str:
-    numbers = ", ".join(str(index + 1) for index in draws[:MAX_DRAWS_NAMED])
-    more = f" and {len(draws) - MAX_DRAWS_NAMED} others" if len(draws) > MAX_DRAWS_NAMED else ""
-    return f"draws {numbers}{more}"
 
 
 def _largest(error: FloatArray) -> float:

@@ -2,6 +2,7 @@
 
 from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, Supports, cases
 from tissuq.finite_elements.material import FElupeMaterial
+from tissuq.finite_elements.plate import PlateWithHole
 from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond
 from tissuq.finite_elements.simulation import Failure, Simulation, simulate
 from tissuq.finite_elements.spread import Band, Shares, band_of, shares_of
@@ -14,6 +15,7 @@ __all__ = [
     "Failure",
     "Indentation",
     "Mesh",
+    "PlateWithHole",
     "Response",
     "Shares",
     "Simulation",

@@ -1,4 +1,4 @@
-"""Cases of finite elements: a body of revolution, its mesh, what holds it and what moves it."""
+"""Cases of finite elements: a body of revolution or a solid, its mesh, what holds it and what moves it."""
 
 from __future__ import annotations
 
@@ -13,27 +13,51 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.registry import variants
 
-__all__ = ["AXIAL", "RADIAL", "Case", "ClampedBar", "Indentation", "Mesh", "Supports", "cases", "graded", "grid"]
+__all__ = [
+    "ACROSS",
+    "AXIAL",
+    "Case",
+    "ClampedBar",
+    "Indentation",
+    "Mesh",
+    "Supports",
+    "cases",
+    "graded",
+    "grid",
+]
 
 FloatArray = NDArray[np.float64]
 
-AXIAL, RADIAL = 0, 1
+AXIAL, ACROSS = 0, 1
 """Columns of points and displacements."""
 
 
 class Mesh(NamedTuple):
-    """Quadrilaterals in a half plane through the axis.
+    """Quadrilaterals in a half plane through the axis of a body of revolution, or hexahedra.
 
     Attributes
     ----------
-    points : (n, 2) array, mm
-        Along the axis, and the distance from it.
-    cells : (c, 4) integer array
-        Corners, in order.
+    points : (n, 2) or (n, 3) array, mm
+        Along the axis, and the distance from it; of hexahedra also the height over the plane in which a section is
+        shown.
+    cells : (c, 4) or (c, 8) integer array
+        Corners, in order; of hexahedra the lower four first.
     """
 
     points: FloatArray
     cells: NDArray[np.intp]
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether cells are hexahedra."""
+        return bool(self.points.shape[1] == 3)
+
+    @property
+    def section(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Quadrilaterals (p, 4) of points that show a section, and the cells (p,) that they are of."""
+        faces = self.cells[:, :4]
+        shown = ~self.points[faces, 2:].any(axis=(1, 2))
+        return faces[shown], np.flatnonzero(shown)
 
 
 class Supports(NamedTuple):
@@ -41,22 +65,25 @@ class Supports(NamedTuple):
 
     Attributes
     ----------
-    fixed : (n, 2) boolean array
+    fixed : (n, 2) or (n, 3) boolean array
         Displacements that stay zero.
     moved : (n,) boolean array
         Points whose displacement along the axis is given.
     direction : float
-        1 or -1: along the axis or against it.
+        1 or -1: along the axis or against it; less where symmetry leaves the points a part of the way.
+    parts : float
+        Number of such bodies, by symmetry, that bear the force side by side.
     """
 
     fixed: NDArray[np.bool_]
     moved: NDArray[np.bool_]
     direction: float
+    parts: float = 1.0
 
 
 @dataclass(frozen=True)
 class Case(ABC):
-    """A body of revolution that something moves along its axis, and the force that this needs.
+    """A body of revolution, or a solid, that something moves along an axis, and the force that this needs.
 
     A new case is one subclass in one file: its sizes as fields, a mesh, and its supports. Everything that takes a case,
     figures and report included, then takes it. All lengths are in mm and positive, forces in N.
@@ -68,6 +95,8 @@ class Case(ABC):
     description: ClassVar[str]
     travel_name: ClassVar[str]
     """What the travel is called: a depth, an elongation."""
+    mesh_order: ClassVar[int] = 1
+    """Power of the size of the cells in which the force errs: one where strains are singular, as at sharp edges."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -86,7 +115,7 @@ class Case(ABC):
 
     @abstractmethod
     def supports(self, points: FloatArray) -> Supports:
-        """Return what holds the points (n, 2), and what moves them."""
+        """Return what holds the points of the mesh, and what moves them."""
 
     def steps(self, count: int) -> FloatArray:
         """Return travels (count,) at equal distances, the last one all of it."""
@@ -158,7 +187,7 @@ class ClampedBar(Case):
         return grid(axial, radial)
 
     def supports(self, points: FloatArray) -> Supports:
-        axial, radial = points[:, AXIAL], points[:, RADIAL]
+        axial, radial = points[:, AXIAL], points[:, ACROSS]
         tolerance = 1e-9 * self.bar_length
         middle, clamp = axial < tolerance, axial > self.bar_length / 2 - tolerance
         return Supports(np.stack([middle, clamp | (radial < tolerance)], axis=-1), clamp, 0.5)
@@ -225,7 +254,7 @@ class Indentation(Case):
         return grid(self.height - graded(self.height, smallest_cell, growth)[::-1], radial)
 
     def supports(self, points: FloatArray) -> Supports:
-        axial, radial = points[:, AXIAL], points[:, RADIAL]
+        axial, radial = points[:, AXIAL], points[:, ACROSS]
         tolerance = 1e-9 * self.radius
         base = axial < tolerance
         punch = (axial > self.height - tolerance) & (radial < self.punch_radius + tolerance)

@@ -113,13 +113,15 @@ class Simulation:
 
     @property
     def mesh_factor(self) -> FloatArray:
-        """What forces (s,) are to be multiplied by for cells without size (Richardson): errors halve with the cells.
+        """What forces (s,) are to be multiplied by for cells without size (Richardson).
 
-        Strains are singular at the edge of a punch and at a clamp, so that errors are of first order in that size.
+        Strains are singular at the edge of a punch and at a clamp, so that errors halve with the cells; in a body
+        without sharp edges they fall to a quarter (`Case.mesh_order`).
         """
         if not self.mesh_changes:
             return np.ones(len(self.travel))
-        return np.asarray(1 + 2 * np.interp(self.travel, *np.transpose(self.mesh_changes)))
+        finer = 2.0**self.case.mesh_order
+        return np.asarray(1 + finer / (finer - 1) * np.interp(self.travel, *np.transpose(self.mesh_changes)))
 
     def table(self) -> pd.DataFrame:
         """Return band and shares of the variance at every step, N: see `tissuq.finite_elements.spread.force_table`.

@@ -38,8 +38,8 @@ class CellFields:
 
     Attributes
     ----------
-    displacement : (n, 2) array, mm
-        Displacements of the points, along the axis and from it.
+    displacement : (n, 2) or (n, 3) array, mm
+        Displacements of the points, with the axes of the mesh.
     first_invariant, second_invariant : (c,) array
         I1 - 3 and I2 - 3 of the distortion.
     largest : (c,) array
@@ -92,10 +92,16 @@ class Solver:
         self._bulk_ratio = bulk_ratio
         self._umat = FElupeMaterial(material, values=values)
         self._modulus = self._umat.unit = _stiffness(material, self._umat.energy.initial_shear_modulus)
-        region = fem.RegionQuad(fem.Mesh(*mesh, "quad"))
-        self._field = fem.FieldContainer([fem.FieldAxisymmetric(region, dim=2)])
+        if mesh.is_solid:
+            region = fem.RegionHexahedron(fem.Mesh(*mesh, "hexahedron"))
+            field, width = fem.Field(region, dim=3), 1.0
+        else:
+            region = fem.RegionQuad(fem.Mesh(*mesh, "quad"))
+            field = fem.FieldAxisymmetric(region, dim=2)
+            width = 2 * np.pi * field.radius
+        self._field = fem.FieldContainer([field])
         self._solid = fem.SolidBodyNearlyIncompressible(self._umat, self._field, bulk=bulk_ratio)
-        self._volumes = 2 * np.pi * self._field[0].radius * region.dV
+        self._volumes, self._parts = supports.parts * width * region.dV, supports.parts
         held = supports.fixed.copy()
         held[:, AXIAL] |= supports.moved
         self._held, self._free = np.flatnonzero(held.ravel()), np.flatnonzero(~held.ravel())
@@ -125,8 +131,8 @@ class Solver:
 
     def force(self) -> float:
         """Return the force (N) that moves the moved points on."""
-        internal = self._residual(self._path[-1][1]).reshape(-1, 2)[self._moved, AXIAL]
-        return float(internal.sum() * np.sign(self._rate.sum()) * self._modulus)
+        internal = self._residual(self._path[-1][1]).reshape(self._rate.shape)[self._moved, AXIAL]
+        return float(self._parts * internal.sum() * np.sign(self._rate.sum()) * self._modulus)
 
     def fields(self) -> CellFields:
         """Return the displacements, and means over cells weighted by volume."""
@@ -250,7 +256,7 @@ class Solver:
         return tried, tried_residual
 
     def _residual(self, u: FloatArray) -> FloatArray:
-        """Return the internal forces of displacements (n, 2), (2 n,), in initial shear moduli times mm^2."""
+        """Return the internal forces of displacements (n, d), (d n,), in initial shear moduli times mm^2."""
         self._field[0].values[:] = u
         try:
             internal = self._solid.assemble.vector(self._field).toarray()

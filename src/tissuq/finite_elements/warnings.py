@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, Simulation
 from tissuq.finite_elements.spread import PROBABILITY, band_probability, shares_of
+from tissuq.posterior.draws_in_words import failed_draws
 
-__all__ = ["MAX_DRAWS_NAMED", "simulation_warnings"]
-
-MAX_DRAWS_NAMED = 6
-"""Largest number of failed draws that a warning names; the table of failures has all of them."""
+__all__ = ["simulation_warnings"]
 
 MIN_ENERGY_SHARE = 0.05
 """Share of the strain energy beyond the measured invariants from which a warning is given."""
@@ -31,19 +27,8 @@ def simulation_warnings(simulation: Simulation) -> list[str]:
 
 
 def _failed(simulation: Simulation) -> list[str]:
-    """Return a sentence for each family of draws of which some did not reach the end."""
-    name, texts = simulation.case.travel_name, []
-    for family, count in Counter(failure.family for failure in simulation.failures).items():
-        failures = [failure for failure in simulation.failures if failure.family == family]
-        failures.sort(key=lambda failure: failure.reached)
-        named = "; ".join(f"draw {item.number + 1} at {item.reached:.3g} mm" for item in failures[:MAX_DRAWS_NAMED])
-        more = f"; and {count - MAX_DRAWS_NAMED} more, see failures.csv" if count > MAX_DRAWS_NAMED else ""
-        texts.append(
-            f"{count} of {len(simulation.forces[family])} {FAMILIES[family]} did not reach the full {name} of "
-            f"{simulation.case.travel:.3g} mm ({named}{more}; first reason: {failures[0].problem}). Each step shows "
-            "only the draws that reached it, which may no longer be a fair sample."
-        )
-    return texts
+    totals = {family: len(forces) for family, forces in simulation.forces.items()}
+    return failed_draws(simulation.failures, totals, FAMILIES, "at {:.3g} mm", "failures.csv has all of them.")
 
 
 def _extrapolated(simulation: Simulation) -> list[str]:

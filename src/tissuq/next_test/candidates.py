@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +26,7 @@ __all__ = [
     "MODULUS",
     "Candidate",
     "ModulusTarget",
+    "OfStresses",
     "ParameterTarget",
     "StressTarget",
     "Target",
@@ -206,7 +208,24 @@ def _why_not(material: Material, mode: LoadingMode) -> str:
 MODULUS = "modulus"
 
 
-@dataclass(frozen=True)
+class OfStresses(NamedTuple):
+    """A quantity of stresses: intercept + sum of weight_k * stress_k + an error.
+
+    Attributes
+    ----------
+    weights : (K,) array
+    intercept : float
+        Which no error of all stresses multiplies.
+    residual_sd : float
+        Of the error.
+    """
+
+    weights: FloatArray
+    intercept: float = 0.0
+    residual_sd: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Target(ABC):
     """A quantity that is linear in the linear parameters, given the others."""
 
@@ -229,8 +248,13 @@ class Target(ABC):
 
     @property
     def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """A mode and a stretch (1,) of it, where it is the stress there."""
+        """A mode and a stretch (1,) of it for each stress that it is made of, where it is of stresses."""
         return iter(())
+
+    @property
+    def of_stresses(self) -> OfStresses:
+        """How it is made of these stresses: it is the one stress, unless a subclass says otherwise."""
+        return OfStresses(np.ones(1))
 
     @abstractmethod
     def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:

@@ -105,7 +105,7 @@ class NextTest:
         for number, components in enumerate(self._batches):
             mixture, noise_sd = self._mixture(components, candidate)
             variances = expected_variances(mixture, noise_sd, self._uniforms(number, mixture, noise_sd))
-            centre = (mixture.weights @ mixture.mean)[noise_sd.shape[1] :]
+            centre = (mixture.weights @ mixture.mean)[noise_sd.shape[1] :] - self._intercepts
             prior, expected = (
                 variance + self._common_error(self.errors_after) ** 2 * (variances.prior + centre**2)
                 for variance in (variances.prior, variances.expected)
@@ -123,7 +123,8 @@ class NextTest:
         mean, root = self._targets(self._components, *self._stresses(self._components, []))
         centre, covariance = GaussianMixture(self._components.weights, self._components.settings, mean, root).moments()
         variance = np.diag(covariance)
-        return np.sqrt(variance + self._common_error(self.errors_now) ** 2 * (variance + centre**2))
+        of_stresses = centre - self._intercepts
+        return np.sqrt(variance + self._common_error(self.errors_now) ** 2 * (variance + of_stresses**2))
 
     @property
     def tolerances(self) -> Tolerances:
@@ -154,6 +155,11 @@ class NextTest:
     def _common_error(self, error: float) -> FloatArray:
         """Return the error (t,) of each target that all stresses have in common."""
         return error * np.array([target.is_stiffness(self.model) for target in self.targets])
+
+    @property
+    def _intercepts(self) -> FloatArray:
+        """The part (t,) of each target that such an error does not multiply."""
+        return np.array([target.of_stresses.intercept for target in self.targets])
 
     @cached_property
     def _batches(self) -> list[GaussianMixture]:
@@ -192,9 +198,12 @@ class NextTest:
         column = mean.shape[1] - sum(1 for target in self.targets for _ in target.points)
         for target in self.targets:
             target_root, target_mean = np.zeros((len(mean), width + 1)), np.zeros(len(mean))
-            if any(True for _ in target.points):
-                target_mean, target_root[:, :width], target_root[:, width] = mean[:, column], root[:, column], scatter
-                column += 1
+            if count := sum(1 for _ in target.points):
+                of_target, (weights, intercept, residual_sd) = slice(column, column + count), target.of_stresses
+                target_mean = intercept + mean[:, of_target] @ weights
+                target_root[:, :width] = np.einsum("mkr,k->mr", root[:, of_target], weights)
+                target_root[:, width] = np.hypot(scatter * np.linalg.norm(weights), residual_sd)
+                column += count
             else:
                 target_mean, linear = target.moments(self.model, components)
                 target_root[:, : linear.shape[1]] = linear
@@ -212,7 +221,7 @@ class NextTest:
         noise_sd = self._noise(components, candidate, points, curve)
         if self.specimen == "other":
             test = self._error_points(components, candidate, points, curve)
-            columns = list(self._errors_of_specimen(test, mean, target_mean))
+            columns = list(self._errors_of_specimen(test, mean, target_mean - self._intercepts))
             root = np.concatenate([root, *(column[:, :, None] for column, _ in columns)], axis=2)
             target_root = np.concatenate([target_root, *(column[:, :, None] for _, column in columns)], axis=2)
             noise_sd = np.hypot(noise_sd, self.tolerances.noise(test))

@@ -43,15 +43,15 @@ def has_shares(solution: Solution) -> bool:
     return bool(solution.model.discrepancy.parameters)
 
 
-def answer(found: Sequence[Described], drawn: Panels, unit: StressUnit) -> None:
+def answer(described: Sequence[Described], drawn: Panels, unit: StressUnit) -> None:
     """Draw every measured curve with its bands on a panel of its own, and the discrepancy's share on the strips."""
-    solution, prob = found[0].solution, found[0].prob
+    solution, prob = described[0].solution, described[0].prob
     curves = solution.model.experiment.curves
-    for number, (axis, of) in enumerate(zip(drawn.axes, found, strict=True)):
+    for number, (axis, of) in enumerate(zip(drawn.axes, described, strict=True)):
         curve = of.curve
         _draw(axis, of, unit)
         if drawn.is_new:
-            axis.set_title(_title(of, len(found) > 1, drawn.letters))
+            axis.set_title(_title(of, len(described) > 1, drawn.letters))
         if number % drawn.columns == 0 or not _is_one_stress(solution):
             axis.set_ylabel(f"{curve.quantity.replace(LONG, SHORT)} [{unit.name}]")
     if drawn.strips:
@@ -61,20 +61,20 @@ def answer(found: Sequence[Described], drawn: Panels, unit: StressUnit) -> None:
     drawn.explain()
 
 
-def answer_on_new_figure(found: Sequence[Described], unit: StressUnit, *, is_narrow: bool = False) -> Figure:
+def answer_on_new_figure(described: Sequence[Described], unit: StressUnit, *, is_narrow: bool = False) -> Figure:
     """Return the picture as a figure of a page: 1000 pixels wide, or 400 with panels above one another.
 
     A pixel of a page is a 96th of an inch, so that the SVG has these sizes. One row of panels is 480 pixels tall.
     """
-    count = len(found)
+    count = len(described)
     columns = 1 if is_narrow else columns_of(count)
     (width, height), further = (NARROW, NARROW_ROW) if is_narrow else (WIDE, WIDE_ROW)
     tall = height + further * (-(-count // columns) - 1)
     letters = NARROW_LETTERS if is_narrow else WIDE_LETTERS
     style = STYLE | {"font.size": letters, "axes.titlesize": letters, "figure.dpi": PIXELS}
     with new_figure(width / PIXELS, tall / PIXELS, style) as figure:
-        drawn = on_figure(figure, count, columns, has_strips=has_shares(found[0].solution))
-        answer(found, Panels(drawn.axes, drawn.strips), unit)
+        drawn = on_figure(figure, count, columns, has_strips=has_shares(described[0].solution))
+        answer(described, Panels(drawn.axes, drawn.strips), unit)
     return figure
 
 
@@ -115,21 +115,21 @@ def small_svg(solution: Solution, unit: StressUnit, words: str) -> str:
     return inline_svg(figure, words)
 
 
-def _draw(axis: Axes, found: Described, unit: StressUnit) -> None:
+def _draw(axis: Axes, described: Described, unit: StressUnit) -> None:
     """Draw the bands of a curve, the material alone and the measurements; of several paths lines for the latter two."""
-    curve, percent, is_one = found.curve, f"{100 * found.prob:.4g} %", len(found.ways) == 1
-    alone = found.stress_alone if found.has_discrepancy else None
+    curve, percent, is_one = described.curve, f"{100 * described.prob:.4g} %", len(described.ways) == 1
+    alone = described.stress_alone if described.has_discrepancy else None
     measured, error = curve.stress / unit.to_mpa, curve.standard_error / unit.to_mpa
-    core = [measured - error, measured + error, found.stress.median / unit.to_mpa]
-    beyond = [end / unit.to_mpa for of in (found.measurements, found.stress) for end in (of.low, of.high)]
+    core = [measured - error, measured + error, described.stress.median / unit.to_mpa]
+    beyond = [end / unit.to_mpa for of in (described.measurements, described.stress) for end in (of.low, of.high)]
     limits = limits_of(core, [*beyond, *([alone.median / unit.to_mpa] if alone else [])])
-    bands = [(found.measurements, 0.18 if is_one else 0.12, BAND, f"{percent} of measurements")]
-    bands += [(found.stress, 0.38, BAND, f"{percent} of the stress")] if is_one else []
+    bands = [(described.measurements, 0.18 if is_one else 0.12, BAND, f"{percent} of measurements")]
+    bands += [(described.stress, 0.38, BAND, f"{percent} of the stress")] if is_one else []
     bands += [(alone, 0.13, TRUTH, "")] if alone and is_one else []
-    lines = [(found.stress, BAND, "-", "" if is_one else "stress, median")]
-    material = found.solution.model.material.name
+    lines = [(described.stress, BAND, "-", "" if is_one else "stress, median")]
+    material = described.solution.model.material.name
     lines += [(alone, TRUTH, "--", f"{material} alone{f', {percent}' * is_one}")] if alone else []
-    for number, (places, is_curve) in enumerate(found.ways):
+    for number, (places, is_curve) in enumerate(described.ways):
         for of, strength, color, label in bands:
             low, high = (within(end[places] / unit.to_mpa, limits) for end in (of.low, of.high))
             band(axis, of.stretch[places], low, high, color=color, strength=strength, is_path=is_curve,
@@ -146,13 +146,13 @@ def _draw(axis: Axes, found: Described, unit: StressUnit) -> None:
     axis.locator_params(axis="x", nbins=6)
 
 
-def _title(found: Described, is_named: bool, letters: int) -> str:
+def _title(described: Described, is_named: bool, letters: int) -> str:
     """Return how many measurements of a curve are inside its band, beneath its name where there are several."""
-    curve, percent = found.curve, f"{100 * found.prob:.4g} %"
+    curve, percent = described.curve, f"{100 * described.prob:.4g} %"
     name = f"{shortened(curve.name, letters)}\n" if is_named else ""
-    if not found.solution.is_of_data:
+    if not described.solution.is_of_data:
         return f"{name}predicted, not fitted to these"
-    inside = int(found.inside.sum())
+    inside = int(described.inside.sum())
     forms = f"measurements inside their {percent} band", f"inside their {percent} band", f"inside {percent} band"
     texts = [f"{inside} of {len(curve)} {form}" for form in forms]
     return name + next((text for text in texts if len(text) <= letters), texts[-1])

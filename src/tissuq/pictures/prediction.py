@@ -135,11 +135,11 @@ def predictions(
 def _predictions(solution: Solution, mode: LoadingMode, at: FloatArray, prob: float) -> list[Predicted]:
     data, model = solution.model.experiment, solution.model
     is_joint, several = speaks_of(model, mode), len(mode.controls) > 1
-    found = []
+    predictions = []
     for channel, quantity in enumerate(mode.stresses):
         options: dict[str, Any] = {"discrepancy": is_joint, "prob": prob, "mode": mode, "channel": channel}
         noisy, stress = predict_bands([(1.0, solution)], at, (True, False), **options)
-        found.append(
+        predictions.append(
             Predicted(
                 abscissa=stress.stretch,
                 stress=stress,
@@ -153,12 +153,12 @@ def _predictions(solution: Solution, mode: LoadingMode, at: FloatArray, prob: fl
                 quantity=quantity,
             )
         )
-    return found
+    return predictions
 
 
-def prediction(drawn: Panels, found: Sequence[Predicted], unit: StressUnit, prob: float = 0.95) -> None:
+def prediction(drawn: Panels, predicted: Sequence[Predicted], unit: StressUnit, prob: float = 0.95) -> None:
     """Draw every stress on a panel of its own."""
-    for axis, of in zip(drawn.axes, found, strict=True):
+    for axis, of in zip(drawn.axes, predicted, strict=True):
         draw_predicted(axis, of, unit, predicted_limits([of]), prob)
         axis.set_ylabel(f"{of.quantity} [{unit.name}]")
         axis.set_xlabel(of.label)
@@ -167,10 +167,10 @@ def prediction(drawn: Panels, found: Sequence[Predicted], unit: StressUnit, prob
     drawn.explain()
 
 
-def predicted_limits(found: Sequence[Predicted]) -> tuple[float, float]:
+def predicted_limits(predicted: Sequence[Predicted]) -> tuple[float, float]:
     """Return the ends of an axis, MPa: what is measured, the medians, and of bands what is not far from them."""
     core, known_ends, beyond = list[FloatArray](), list[FloatArray](), list[FloatArray]()
-    for of in found:
+    for of in predicted:
         known = _known(of)
         core += [of.stress.median[known], *([of.measured.stress] if of.measured is not None else [])]
         known_ends += [values[known] for values in (of.measurements.low, of.measurements.high)]
@@ -178,48 +178,48 @@ def predicted_limits(found: Sequence[Predicted]) -> tuple[float, float]:
     core.append(np.array(limits_of(core, known_ends, KNOWN_MARGIN)))
     low, high = limits_of(core, [])
     extent = high - low
-    medians = [np.clip(of.stress.median, low - extent, high + extent) for of in found]
+    medians = [np.clip(of.stress.median, low - extent, high + extent) for of in predicted]
     near = [np.clip(ends, low - NEAR_MARGIN * extent, high + NEAR_MARGIN * extent) for ends in beyond]
     return limits_of([*core, *medians, *near], [])
 
 
-def _known(found: Predicted) -> NDArray[np.bool_]:
+def _known(predicted: Predicted) -> NDArray[np.bool_]:
     """Return where a prediction is calibrated, or everywhere where it is nowhere."""
-    return found.is_calibrated if found.is_calibrated.any() else np.ones_like(found.is_calibrated)
+    return predicted.is_calibrated if predicted.is_calibrated.any() else np.ones_like(predicted.is_calibrated)
 
 
 def draw_predicted(
-    axis: Axes, found: Predicted, unit: StressUnit, limits: tuple[float, float], prob: float = 0.95
+    axis: Axes, predicted: Predicted, unit: StressUnit, limits: tuple[float, float], prob: float = 0.95
 ) -> None:
     """Draw bands, measurements and where nothing was measured; ``limits`` of the stress are in MPa."""
-    scale, percent, at = unit.to_mpa, f"{100 * prob:.4g} %", found.abscissa
+    scale, percent, at = unit.to_mpa, f"{100 * prob:.4g} %", predicted.abscissa
     ends = limits[0] / scale, limits[1] / scale
-    for number, (places, is_curve) in enumerate(found.ways):
+    for number, (places, is_curve) in enumerate(predicted.ways):
         for of, strength, label in (
-            (found.measurements, 0.18, f"{percent} of measurements"),
-            (found.stress, 0.38, f"{percent} of the stress"),
+            (predicted.measurements, 0.18, f"{percent} of measurements"),
+            (predicted.stress, 0.38, f"{percent} of the stress"),
         ):
             low, high = within(of.low[places] / scale, ends), within(of.high[places] / scale, ends)
             label = "" if number else label
             band(axis, at[places], low, high, strength=strength, label=label, is_path=is_curve)
-        median = within(found.stress.median[places] / scale, ends)
+        median = within(predicted.stress.median[places] / scale, ends)
         line(axis, at[places], median, label="" if number else "predicted median", is_path=is_curve)
     margin = 0.02 * max(float(np.ptp(at)), 0.1 * abs(float(at.max())))
     axis.set_xlim(at.min() - margin, at.max() + margin)
     axis.set_ylim(ends)
-    known = _known(found)
-    cut_off(axis, found.measurements.low[known] / scale, found.measurements.high[known] / scale, unit.name)
+    known = _known(predicted)
+    cut_off(axis, predicted.measurements.low[known] / scale, predicted.measurements.high[known] / scale, unit.name)
     axis.locator_params(axis="x", nbins=6)
     size = relative_size()
-    if found.calibrated is not None:
-        outside(axis, *found.calibrated, "extrapolated")
-    elif not found.is_calibrated.all():
-        beyond = at[~found.is_calibrated]
+    if predicted.calibrated is not None:
+        outside(axis, *predicted.calibrated, "extrapolated")
+    elif not predicted.is_calibrated.all():
+        beyond = at[~predicted.is_calibrated]
         axis.plot(beyond, np.zeros_like(beyond), "|", color=BASE, ms=8 * size, transform=axis.get_xaxis_transform(),
                   label="extrapolated", clip_on=False)  # fmt: skip
-    if found.measured is None:
+    if predicted.measured is None:
         return
-    shown = found.measured
+    shown = predicted.measured
     for is_shown, face, label in (
         (shown.is_calibrated, INK, "measured"),
         (~shown.is_calibrated, "white", "measured beyond"),

@@ -175,11 +175,19 @@ class ErrorEstimates:
         return replace(model, tolerances=stated.with_factor(factor)).with_errors(factor=factor)
 
     def _with_lag(self, model: StatisticalModel) -> StatisticalModel:
-        """Return a model with consecutive noise at the lag under which the data are most probable."""
+        """Return a model with consecutive noise at the lag under which the data are most probable.
+
+        Which has one peak: lags are tried from the middle of the grid upwards, as long as it rises.
+        """
         if not model.noise.is_consecutive or model.fitted_errors.lag is not None:
             return model
-        log_evidence = np.array([self._evidence(model.with_errors(lag=lag)) for lag in LAG_GRID])
-        return model.with_errors(lag=float(np.tanh(_peak(np.arctanh(LAG_GRID), log_evidence))))
+        best, evidences = len(LAG_GRID) // 2, dict[int, float]()
+        while new := {best - 1, best, best + 1} & set(range(len(LAG_GRID))) - evidences.keys():
+            evidences |= {index: self._evidence(model.with_errors(lag=LAG_GRID[index])) for index in new}
+            best = max(evidences, key=lambda index: evidences[index])
+        indices = sorted(evidences)
+        lags, log_evidence = np.arctanh(LAG_GRID)[indices], np.array([evidences[index] for index in indices])
+        return model.with_errors(lag=float(np.tanh(_peak(lags, log_evidence))))
 
     def _with_curve(self, model: StatisticalModel) -> StatisticalModel:
         """Return a model with tolerances along its own mean curve, and at its own level of errors.

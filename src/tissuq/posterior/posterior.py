@@ -28,6 +28,7 @@ from tissuq.mechanics import Material
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.next_test import Candidate, rank_tests
+from tissuq.next_test.candidates import Target
 from tissuq.pictures.answer import small_svg
 from tissuq.posterior.archive import read_solution, solution_groups
 from tissuq.posterior.ensemble import Ensemble, Sampling, drawn_ensemble
@@ -235,7 +236,10 @@ class Posterior(PosteriorPlots):
         return stable_ranges(self.solution)
 
     def design(
-        self, candidates: Sequence[str | Candidate] = (), target: str | Sequence[str] = (), **options: Any
+        self,
+        candidates: Sequence[str | Candidate] = (),
+        target: str | Target | Sequence[str | Target] = (),
+        **options: Any,
     ) -> pd.DataFrame:
         """Rank tests that could be made next by how much less uncertain they are expected to make a target.
 
@@ -245,8 +249,9 @@ class Posterior(PosteriorPlots):
         ----------
         candidates : sequence of str or Candidate
             Such as ``"planar 1:1.5 20"``; usual ones in all modes, unless given.
-        target : str or sequence of str
-            ``"modulus"`` (the initial shear modulus, unless given), a parameter, or a stress such as ``"planar:1.5"``.
+        target : str, Target, or sequence of these
+            ``"modulus"`` (the initial shear modulus, unless given), a parameter, a stress such as ``"planar:1.5"``; or
+            a quantity of a finite-element model (`tissuq.next_test.quantity_target`).
 
         Examples
         --------
@@ -256,7 +261,7 @@ class Posterior(PosteriorPlots):
         >>> posterior.design(["uniaxial 0.9:1.1 4", "uniaxial 0.7:1.3 4"]).query("not is_repeat")["low"].tolist()
         [0.7, 0.9]
         """
-        targets = [target] if isinstance(target, str) else target
+        targets = [target] if isinstance(target, (str, Target)) else target
         return rank_tests(self.solution, candidates, targets, **options)
 
     def update(self, more: Experiment) -> Posterior:

@@ -62,7 +62,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     inside_alone = calibration.predictive_coverage(discrepancy=False)
     alone = f"of the forward model alone: {inside_alone:.0%}" if has_discrepancy else ""
     numbers = [
-        Number(symbol, marginal.mean, *marginal.hdi(), interval_is="95 % HPD")
+        Number(symbol, marginal.mean, *marginal.hdi(), study.units.get(symbol, ""), interval_is="95 % HPD")
         for symbol, marginal in calibration.marginals.items()
         if symbol in calibration.problem.forward_symbols
     ]
@@ -70,7 +70,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
     return Result(
         command=_repeated(settings.model_copy(update=relocated)),
         title="Parameters of an expensive forward model",
-        subject=f"{len(study.data.control)} measurements · forward model {model} · {runs} runs · discrepancy "
+        subject=f"{len(calibration.problem.measured)} measurements · forward model {model} · {runs} runs · discrepancy "
         f"{settings.discrepancy}",
         numbers=(*numbers[:MAX_NUMBERS], Number("inside the band", inside, remark=alone)),
         finding=_lead(study),
@@ -80,7 +80,7 @@ def calibration_result(study: CalibrationStudy, beside: Path = Path()) -> Result
             "Predictive band over the measurements", "95 % predictive band of a new measurement, including noise.",
         ),
         tables=(
-            Table(HEADERS, readable_calibration(calibration), f"{model}: {runs} runs",
+            Table(HEADERS, readable_calibration(study), f"{model}: {runs} runs",
                   note=f"{BY_EMULATOR} Emulator, {calibration.check}."),
         ),
         sections=_sections(study),
@@ -156,16 +156,22 @@ def _model_copies(
 
 
 def _tables(study: CalibrationStudy) -> dict[str, Any]:
-    calibration, data = study.calibration, study.data
+    calibration, problem = study.calibration, study.calibration.problem
     rows: list[Row] = [
-        {"parameter": str(symbol), "prior": str(calibration.problem.priors[str(symbol)])}
+        {
+            "parameter": str(symbol),
+            "unit": study.units.get(str(symbol), ""),
+            "prior": str(calibration.problem.priors[str(symbol)]),
+        }
         | {str(name): known_number(value) for name, value in estimates.items()}
         for symbol, estimates in calibration.summary().iterrows()
     ]
     bands = {name: calibration.predict(discrepancy=kind) for name, kind in (("", True), ("_model_alone", False))}
-    table: dict[str, Any] = {"control": data.control, "measured": data.measured}
+    table: dict[str, Any] = {"control": problem.control, "measured": problem.measured}
     for suffix, band in bands.items():
         table |= {f"{name}{suffix}": band[name].to_numpy() for name in ("mean", "low", "high")}
+    names = [name for name, (start, stop) in problem.quantities.items() for _ in range(stop - start)]
+    named = [{"quantity": name} if name else {} for name in names]
     runs = calibration.runs
     parameters = dict(zip(runs.symbols, runs.points.T, strict=True))
     outputs = {f"output_{number}": column for number, column in enumerate(runs.outputs.T, 1)}
@@ -173,7 +179,7 @@ def _tables(study: CalibrationStudy) -> dict[str, Any]:
     return {
         "summary.csv": rows,
         "summary.json": rows,
-        "prediction.csv": _rows(table),
+        "prediction.csv": [name | row for name, row in zip(named, _rows(table), strict=True)],
         "leave_one_out.csv": calibration.leave_one_out.to_dict("records"),
         "sensitivity.csv": calibration.sensitivity.reset_index().to_dict("records"),
         "forward_runs.csv": [{**row, "error": error} for row, error in zip(numbers, runs.errors, strict=True)],
@@ -198,22 +204,22 @@ def _rows(columns: dict[str, Any]) -> list[Row]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
-def readable_calibration(calibration: Calibration) -> list[list[str]]:
+def readable_calibration(study: CalibrationStudy) -> list[list[str]]:
     """Return the rows of the summary as text, under `HEADERS`, in the units of the forward model."""
-    rows = []
+    calibration, rows = study.calibration, []
     for symbol, marginal in calibration.marginals.items():
         low, high = marginal.hdi()
         mean, sd = interval(marginal.mean, marginal.sd, marginal.sd)
         ends = "[{}, {}]".format(*interval(low, high, marginal.sd))
         share = calibration.emulator_share[symbol]
-        rows.append([symbol, mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
+        rows.append([study.label(symbol), mean, sd, ends, f"{calibration.posterior.ess[symbol]:.0f}", f"{share:.0%}"])
     return rows
 
 
 def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     """Return what a page folds: posteriors, the emulator, what outputs depend on, failures, how it was computed."""
     calibration, runs = study.calibration, study.calibration.runs
-    symbols, held_out = list(runs.symbols), calibration.held_out
+    labels, held_out = list(map(study.label, runs.symbols)), calibration.held_out
     has_discrepancy = calibration.problem.discrepancy.is_correlated
     both = (
         " Left: forward model and discrepancy. Right: the forward model alone; where it misses, the model is wrong."
@@ -225,7 +231,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
         f"95 % predictive band of a new measurement, including noise.{both}", not has_discrepancy,
     )  # fmt: skip
     marginals = Picture(
-        "marginals", lambda: marginals_figure(calibration), "Marginal posteriors",
+        "marginals", lambda: marginals_figure(study), "Marginal posteriors",
         "Blue: marginal posterior and its 95 % HPD. Dashed: without the error of the emulator. Dotted: prior.",
     )  # fmt: skip
     alone = (
@@ -255,7 +261,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
     sections = [
         Section("Posteriors and predictive checks", (band, coverage, marginals)),
         Section("The emulator", (EMULATOR, checks, errors, WORST,
-                Table([*symbols, "error", "sd", "standardised"], _worst_runs(calibration)))),
+                Table([*labels, "error", "sd", "standardised"], _worst_runs(calibration)))),
         Section("What the outputs depend on", (SOBOL, Table(["parameter", "first", "total"], sensitivity))),
     ]  # fmt: skip
     if runs.failure_summary:
@@ -264,7 +270,7 @@ def _sections(study: CalibrationStudy) -> tuple[Section, ...]:
             for point, error in zip(runs.points, runs.errors, strict=True)
             if error
         ]
-        table = Table([*symbols, "reason"], failures)
+        table = Table([*labels, "reason"], failures)
         sections.append(Section("Runs that failed", (str(runs.failure_summary), table)))
     return (*sections, Section("How it was computed", _computed(study)))
 
@@ -276,10 +282,11 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
     refined = ", then points in the posterior" if calibration.held_out else ""
     whose = "The logarithms of the outputs" if emulator.basis.is_log else "The outputs"
     logarithms = f"; taken by logarithm: {', '.join(emulator.logarithms)}" if emulator.logarithms else ""
+    noise = ", ".join(f"{sd} ({name})" if name else str(sd) for name, sd in settings.noises.items())
     evidence = "" if calibration.log_evidence is None else f" Log evidence {calibration.log_evidence:.2f}."
     sentences = (
         "measured = emulator(parameters) + discrepancy(control) + noise (Kennedy & O'Hagan 2001), all Gaussian given "
-        f"the parameters; noise sd {settings.noise_sd}.",
+        f"the parameters; noise sd {noise}.",
         f"{len(runs)} runs ({settings.design} design{refined}), {significant(float(np.median(runs.seconds)))} s each. "
         f"{whose} vary in {directions} direction{'s' * (directions != 1)}, each a process with the kernel "
         f"{settings.kernel} and a {settings.trend} mean{logarithms}. The variation outside these directions is part of "
@@ -287,7 +294,7 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
         f"Posterior by {calibration.posterior.method}. {calibration.posterior.verdict}{evidence} {study.seconds:.0f} s "
         "in all.",
     )
-    priors = [[symbol, str(prior)] for symbol, prior in calibration.problem.priors.items()]
+    priors = [[study.label(symbol), str(prior)] for symbol, prior in calibration.problem.priors.items()]
     blocks: list[Block] = [sentences, Table(["parameter", "prior"], priors, text_columns=(1,))]
     if settings.prior_correlations:
         named = (f"{pair.replace(',', ' and ')} {value:.2f}" for pair, value in settings.prior_correlations.items())
@@ -309,16 +316,20 @@ def _computed(study: CalibrationStudy) -> tuple[Block, ...]:
 
 def _model_run(forward: DeckForward, study: CalibrationStudy) -> tuple[str, ...]:
     """Return how a finite-element model was run, and how its numbers became those of the file."""
-    settings, solver, data = study.settings, forward.program, study.data
-    ((name, quantity),) = settings.quantities.items()
+    settings, solver = study.settings, forward.program
+    quantities = zip(study.data.values(), settings.quantities.items(), forward.factors.values(), strict=True)
+    of_file = (
+        f"{data.measured_label} of the file is {factor:.6g} times {name} ({quantity})"
+        for data, (name, quantity), factor in quantities
+    )
+    control = next(iter(study.data.values())).control_label
     controlled = "the time of the model" if forward.along is None else f"{next(iter(settings.along.values()))}"
     return (
         f"The material '{forward.replaced}' of {forward.read_deck.main} got the card of {forward.material} for every "
         f"run. Solver: {solver.name}, `{solver.command or solver.template}`. Unit of stress of the model: "
         f"{settings.unit} ({forward.cards.system.units}).",
-        f"{data.measured_label} of the file is {forward.factor:.6g} times {name} ({quantity}), {data.control_label} is "
-        f"{forward.along_factor:.6g} times {controlled}: units, signs and symmetry together. Between the increments of "
-        "the solver both are interpolated by monotone cubics.",
+        f"{', '.join(of_file)}, {control} is {forward.along_factor:.6g} times {controlled}: units, signs and symmetry "
+        "together. Between the increments of the solver they are interpolated by monotone cubics.",
     )
 
 
@@ -329,10 +340,12 @@ def _lead(study: CalibrationStudy) -> str:
     for symbol in calibration.problem.forward_symbols:
         marginal = calibration.marginals[symbol]
         low, high = interval(*marginal.hdi(), marginal.sd)
-        findings.append(f"{symbol} is {low} to {high}")
+        unit = f" {study.units[symbol]}" if symbol in study.units else ""
+        findings.append(f"{symbol} is {low} to {high}{unit}")
     share = max(calibration.emulator_share[symbol] for symbol in calibration.problem.forward_symbols)
+    whose = "" if study.settings.material else ", in the units of the forward model"
     size = "less than 1 %" if share < 0.01 else f"at most {100 * share:.0f} %"
     return (
-        f"With a probability of 95 % each, {', and '.join(findings)}, in the units of the forward model. The error of "
-        f"the emulator contributes {size} to their variance."
+        f"With a probability of 95 % each, {', and '.join(findings)}{whose}. The error of the "
+        f"emulator contributes {size} to their variance."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import ceil
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from tissuq.drawing import pieces
 from tissuq.drawing.panels import legend_above
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, new_figure
 from tissuq.emulation import Calibration
-from tissuq.studies.calibration import Measured
+from tissuq.studies.calibration import CalibrationStudy, Measured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,28 +25,33 @@ MAX_COLUMNS = 3
 """Panels in a row of the figure of marginals."""
 
 
-def band_figure(calibration: Calibration, data: Measured, *, is_narrow: bool = False) -> Figure:
+def band_figure(calibration: Calibration, data: Mapping[str, Measured], *, is_narrow: bool = False) -> Figure:
     """Return the 95 % predictive band over the measurements: with the discrepancy, and of the forward model alone.
 
-    Where it is to be narrow, without the latter.
+    Where it is to be narrow, without the latter. Every quantity has a row of panels.
     """
     titles = {True: "with the discrepancy", False: "forward model alone"}
     if not calibration.problem.discrepancy.is_correlated:
         titles = {True: "forward model"}
     elif is_narrow:
         titles = {True: titles[True]}
-    with new_figure(ANSWER_WIDTH if is_narrow else 4.6 * len(titles) + 0.8, 3.9) as figure:
-        panels = figure.subplots(1, len(titles), squeeze=False, sharey=True)[0]
-        order = np.argsort(data.control, kind="stable")
-        for axis, (with_discrepancy, title) in zip(panels, titles.items(), strict=True):
-            band = calibration.predict(discrepancy=with_discrepancy).iloc[order]
-            pieces.band(axis, band["control"], band["low"], band["high"], label="95 % predictive band")
-            pieces.line(axis, band["control"], band["mean"], label="predicted mean")
-            pieces.points(axis, data.control, data.measured)
-            axis.set_title(f"{title}:  {calibration.predictive_coverage(discrepancy=with_discrepancy):.0%} inside")
-            axis.set_xlabel(data.control_label)
-        panels[0].set_ylabel(data.measured_label)
-        panels[0].legend(fontsize=9)
+    bands = {kind: calibration.predict(discrepancy=kind) for kind in titles}
+    width, height = ANSWER_WIDTH if is_narrow else 4.6 * len(titles) + 0.8, 0.6 + 3.3 * len(data)
+    with new_figure(width, height) as figure:
+        panels = figure.subplots(len(data), len(titles), squeeze=False, sharey="row")
+        for row, (name, measured) in zip(panels, data.items(), strict=True):
+            part = slice(*calibration.problem.quantities[name])
+            order = np.argsort(measured.control, kind="stable")
+            for axis, (kind, title) in zip(row, titles.items(), strict=True):
+                band = bands[kind].iloc[part].iloc[order]
+                pieces.band(axis, band["control"], band["low"], band["high"], label="95 % predictive band")
+                pieces.line(axis, band["control"], band["mean"], label="predicted mean")
+                pieces.points(axis, measured.control, measured.measured)
+                inside = band["low"].le(measured.measured[order]) & band["high"].ge(measured.measured[order])
+                axis.set_title(f"{title}:  {inside.mean():.0%} inside")
+                axis.set_xlabel(measured.control_label)
+            row[0].set_ylabel(measured.measured_label)
+        panels[0, 0].legend(fontsize=9)
     return figure
 
 
@@ -73,15 +79,16 @@ def check_figure(calibration: Calibration) -> Figure:
     return figure
 
 
-def marginals_figure(calibration: Calibration) -> Figure:
+def marginals_figure(study: CalibrationStudy) -> Figure:
     """Return the marginal posterior of every parameter with its prior, and as if the emulator were exact."""
-    symbols = calibration.problem.symbols
+    calibration, symbols = study.calibration, study.calibration.problem.symbols
     columns = min(MAX_COLUMNS, len(symbols))
     rows = ceil(len(symbols) / columns)
     with new_figure(3.6 * columns + 0.6, 2.7 * rows + 0.7) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for axis, symbol in zip(panels, symbols, strict=False):
             _draw_marginal(axis, calibration, symbol)
+            axis.set_title(study.label(symbol))
         for spare in panels[len(symbols) :]:
             spare.set_visible(False)
         legend_above(figure, panels[:1])
@@ -101,7 +108,6 @@ def _draw_marginal(axis: Axes, calibration: Calibration, symbol: str) -> None:
     axis.plot(posterior.hdi(), [0, 0], color=BAND, lw=4, solid_capstyle="butt")
     top = max(posterior.density.max(), float(exact.pdf(values).max()))
     axis.set_ylim(-0.02 * top, min(1.08 * top, 4 * float(posterior.density.max())))
-    axis.set_title(symbol)
     axis.set_yticks([])
     axis.spines["left"].set_visible(False)
     axis.locator_params(axis="x", nbins=5)

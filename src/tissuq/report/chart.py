@@ -65,7 +65,7 @@ def chart_data(
     posteriors: Mapping[str, Posterior],
     main: str,
     unit: StressUnit,
-    found: Mapping[str, Sequence[Described]] | None = None,
+    computed: Mapping[str, Sequence[Described]] | None = None,
 ) -> dict[str, Any]:
     """Return the data of the chart, stresses in a unit.
 
@@ -76,7 +76,7 @@ def chart_data(
     main : str
         The formulation that is shown first, and alone with loading modes that were not measured.
     unit : StressUnit
-    found : mapping of str to sequence of Described, optional
+    computed : mapping of str to sequence of Described, optional
         What the posteriors say of their curves, of which nothing is computed anew.
 
     Returns
@@ -89,13 +89,13 @@ def chart_data(
         sliders, the linear ones first; ``nodes`` of an exponent that has a slider; ``fixed``, the parameters that stay
         at their medians; and ``unit``.
     """
-    known = found or {name: described_curves(posterior) for name, posterior in posteriors.items()}
-    first = posteriors[main]
-    tests = [*_measured(known[main]), *_others(first)]
-    sliders = _Sliders(first, unit)
+    described = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
+    posterior = posteriors[main]
+    tests = [*_measured(described[main]), *_others(posterior)]
+    sliders = _Sliders(posterior, unit)
     views = []
     for name in sorted(posteriors, key=lambda name: name != main):
-        drawn = [*_of_measured(known[name]), *(_of_others(first, tests) if name == main else [])]
+        drawn = [*_of_measured(described[name]), *(_of_others(posterior, tests) if name == main else [])]
         views += [
             {"formulation": name, "test": number, **_columns(bands, tests[number], unit)}
             for number, bands in enumerate(drawn)
@@ -111,11 +111,11 @@ def chart_data(
     }
 
 
-def _measured(found: Sequence[Described]) -> Iterator[_Test]:
+def _measured(described: Sequence[Described]) -> Iterator[_Test]:
     """Yield the measured curves, of those with several paths each path."""
-    for of in found:
+    for of in described:
         curve = of.curve
-        name = curve.name if len(found) > 1 else curve.mode.name
+        name = curve.name if len(described) > 1 else curve.mode.name
         name += f", {curve.quantity}" if len(curve.mode.stresses) > 1 else ""
         for number, (places, is_curve) in enumerate(of.ways, 1):
             rows = _spread(np.argsort(curve.abscissa, kind="stable") if of.points.ndim == 1 else places)
@@ -144,8 +144,8 @@ def _others(posterior: Posterior) -> Iterator[_Test]:
             yield _Test(f"{name} (predicted)", loading_mode(name), 0, points, none, none)
 
 
-def _of_measured(found: Sequence[Described]) -> Iterator[_Bands | None]:
-    for of in found:
+def _of_measured(described: Sequence[Described]) -> Iterator[_Bands | None]:
+    for of in described:
         for places, is_curve in of.ways:
             drawn = _drawn(places, is_curve)
             alone = _at(of.stress_alone, drawn) if of.has_discrepancy else None

@@ -105,7 +105,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
         title="Which test to make next",
         subject=f"{model.experiment.name} · {model.material.name}, discrepancy {model.discrepancy.name}",
         numbers=tuple(best[:MAX_TARGETS]),
-        finding=" ".join(_sentences(study)),
+        finding=" ".join(_sentences(study)[MAX_TARGETS:]),
         next_step=NEXT if best else "",
         picture=Picture(
             "answer", lambda: _figure(study, study.targets[:1], FEW_ROWS, ANSWER_WIDTH),
@@ -116,7 +116,7 @@ def design_result(study: DesignStudy, recipe: DesignSettings) -> Result:
                   _capitalised(heading(study, target)), (0, 3))
             for target in study.targets
         ),
-        sections=(Section("Every test", (every,)), Section("How to read it", (how_to_read,))),
+        sections=(Section("Every test", (tuple(_sentences(study)), every)), Section("How to read it", (how_to_read,))),
         warnings=tuple(study.warnings),
         files={"design.csv": rows, "design.json": rows},
         recipe=recipe,
@@ -209,6 +209,8 @@ def _panel(axis: Axes, study: DesignStudy, target: Target, table: pd.DataFrame) 
     axis.set_yticks(heights, [str(name) for name in table["candidate"]])
     axis.set_ylim(-0.7, len(table) - 0.3)
     axis.set_xlim(0, 1.04 * sd_now)
+    axis.locator_params(axis="x", nbins=4)
+    axis.xaxis.set_major_formatter("{x:.3g}")
     axis.set_title(target.title(study.posterior.model))
     axis.set_xlabel(f"expected sd after the test{f' [{unit}]' if unit else ''}\n(line: now)")
     axis.tick_params(axis="y", length=0)

@@ -51,14 +51,14 @@ def described_curves(posterior: Posterior) -> list[Described]:
 
 
 def answer_figure(
-    posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False, found: Sequence[Described] | None = None
+    posterior: Posterior, unit: StressUnit, *, is_narrow: bool = False, computed: Sequence[Described] | None = None
 ) -> Figure:
     """Return `Posterior.plot` for the head of a page: 1000 x 480 px, or 400 px wide with larger letters.
 
     Further rows of panels make it taller. Its SVG has these sizes at 96 px an inch; a page embeds both, and shows the
-    narrow one on screens of up to 600 px. What ``found`` has computed of the posterior's curves is not computed anew.
+    narrow one on screens of up to 600 px. What ``computed`` says of the curves is not computed anew.
     """
-    return answer_on_new_figure(found or described_curves(posterior), unit, is_narrow=is_narrow)
+    return answer_on_new_figure(computed or described_curves(posterior), unit, is_narrow=is_narrow)
 
 
 def predictive_figure(
@@ -67,7 +67,7 @@ def predictive_figure(
     discrepancy: bool,
     unit: StressUnit,
     true_curve: tuple[FloatArray, FloatArray] | None = None,
-    found: Mapping[str, Sequence[Described]] | None = None,
+    computed: Mapping[str, Sequence[Described]] | None = None,
 ) -> Figure:
     """Return one panel a formulation, or one for each measured stress: data, 95 % predictive band and mean.
 
@@ -86,10 +86,10 @@ def predictive_figure(
         Unit of the stress axis.
     true_curve : (stretch, stress) arrays, MPa
         Drawn where it is known.
-    found : mapping of str to sequence of Described, optional
+    computed : mapping of str to sequence of Described, optional
         What the posteriors say of their curves, of which nothing is computed anew.
     """
-    known = found or {name: described_curves(posterior) for name, posterior in posteriors.items()}
+    known = computed or {name: described_curves(posterior) for name, posterior in posteriors.items()}
     curves = next(iter(posteriors.values())).model.experiment.curves
     panels = [(name, of) for name in posteriors for of in known[name]]
     columns = columns_of(len(panels))

@@ -40,7 +40,7 @@ HOW_TO_READ = (
     "stress. Share of discrepancy: of the stress beside this law, on average.",
     "Stable / to 1.5 I: probability of stability over the range of I1 and I2 that was measured, and up to 1.5 times "
     "these, with the discrepancy where it is an energy; in the least stable loading mode.",
-    "To continue with one law: tissuq predict, export or design with this folder and --discrepancy LAW.",
+    "To continue with one law: tissuq predict, export or design with this folder and --material LAW.",
 )
 HEADERS = [
     "law", "modulus", "95 % HPD", "parameters", "probability", "elpd less best", "R2 alone", "error alone",
@@ -72,7 +72,7 @@ def law_result(study: LawStudy, sources: Sequence[Path]) -> Result:
         subject=subject_of(study.experiment),
         numbers=_numbers(study),
         finding=f"{law_lead(study)} The interval is of {study.tolerances.meaning}.",
-        next_step=f"to continue with one law: tissuq predict, export or design {{run}} --discrepancy {rows[0]['law']}",
+        next_step=f"to continue with one law: tissuq predict, export or design {{run}} --material {rows[0]['law']}",
         picture=Picture("moduli", lambda: modulus_figure(study), "Initial shear moduli of the laws", caption),
         tables=(Table(headers, readable_laws(study), f"Laws of {study.experiment.name}, moduli in {unit.name}",
                       note="Log evidences, intervals of the shares and times are in `laws.csv`."),),
@@ -115,7 +115,7 @@ def readable_laws(study: LawStudy) -> list[list[str]]:
 
 def _readable(name: str, row: Any, to_mpa: float) -> list[str]:
     median, low, high = (significant(value / to_mpa) for value in (row.modulus, row.modulus_low, row.modulus_high))
-    difference = f"{row.elpd_difference:.1f} +- {row.elpd_difference_error:.1f}"
+    difference = f"{row.elpd_difference:.1f} ± {row.elpd_difference_error:.1f}"
     return [
         name,
         median,

@@ -357,18 +357,30 @@ def _lead_of_scores(prediction: Prediction) -> str:
 
 
 def _lead_of_bands(prediction: Prediction) -> str:
+    """Return what the numbers do not say: the stress at the end of the measured range, or that of the material alone.
+
+    The numbers are of the point farthest from rest, with the discrepancy where the run has one.
+    """
     calibrated, change = np.flatnonzero(prediction.is_calibrated), _changes(prediction)
-    index = int(calibrated[change[calibrated].argmax()] if len(calibrated) else change.argmax())
+    farthest, kind = int(change.argmax()), _kind(prediction, prediction.kinds[0])
+    index = int(calibrated[change[calibrated].argmax()]) if len(calibrated) else farthest
+    if change[index] < change[farthest]:
+        stresses = _stresses_at(prediction, index, prediction.kinds[0])
+        return f"At {_point(prediction, index)} in mode {prediction.mode.name}, {stresses}: {kind}."
+    if not prediction.kinds[0]:
+        return f"Predicted by {kind}."
+    alone = _kind(prediction, kind=False)
+    return f"Predicted {kind}. There, for {alone}, {_stresses_at(prediction, index, kind=False)}."
+
+
+def _stresses_at(prediction: Prediction, index: int, kind: bool) -> str:
+    """Return every stress at a point in words, with its band: ``the stress is 5 kPa (95 %: 4 to 6)``."""
     texts = []
     for channel, name in enumerate(prediction.stresses):
-        band, scale = prediction.curves[channel, prediction.kinds[0], False], prediction.unit.to_mpa
+        band, scale = prediction.curves[channel, kind, False], prediction.unit.to_mpa
         median, ends = (words(band, index, scale) for words in (_median, _ends))
         texts.append(f"the {name} is {median} {prediction.unit.name} ({100 * prediction.prob:.4g} %: {ends})")
-    extrapolated = "" if len(calibrated) else ", which is outside the measured range"
-    kind = _kind(prediction, prediction.kinds[0])
-    return (
-        f"At {_point(prediction, index)} in mode {prediction.mode.name}{extrapolated}, {' and '.join(texts)}: {kind}."
-    )
+    return " and ".join(texts)
 
 
 def _changes(prediction: Prediction) -> FloatArray:

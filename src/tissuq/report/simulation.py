@@ -298,19 +298,21 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         failed = Table(["draws", "number", "reached, mm", "reason"], failures, text_columns=(0, 3))
         sections.append(Section("Draws that were not completed", (failed,)))
     change = simulation.mesh_change
-    mesh = (
+    finer = (
         f" On a mesh of twice the fineness the force of one draw at {change[1]:.3g} mm changes by "
         f"{100 * change[0]:+.1f} %."
         if change
         else ""
     )
+    mesh = simulation.case.mesh()
     computed = (
         *origin_sentences(simulation.ensembles[COMPLETE]),
         f"{draws} draws of the posterior, each stable in every loading mode over the measured range, each a complete "
         f"material including the discrepancy in the energy. Bulk modulus: {settings.bulk_ratio:g} times the draw's "
         "initial shear modulus.",
-        f"{len(simulation.case.mesh().cells)} axisymmetric quadrilaterals with one pressure and one volume each (mean "
-        f"dilatation), FElupe's; Newton's method with load steps that are halved where it fails.{mesh}",
+        f"{len(mesh.cells)} {'hexahedra' if mesh.is_solid else 'axisymmetric quadrilaterals'} with one pressure and "
+        "one volume each (mean dilatation), FElupe's; Newton's method with load steps that are halved where it fails."
+        f"{finer}",
         *_first_order(simulation),
         "Numbers after ± are bootstrap standard errors from the number of draws. "
         f"{simulation.seconds:.0f} s of one processor.",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
-from tissuq.finite_elements.case import AXIAL, RADIAL, Mesh
+from tissuq.finite_elements.case import ACROSS, AXIAL, Mesh
 from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
 
@@ -183,9 +183,11 @@ def _fields(simulation: Simulation) -> Figure:
     """Draw mean and sd of the largest stretch on the mean deformed section."""
     from matplotlib.figure import Figure
 
-    mesh, largest = simulation.case.mesh(), simulation.fields["largest"]
+    mesh = simulation.case.mesh()
+    faces, cells = mesh.section
+    largest = simulation.fields["largest"][:, cells]
     deformed = mesh.points + simulation.fields["displacement"].mean(axis=0)
-    corners = deformed[mesh.cells]
+    corners = deformed[faces, :2]
     limits = _limits(corners, largest.mean(axis=0) - 1)
     height = 3.8 * min(1.1, max(0.3, limits[3] - limits[2]) / (limits[1] - limits[0])) + 1.3
     figure = Figure(figsize=(10.4, height))
@@ -208,8 +210,8 @@ def _limits(corners: FloatArray, strain: FloatArray) -> tuple[float, float, floa
     body = corners.reshape(-1, 2)
     shown = corners[strain > MIN_STRAIN * strain.max()].reshape(-1, 2)
     low, high = shown.min(axis=0), shown.max(axis=0)
-    margin = MARGIN * (high - low)[AXIAL], MARGIN * high[RADIAL]
-    right = min(high[RADIAL] + margin[1], body[:, RADIAL].max())
+    margin = MARGIN * (high - low)[AXIAL], MARGIN * high[ACROSS]
+    right = min(high[ACROSS] + margin[1], body[:, ACROSS].max())
     bottom, top = max(low[AXIAL] - margin[0], body[:, AXIAL].min()), min(high[AXIAL] + margin[0], body[:, AXIAL].max())
     air = 0.03 * (top - bottom)
     return -1.02 * right, 1.02 * right, bottom - air, top + air
@@ -219,7 +221,7 @@ def _draw_section(axis: Axes, corners: FloatArray, values: FloatArray, colors: s
     """Draw both halves of a section through the axis."""
     from matplotlib.collections import PolyCollection
 
-    half = corners[:, :, [RADIAL, AXIAL]]
+    half = corners[:, :, [ACROSS, AXIAL]]
     section = np.concatenate([half, half * [-1, 1]])
     drawn = PolyCollection(
         list(section), array=np.tile(values, 2), cmap=colors, edgecolors=(0, 0, 0, 0.25), linewidths=0.3
@@ -234,13 +236,15 @@ def write_vtu(
 ) -> None:
     """Write a mesh with fields of its points and its cells; x is the distance from the axis, y is along it.
 
-    Fields of points with two columns are displacements (along the axis, from it), and become vectors.
+    Fields of points with several columns are displacements with the axes of the mesh, and become vectors.
     """
     import meshio
 
     fields = {name: _vectors(values) if values.ndim > 1 else values for name, values in points.items()}
     blocks = {name: [values] for name, values in cells.items()}
-    written = meshio.Mesh(_vectors(mesh.points), [("quad", mesh.cells)], fields, blocks)
+    written = meshio.Mesh(
+        _vectors(mesh.points), [("hexahedron" if mesh.is_solid else "quad", mesh.cells)], fields, blocks
+    )
     written.write(path, file_format="vtu", binary=False)
 
 
@@ -255,4 +259,5 @@ def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:
 
 
 def _vectors(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.stack([values[:, RADIAL], values[:, AXIAL], np.zeros(len(values))], axis=-1)
+    height = values[:, 2] if values.shape[1] > 2 else np.zeros(len(values))
+    return np.stack([values[:, ACROSS], values[:, AXIAL], -height], axis=-1)  # right-handed as before

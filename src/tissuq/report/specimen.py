@@ -76,7 +76,7 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
     summary = [_summary_row(study, name, posterior) for name, posterior in posteriors.items()]
 
     @cache
-    def found() -> dict[str, Sequence[Described]]:
+    def computed() -> dict[str, Sequence[Described]]:
         return {name: described_curves(posterior) for name, posterior in posteriors.items()}
 
     return replace(
@@ -84,13 +84,13 @@ def specimen_result(study: SpecimenStudy, sources: Sequence[Path]) -> Result:
         command=f"fit{inputs.options}",
         picture=Picture(
             "answer",
-            lambda: answer_figure(posteriors[study.main], unit, is_narrow=True, found=found()[study.main]),
+            lambda: answer_figure(posteriors[study.main], unit, is_narrow=True, computed=computed()[study.main]),
             "Measurements, and the 95 % predictive band of material, discrepancy and noise",
             "Measurements, and the 95 % band of new ones.",
-            chart=lambda: chart_data(posteriors, study.main, unit, found()),
+            chart=lambda: chart_data(posteriors, study.main, unit, computed()),
         ),
         tables=_tables(study, summary),
-        sections=_sections(study, summary, partial(_predictive, study, found)),
+        sections=_sections(study, summary, partial(_predictive, study, computed)),
         files=inputs.files | _files(study, summary),
         recipe=inputs.recipe,
         without=inputs.without,
@@ -144,8 +144,8 @@ def _marginals(study: SpecimenStudy) -> Picture:
     )  # fmt: skip
 
 
-def _predictive(study: SpecimenStudy, found: Any, *, discrepancy: bool) -> Figure:
-    return predictive_figure(study.posteriors, discrepancy=discrepancy, unit=study.unit, found=found())
+def _predictive(study: SpecimenStudy, computed: Any, *, discrepancy: bool) -> Figure:
+    return predictive_figure(study.posteriors, discrepancy=discrepancy, unit=study.unit, computed=computed())
 
 
 def _sections(study: SpecimenStudy, summary: list[Row], predictive: Any) -> tuple[Section, ...]:

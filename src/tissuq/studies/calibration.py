@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 
 from tissuq.emulation import Calibration, Forward
 from tissuq.emulation.material_posterior import check_material
+from tissuq.emulation.problem import symbol_of
 from tissuq.errors import InputError
 from tissuq.experiments.reading.column_units import declared_unit
+from tissuq.experiments.reading.headings import heading, plain
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
+from tissuq.mechanics import material_named
+from tissuq.model.noise import NOISE_SD
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.calibrate import calibrate
 from tissuq.studies.calibration_settings import CalibrationSettings
@@ -29,7 +33,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Two columns of a file: what was set and what was measured, with their names and units."""
+    """Two columns of a file: what was set and a quantity that was measured, with their names and units."""
 
     control: FloatArray
     measured: FloatArray
@@ -44,7 +48,8 @@ class CalibrationStudy:
     """Results of a calibration."""
 
     settings: CalibrationSettings
-    data: Measured
+    data: Mapping[str, Measured]
+    """By the names of the quantities; that of a single one is empty."""
     calibration: Calibration
     seconds: float
     forward: Forward
@@ -53,6 +58,19 @@ class CalibrationStudy:
     """That of the material in the forward model, where one is named."""
     prior_run: str | None = None
     """The run whose posterior the priors are."""
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of parameters where they are known: of the material that is named, and of the noise."""
+        material = self.settings.material
+        parameters = () if material is None else material_named(material).parameters
+        of_material = {parameter.symbol: self.settings.unit for parameter in parameters if parameter.unit}
+        of_noise = {symbol_of(NOISE_SD.symbol, name): measured.units[1] for name, measured in self.data.items()}
+        return of_material | {symbol: unit for symbol, unit in of_noise.items() if unit}
+
+    def label(self, symbol: str) -> str:
+        """Return a parameter with its unit, where it has one that is known: ``mu1 [kPa]``."""
+        return f"{symbol} [{self.units[symbol]}]" if symbol in self.units else symbol
 
     @property
     def warnings(self) -> list[str]:
@@ -95,14 +113,15 @@ def run_calibration(
     if settings.material is not None:
         check_material(settings.material, settings.parameter_priors, settings.unit)
     data = _read(settings, folder)
-    forward = settings.forward_model(folder, data.units, **running)
+    forward = settings.forward_model(folder, {name: each.units for name, each in data.items()}, **running)
     start = perf_counter()
-    names = ("discrepancy", "noise_sd", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
+    names = ("discrepancy", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
     calibration = calibrate(
-        data.control,
-        data.measured,
+        {name: each.control for name, each in data.items()},
+        {name: each.measured for name, each in data.items()},
         forward,
         settings.parameter_priors,
+        noise_sd=settings.noises,
         correlations=settings.correlations,
         folder=runs_in,
         workers=workers,
@@ -134,10 +153,27 @@ def with_priors_of_run(settings: CalibrationSettings, folder: Path = Path()) -> 
     return settings.model_copy(update=changes)
 
 
-def _read(settings: CalibrationSettings, folder: Path) -> Measured:
+def _read(settings: CalibrationSettings, folder: Path) -> dict[str, Measured]:
+    """Return what was measured, by quantity; of several, rows count where there is a value."""
     table = read_table(folder / settings.file, settings.skip_rows, settings.sheet)
-    columns = _places(table, (settings.control, settings.measured))
-    control, measured = (column[:: settings.every] for column in table.numbers(columns))
+    if settings.measured_names == ("",):
+        return {"": _measured(table, _places(table, (settings.control, settings.measured)), settings.every)}
+    places = {name: _place(table, name) for name in settings.measured_names}
+    others = [index for index in range(len(table.names)) if index not in places.values()]
+    if settings.control is None and len(others) != 1:
+        names = ", ".join(table.label(index) for index in others)
+        raise InputError(f"{table.file} has the columns {names}: name that of the control (--control NAME).")
+    control = others[0] if settings.control is None else _place(table, settings.control)
+    if control in places.values():
+        raise InputError(f"{table.file}: the control {table.label(control)} is one of the quantities.")
+    return {
+        name: _measured(table.without_missing([place]), (control, place), settings.every)
+        for name, place in places.items()
+    }
+
+
+def _measured(table: Table, columns: tuple[int, int], every: int) -> Measured:
+    control, measured = (column[::every] for column in table.numbers(columns))
     control_label, measured_label = (_label(table, index) for index in columns)
     units = declared_unit(table, columns[0]), declared_unit(table, columns[1])
     return Measured(control, measured, control_label, measured_label, units)
@@ -162,6 +198,9 @@ def _places(table: Table, requested: Sequence[str | int | None]) -> tuple[int, i
 def _place(table: Table, requested: str | int) -> int:
     matches = [index for index, name in enumerate(table.names) if name == requested]
     if matches:
+        return matches[0]
+    matches = [index for index, name in enumerate(table.names) if heading(name).quantity == plain(str(requested))]
+    if len(matches) == 1:  # the name without its unit
         return matches[0]
     if isinstance(requested, int) and 1 <= requested <= len(table.names):
         return requested - 1

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import field_validator, model_validator
@@ -33,7 +35,10 @@ class CalibrationSettings(ModelSettings):
     """
 
     file: str = argument(
-        ..., "CSV or Excel file with a column of controls and one of measured values.", takes=Path, parse=str
+        ...,
+        "CSV or Excel file with a column of controls and one of measured values (with several --qoi one of each name).",
+        takes=Path,
+        parse=str,
     )
     forward: str | None = option(
         None, "Function of the model: file.py:function or package.module:function. Its code is run."
@@ -48,7 +53,7 @@ class CalibrationSettings(ModelSettings):
     )
     quantities: dict[str, str] = option(
         default_factory=dict,
-        help="What was measured: NAME=RF3@SET and the like, as of tissuq ensemble.",
+        help="What was measured: NAME=RF3@SET and the like, as of tissuq ensemble; repeat for more.",
         name="qoi",
         parse=pairs_of("--qoi", "a quantity of interest", "NAME=WHAT, as in force=RF3@TOP"),
         group=OWN,
@@ -85,12 +90,14 @@ class CalibrationSettings(ModelSettings):
         takes=Path,
         parse=str,
     )
-    control: str | int | None = option(None, "Column of the control [the first of two].", parse=column)
+    control: str | int | None = option(
+        None, "Column of the control [the first of two; with several --qoi the only other one].", parse=column
+    )
     measured: str | int | None = option(None, "Column of the measured values [the second of two].", parse=column)
     discrepancy: str = option("none", "none, gp, or gp-pinned (zero with its slope at zero load).")
-    noise_sd: float | Literal["unknown"] = option(
+    noise_sd: float | Literal["unknown"] | dict[str, float | Literal["unknown"]] = option(
         "unknown",
-        "Sd of the noise, in the unit of the measured values, or unknown.",
+        "Sd of the noise, in the unit of the measured values, or unknown; with several --qoi NAME=SD,NAME=SD.",
         takes=str,
         parse=sd_or_unknown,
     )
@@ -120,7 +127,9 @@ class CalibrationSettings(ModelSettings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        return positive_or_unknown(value, "the unit of the measured values")
+        for each in value.values() if isinstance(value, dict) else [value]:
+            positive_or_unknown(each, "the unit of the measured values")
+        return value
 
     @model_validator(mode="before")
     @classmethod
@@ -143,6 +152,7 @@ class CalibrationSettings(ModelSettings):
         if self.prior_run is not None and self.material is None:
             raise ValueError("prior_run needs the law in the forward model (material), whose posterior it is")
         self._check_deck()
+        self._check_noise()
         if (self.material is None) != (self.range is None):
             raise ValueError("material and range belong together: the law of the forward model, and its stretches, "
                              "such as 0.7:1.3")  # fmt: skip
@@ -160,12 +170,34 @@ class CalibrationSettings(ModelSettings):
                    "range": "--range 0.7:1.3"}  # fmt: skip
         if lacking := [text for name, text in missing.items() if not getattr(self, name)]:
             raise ValueError(f"a finite-element model needs {', '.join(lacking)}, too")
-        if len(self.quantities) != 1 or len(self.along) > 1:
-            raise ValueError("one quantity is calibrated: give one --qoi, and at most one --along")
+        if len(self.along) > 1:
+            raise ValueError("all quantities have the same controls: give at most one --along")
         if len(set(names)) < len(names):
             raise ValueError(f"what was measured and its control are both called {names[0]}: rename one")
         if unknown := [name for name in self.factors if name not in names]:
             raise ValueError(f"factors are of {' and '.join(names)}, not of {', '.join(unknown)}")
+
+    def _check_noise(self) -> None:
+        several = self.measured_names != ("",)
+        if isinstance(self.noise_sd, dict) and (not several or set(self.noise_sd) - set(self.quantities)):
+            of = ", ".join(self.quantities) if several else "one quantity, and has no name"
+            raise ValueError(f"the noise (noise_sd) is of {of}; it is given for {', '.join(self.noise_sd)}")
+        if several and isinstance(self.noise_sd, float):
+            each = ",".join(f"{name}=SD" for name in self.quantities)
+            raise ValueError(f"every quantity has a noise of its own: --noise-sd {each}, or unknown")
+        if several and self.measured is not None:
+            raise ValueError("the columns of several quantities are called as these are: leave out measured")
+
+    @property
+    def measured_names(self) -> tuple[str, ...]:
+        """What was measured, by name; the name of a single quantity is empty."""
+        return tuple(self.quantities) if len(self.quantities) > 1 else ("",)
+
+    @property
+    def noises(self) -> dict[str, float | str]:
+        """The standard deviation of the noise of everything that was measured."""
+        of = self.noise_sd if isinstance(self.noise_sd, dict) else dict.fromkeys(self.measured_names, self.noise_sd)
+        return {name: of.get(name, "unknown") for name in self.measured_names}
 
     @property
     def stretches(self) -> tuple[float, float]:
@@ -174,7 +206,11 @@ class CalibrationSettings(ModelSettings):
         return float(low), float(high)
 
     def forward_model(
-        self, beside: Path = Path(), units: tuple[str, str] = ("", ""), timeout: float | None = None, **running: Any
+        self,
+        beside: Path = Path(),
+        units: Mapping[str, tuple[str, str]] = MappingProxyType({}),
+        timeout: float | None = None,
+        **running: Any,
     ) -> Forward:
         """Return what is run.
 
@@ -182,9 +218,9 @@ class CalibrationSettings(ModelSettings):
         ----------
         beside : Path
             Where the files of a finite-element model lie, unless their names are absolute.
-        units : (str, str)
-            Of control and measured values in the file; empty where it does not say, which is refused for quantities
-            that have a unit in a finite-element model.
+        units : mapping of str to (str, str)
+            Of control and measured values in the file, by the names of `measured_names`; empty where it does not say,
+            which is refused for quantities that have a unit in a finite-element model.
         timeout, **running
             How a finite-element model is run: fields of `tissuq.DeckForward`.
         """
@@ -196,18 +232,23 @@ class CalibrationSettings(ModelSettings):
             return UmbridgeForward(self.umbridge, self.server_model)
         if self.model is None:
             return FileForward(str(self.forward))
-        ((name, quantity),) = self.quantities.items()
-        controlled, along = next(iter(self.along.items()), ("", None))
         cards = self.card_settings()
+        quantities = {name: located(text, beside) for name, text in self.quantities.items()}
+        factors = {
+            name: self.factors.get(name, 1.0) * conversion(text, cards, units.get(key, ("", ""))[1])
+            for key, (name, text) in zip(self.measured_names, self.quantities.items(), strict=True)
+        }
+        is_one, control_unit = len(quantities) == 1, next(iter(units.values()), ("", ""))[0]
+        controlled, along = next(iter(self.along.items()), ("", None))
         return DeckForward(
             beside / self.model,
             str(self.replaced),
             str(self.material),
-            located(quantity, beside),
+            next(iter(quantities.values())) if is_one else quantities,
             self.stretches,
             along=None if along is None else located(along, beside),
-            factor=self.factors.get(name, 1.0) * conversion(quantity, cards, units[1]),
-            along_factor=self.factors.get(controlled, 1.0) * (conversion(along, cards, units[0]) if along else 1.0),
+            factor=next(iter(factors.values())) if is_one else factors,
+            along_factor=self.factors.get(controlled, 1.0) * (conversion(along, cards, control_unit) if along else 1.0),
             mode=self.mode,
             solver=self.solver,
             command=self.command,

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
 from tissuq.studies.option_texts import priors, tolerances
+from tissuq.studies.settings import SizesOfErrors
 from tissuq.studies.shared_options import seed
 
 __all__ = ["CoverageOptions", "PaperOptions", "SbcOptions", "StructureStudyOptions", "TissueOptions"]
@@ -87,7 +88,7 @@ class TissueOptions(Settings):
         ("auto", "none"), "Discrepancy; repeat for more [auto, none].", name="discrepancy"
     )
     material: str = option("neo-hookean", "The material that is fitted.")
-    tolerances: dict[str, float] | None = option(
+    tolerances: SizesOfErrors = option(
         None,
         "Error of a test, as of tissuq fit (stresses in MPa): stress=10%, smooth=2% ...; or none.",
         name="tolerance",
@@ -104,7 +105,10 @@ class StructureStudyOptions(Settings):
         ("gent", "ogden"), "Law of the truth; repeat for more.", name="truth", min_length=1
     )
     structures: tuple[str, ...] = option(
-        ("bar", "indentation"), "Structure; repeat for more [bar, indentation].", name="structure", min_length=1
+        ("bar", "indentation", "plate"),
+        "Structure; repeat for more [bar, indentation, plate].",
+        name="structure",
+        min_length=1,
     )
     replicates: int = option(60, "Sets of tests of every law.", ge=1, le=100_000)
     modes: tuple[str, ...] = option(

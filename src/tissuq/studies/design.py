@@ -12,15 +12,20 @@ from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.next_test.candidates import Target, target_named
 from tissuq.next_test.next_test import NextTest
+from tissuq.next_test.quantities import QuantityTarget
 from tissuq.next_test.ranking import rank_tests
 from tissuq.posterior.posterior import Posterior
 from tissuq.studies.design_settings import DesignSettings
 from tissuq.studies.earlier_run import load
+from tissuq.studies.ensemble_target import ensemble_target, names_ensemble
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["DesignSettings", "DesignStudy", "run_design"]
+
+WELL_EXPLAINED = 0.9
+"""Share of the variance of a quantity of a model from which nothing need be said of the rest."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,14 @@ class DesignStudy:
     def warnings(self) -> list[str]:
         """Warnings about the numbers in the table."""
         inaccurate = "Numbers marked rough are not reliable: few components of the posterior would remain."
-        return [inaccurate] * bool(self.table["is_rough"].any())
+        unexplained = [
+            f"{target.words}: the stresses of the material within the measured strains explain {target.explained:.0%} "
+            "of its variance over the draws of the ensemble. The rest (strains beyond, other materials, what is not "
+            "linear) stays in every expected sd."
+            for target in self.targets
+            if isinstance(target, QuantityTarget) and target.explained < WELL_EXPLAINED
+        ]
+        return [inaccurate] * bool(self.table["is_rough"].any()) + unexplained
 
 
 def run_design(
@@ -92,8 +104,13 @@ def run_design(
             "--measurements is for the default tests and a candidate states its own points: give only one of them."
         )
     step("loading the run")
-    posterior = load(folder / settings.run, settings.discrepancy, law)
-    targets = tuple(dict.fromkeys(target_named(name, posterior.model) for name in settings.targets))
+    posterior = load(folder / settings.run, settings.discrepancy, settings.law_of(law))
+    targets = tuple(
+        ensemble_target(name, posterior, folder) if names_ensemble(name) else target_named(name, posterior.model)
+        for name in dict.fromkeys(settings.targets)
+    )
+    if len({target.name for target in targets}) < len(set(targets)):
+        raise InputError("two ensembles with quantities of one name are in folders of one name: rename one of these.")
     options = {"points": settings.points, "specimen": settings.specimen, "seed": settings.seed}
     table = rank_tests(posterior.solution, tests, targets, step=step, **options)  # type: ignore[arg-type]
     next_test = NextTest(posterior.solution, targets, settings.specimen)

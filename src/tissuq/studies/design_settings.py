@@ -28,8 +28,8 @@ class DesignSettings(RunSettings):
 
     targets: tuple[str, ...] = option(
         ("modulus",),
-        "Quantity to become less uncertain: modulus (initial shear modulus), a parameter, or a stress as MODE:STRETCH, "
-        "such as planar:1.5; repeat for more [modulus].",
+        "Quantity to become less uncertain: modulus (initial shear modulus), a parameter, a stress as MODE:STRETCH, "
+        "such as planar:1.5, or a quantity of your model as ensemble:FOLDER:NAME; repeat for more [modulus].",
         name="target",
         min_length=1,
     )

@@ -23,7 +23,9 @@ POSTERIORS = "posterior"
 """Subfolder of a run with a file for each of its posteriors."""
 
 
-def load(path: str | Path, discrepancy: str | Discrepancy | None = None, material: Material | None = None) -> Posterior:
+def load(
+    path: str | Path, discrepancy: str | Discrepancy | None = None, material: str | Material | None = None
+) -> Posterior:
     """Return a posterior that was saved, by `Posterior.save` or in a run of ``tissuq fit``, as it was.
 
     Nothing is fitted again, and no code in the folder is run.
@@ -35,27 +37,31 @@ def load(path: str | Path, discrepancy: str | Discrepancy | None = None, materia
     discrepancy : str or Discrepancy, optional
         Which of the run's discrepancies; unless given, ``"auto"`` where the run has it, or the only one. An object,
         where it is of a class of your own.
-    material : Material, optional
-        The material, where it is a law of your own.
+    material : str or Material, optional
+        Which of the laws of a run that compared several; an object, where it is a law of your own.
 
     Raises
     ------
     InputError
-        When there is no such file or run, or it is damaged, or the discrepancy is not one of the run's, or material or
-        discrepancy must be given.
+        When there is no such file or run, or it is damaged, or material or discrepancy is not one of the run's, or must
+        be given.
 
     Examples
     --------
     >>> import tissuq as tq
     >>> posterior = tq.load("runs/brain", discrepancy="auto")  # doctest: +SKIP
+    >>> posterior = tq.load("runs/laws", material="gent")  # doctest: +SKIP
     """
-    file = Path(path)
+    file, law = Path(path), material if isinstance(material, Material) else None
     user_discrepancy = discrepancy if isinstance(discrepancy, Discrepancy) else None
-    return Posterior.load(file if file.is_file() else _file_in(file, discrepancy), material, user_discrepancy)
+    posterior = Posterior.load(file if file.is_file() else _file_in(file, discrepancy, material), law, user_discrepancy)
+    if isinstance(material, str) and material != posterior.model.material.name:
+        raise InputError(f"'{path}' is of the material '{posterior.model.material.name}', and not of '{material}'.")
+    return posterior
 
 
 def load_run(
-    folder: str | Path, discrepancy: str | Discrepancy | None = None, material: Material | None = None
+    folder: str | Path, discrepancy: str | Discrepancy | None = None, material: str | Material | None = None
 ) -> Posterior:
     """Return `load` of the same arguments: its earlier name, deprecated."""
     warn("tissuq.load_run is now called tissuq.load.", DeprecationWarning, stacklevel=2)
@@ -69,7 +75,7 @@ def load_without_discrepancy(folder: str | Path, material: Material | None = Non
     ----------
     folder : str or Path
     material : Material, optional
-        As of `load`.
+        As of `load`; of a run that compared laws the one of these.
 
     Raises
     ------
@@ -84,7 +90,7 @@ def load_without_discrepancy(folder: str | Path, material: Material | None = Non
     return fitted(recipe_of(run), NoDiscrepancy.name, run, material)
 
 
-def modes_of(folder: str | Path, discrepancy: str | None = None) -> list[str]:
+def modes_of(folder: str | Path, discrepancy: str | None = None, material: str | Material | None = None) -> list[str]:
     """Return the loading modes of the tests of a run.
 
     Raises
@@ -92,7 +98,7 @@ def modes_of(folder: str | Path, discrepancy: str | None = None) -> list[str]:
     InputError
         As `load`.
     """
-    return read_modes(_file_in(Path(folder), discrepancy))
+    return read_modes(_file_in(Path(folder), discrepancy, material))
 
 
 def answering(folder: str | Path) -> str:
@@ -117,7 +123,7 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
     InputError
         When the folder is no such run.
     """
-    from tissuq.studies.specimen import SpecimenSettings
+    from tissuq.studies.specimen_settings import LawSettings, SpecimenSettings
 
     run = Path(folder)
     recipe = run / RECIPE
@@ -128,7 +134,7 @@ def recipe_of(folder: str | Path) -> SpecimenSettings:
         command = recipe.read_text(encoding="utf-8").partition("\n")[0]
     if " tissuq fit " not in command:
         raise InputError(f"run '{run}' is not a run of tissuq fit; only these have a posterior to continue from.")
-    return load_settings(SpecimenSettings, recipe, {})
+    return load_settings(LawSettings if _compares_laws(run) else SpecimenSettings, recipe, {})
 
 
 def _files(run: Path) -> dict[str, Path]:
@@ -141,17 +147,28 @@ def _files(run: Path) -> dict[str, Path]:
     return files
 
 
-def _file_in(run: Path, discrepancy: str | Discrepancy | None) -> Path:
-    """Return the file with the posterior of a run under one of its discrepancies."""
-    files = _files(run)
+def _file_in(run: Path, discrepancy: str | Discrepancy | None, material: str | Material | None = None) -> Path:
+    """Return the file with the posterior of a run under one of its discrepancies, or of one of its laws.
+
+    A law is also chosen by the name that is given for the discrepancy, as it was before it had an option of its own.
+    """
+    files, is_of_laws = _files(run), _compares_laws(run)
     names = list(files)
     name = discrepancy.name if isinstance(discrepancy, Discrepancy) else discrepancy
+    law = material.name if isinstance(material, Material) else material
+    if is_of_laws and law and name not in (None, law, *recipe_of(run).discrepancies):
+        raise InputError(
+            f"run '{run}' has no discrepancy '{name}': its laws are with {recipe_of(run).discrepancies[0]}."
+        )
+    name = (law if is_of_laws else None) or name
     name = name or (Auto.name if Auto.name in names else names[0] if len(names) == 1 else None)
     if name not in files:
         available = ", ".join(names)
-        one, several = ("law", "laws") if _compares_laws(run) else ("discrepancy", "discrepancies")
+        one, several, option = (
+            ("law", "laws", "material") if is_of_laws else ("discrepancy", "discrepancies", "discrepancy")
+        )
         what = f"has no {one} '{name}'" if name else f"has several {several}"
-        raise InputError(f"run '{run}' {what}: choose one of {available}.")
+        raise InputError(f"run '{run}' {what}: choose one of {available} (--{option}).")
     return files[name]
 
 

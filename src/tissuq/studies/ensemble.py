@@ -29,7 +29,7 @@ from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.stream import RESULTS, Step, read_results, run_tasks, silent
 
 __all__ = [
-    "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "prepare_ensemble", "run_ensemble",
+    "EnsembleSettings", "EnsembleStudy", "PreparedEnsemble", "drawn_materials", "prepare_ensemble", "run_ensemble",
 ]  # fmt: skip
 
 
@@ -147,15 +147,8 @@ def prepare_ensemble(
     if len(set(replaced.values())) < len(replaced):
         raise InputError(f"--replace names one material of the model twice: {', '.join(replaced)}.")
     formatting = card_format(settings.card_format or solver.card_format or deck.format.card_format)
-    runs = list(dict.fromkeys(settings.materials.values()))
-    ensembles: dict[str, Ensemble] = {}
+    ensembles = drawn_materials(settings, beside, law, step)
     cards: dict[str, dict[str, Cards]] = {COMPLETE: {}}
-    for name, run in settings.materials.items():
-        step(f"draws of {name}")
-        posterior = load(beside / run, settings.discrepancy, law)
-        seed = settings.seed + runs.index(run)  # materials of different runs are independent
-        sampling = cast("Sampling", settings.sampling)
-        ensembles[name] = posterior.ensemble(settings.draws, seed, sampling, admissible=not settings.all_draws)
     all_draws = [draw for ensemble in ensembles.values() for draw in ensemble]
     is_shared = settings.shares and any(draw.discrepancy or len(draw.parts) > 1 for draw in all_draws)
     if is_shared:
@@ -176,6 +169,23 @@ def prepare_ensemble(
     for quantity in quantities if not is_dry else ():
         quantity.check()
     return prepared
+
+
+def drawn_materials(
+    settings: EnsembleSettings,
+    beside: Path = Path(),
+    law: Material | None = None,
+    step: Callable[[str], None] = lambda text: None,
+) -> dict[str, Ensemble]:
+    """Return the draws of an ensemble by material, from runs in ``beside`` unless their names are absolute."""
+    runs, ensembles = list(dict.fromkeys(settings.materials.values())), {}
+    for name, run in settings.materials.items():
+        step(f"draws of {name}")
+        posterior = load(beside / run, settings.discrepancy, law)
+        seed = settings.seed + runs.index(run)  # materials of different runs are independent
+        sampling = cast("Sampling", settings.sampling)
+        ensembles[name] = posterior.ensemble(settings.draws, seed, sampling, admissible=not settings.all_draws)
+    return ensembles
 
 
 def run_ensemble(

@@ -12,9 +12,9 @@ from tissuq.experiments.reading.experiment_file import Reading
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material
 from tissuq.model.tolerances import Tolerances
-from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws, laws_named
+from tissuq.posterior.laws import ALL_LAWS, LawComparison, fit_laws
 from tissuq.result_warning import ResultWarning, merged, most_severe_first
-from tissuq.studies.specimen import parameters_of, priors_in_mpa, warnings_of_files
+from tissuq.studies.specimen import priors_in_mpa, warnings_of_files
 from tissuq.studies.specimen_settings import LawSettings
 
 __all__ = ["LawSettings", "LawStudy", "run_laws"]
@@ -87,15 +87,13 @@ def run_laws(
     readings = settings.readings(folder, found)
     experiment = Experiment.of([reading.experiment for reading in readings])
     unit, (discrepancy,) = stress_unit(experiment.stress_unit), settings.discrepancies
-    is_all = settings.laws == (ALL_LAWS,)
-    laws = laws_named(ALL_LAWS if is_all else [(own or {}).get(name, name) for name in settings.laws])
-    parameters = {name: parameters_of(settings, law, discrepancy, experiment) for name, law in laws.items()}
+    laws, is_all = settings.fitted_laws(own or {}), settings.laws == (ALL_LAWS,)
     comparison = fit_laws(
         experiment,
         ALL_LAWS if is_all else list(laws.values()),
         discrepancy=discrepancy,
         noise=settings.noise_in(unit),
-        priors=priors_in_mpa(settings, parameters, unit),
+        priors=priors_in_mpa(settings, laws.values(), experiment),
         tolerances=settings.tolerances_in(unit),
         method=settings.method,
         stable_in=settings.stable_in,

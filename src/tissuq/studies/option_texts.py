@@ -61,8 +61,11 @@ def number_or_text(text: str) -> float | str:
         return text
 
 
-def sd_or_unknown(text: str) -> float | str:
-    """Return a standard deviation, or 'unknown'."""
+def sd_or_unknown(text: str) -> float | str | dict[str, float | str]:
+    """Return a standard deviation, or 'unknown'; of several quantities by their names."""
+    if "=" in text:
+        each = (part.partition("=") for part in text.split(","))
+        return once_each("--noise-sd", ((name.strip(), number_or_text(value.strip())) for name, _, value in each))
     value = number_or_text(text)
     if isinstance(value, str) and value != "unknown":
         raise InputError(f"--noise-sd must be a number or unknown, not '{text}'.")

@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 
 
 def predict_run(
-    run: str | Path, discrepancy: str | None = None, material: Material | None = None, **options: Any
+    run: str | Path, discrepancy: str | None = None, material: str | Material | None = None, **options: Any
 ) -> Prediction:
     """Predict the stress in a loading mode from a run of ``tissuq fit``.
 
@@ -269,11 +269,11 @@ def run_prediction(
         When run, files or settings cannot be used.
     """
     step("reading")
-    mode = settings.mode_in(folder)
+    mode = settings.mode_in(folder, law)
     options: dict[str, Any] = {name: getattr(settings, name) for name in ("points", "prob", "stress_type")}
     options |= {"mode": mode, "stretch": settings.points_of(mode), "data": _data(settings, mode, folder)}
     step("predicting")
-    return predict_run(folder / settings.run, settings.discrepancy, law, **options)
+    return predict_run(folder / settings.run, settings.discrepancy, settings.law_of(law), **options)
 
 
 def _data(settings: PredictionSettings, mode: str, folder: Path) -> Experiment | None:

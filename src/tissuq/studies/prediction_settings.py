@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from tissuq.mechanics import Material
 
 __all__ = ["POINTS", "ComparedFile", "PredictionSettings", "stretches"]
 
@@ -52,8 +53,10 @@ class PredictionSettings(RunSettings):
         renamed={"stress_type": "data_stress_type", "stretch": "data_stretch", "mode": ""},
     )
 
-    def mode_in(self, folder: Path) -> str:
+    def mode_in(self, folder: Path, law: Material | None = None) -> str:
         """Return the mode to predict: the one asked for, that of the data, or else that of the run.
+
+        ``law`` is the material of the run, where it is the user's own.
 
         Raises
         ------
@@ -71,7 +74,7 @@ class PredictionSettings(RunSettings):
                 f"'{self.data.file}' was measured in mode {stated}, but mode {self.mode} is to be "
                 "predicted: leave --mode out, or give measurements of that mode."
             )
-        modes = modes_of(folder / self.run, self.discrepancy)
+        modes = modes_of(folder / self.run, self.discrepancy, self.law_of(law))
         if not (self.mode or stated) and len(modes) > 1:
             raise InputError(
                 f"run '{self.run}' has tests in several modes ({', '.join(modes)}): choose one with --mode."

@@ -8,7 +8,9 @@ from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from pydantic import AfterValidator
 
 from tissuq.errors import InputError, TissuqError
 
@@ -16,8 +18,8 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 __all__ = [
-    "DAMAGE", "RECIPE", "damage_reported", "is_inside", "load_settings", "looked_up", "positive_or_unknown",
-    "setting_of",
+    "DAMAGE", "RECIPE", "SizesOfErrors", "damage_reported", "is_inside", "load_settings", "looked_up",
+    "positive_or_unknown", "setting_of",
 ]  # fmt: skip
 
 RECIPE = "run.toml"
@@ -158,3 +160,14 @@ def looked_up(find: Callable[[Any], Named], name: Any) -> Named:
         return find(name)
     except TissuqError as error:
         raise ValueError(str(error)) from error
+
+
+def _errors_there_are(sizes: dict[str, float] | None) -> dict[str, float] | None:
+    from tissuq.model.tolerances import Tolerances
+
+    looked_up(lambda given: Tolerances(**given), sizes or {})
+    return sizes
+
+
+SizesOfErrors = Annotated[dict[str, float] | None, AfterValidator(_errors_there_are)]
+"""Standard deviations of errors of tests, by the names of these; None for those of what is estimated."""

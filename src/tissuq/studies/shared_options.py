@@ -1,12 +1,16 @@
-"""Settings that several commands have: a run to begin from, which of its discrepancies, a seed."""
+"""Settings that several commands have: a run to begin from, which of its laws or discrepancies, a seed."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from tissuq.errors import InputError
 from tissuq.parameters.seeds import MAX_SEED
 from tissuq.studies.option import Settings, argument, option
+
+if TYPE_CHECKING:
+    from tissuq.mechanics import Material
 
 __all__ = ["RunSettings", "sampling", "seed"]
 
@@ -15,7 +19,20 @@ class RunSettings(Settings):
     """What is done with a run of ``tissuq fit``."""
 
     run: str = argument(..., "Run folder of tissuq fit.", takes=Path, parse=str)
+    material: str | None = option(None, "Which of the laws of the run, where it compared several.")
     discrepancy: str | None = option(None, "Which of the discrepancies of the run [auto, or the only one].")
+
+    def law_of(self, own: Material | None) -> str | Material | None:
+        """Return the law of the run: the user's own, which was named beside the settings, or the name of another.
+
+        Raises
+        ------
+        InputError
+            When these are two.
+        """
+        if own is not None and self.material not in (None, own.name):
+            raise InputError(f"--user-law names the law '{own.name}', and --material '{self.material}': give one law.")
+        return own or self.material
 
 
 def seed() -> Any:

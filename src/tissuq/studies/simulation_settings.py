@@ -30,11 +30,14 @@ class SimulationSettings(RunSettings):
     ``sizes`` are fields of the case (mm); ``force_noise`` is in N.
     """
 
-    case: str = option("indentation", "indentation (flat punch, disc) or bar (clamped, in tension).")
+    case: str = option(
+        "indentation", "indentation (flat punch, disc), bar (clamped, in tension) or plate (with a hole)."
+    )
     sizes: dict[str, float | str] = option(
         default_factory=dict,
         help="Size of the case in mm, NAME=VALUE; repeat for more. Indentation: depth, punch_radius, height, radius, "
-        "contact=bonded|frictionless, fineness; bar: elongation, bar_length, bar_radius, fineness.",
+        "contact=bonded|frictionless, fineness; bar: elongation, bar_length, bar_radius, fineness; plate: elongation, "
+        "width, thickness, hole_radius, fineness.",
         name="size",
         unit="mm",
         parse=pairs_of("--size", "a size", "NAME=VALUE, as in depth=0.4", number_or_text),

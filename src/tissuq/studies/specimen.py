@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -141,11 +141,11 @@ def run_specimen(
     """
     readings = settings.readings(folder, found)
     experiment = Experiment.of([reading.experiment for reading in readings])
-    material = law or material_named(settings.material)
+    (material,) = settings.fitted_laws({settings.material: law} if law else {}).values()
     unit = stress_unit(experiment.stress_unit)
     is_all, names = settings.discrepancies == (ALL,), _names(settings)
     symbols = {name: parameters_of(settings, material, name, experiment) for name in names}
-    priors = priors_in_mpa(settings, symbols, unit)
+    priors = priors_in_mpa(settings, [material], experiment)
     posteriors, seconds, skipped = {}, {}, {}
     for name in names:
         step(name)
@@ -214,7 +214,8 @@ def fitted(
     applicable = {
         symbol: prior for symbol, prior in settings.priors.items() if symbol in [p.symbol for p in parameters]
     }
-    priors = priors_in_mpa(settings.model_copy(update={"priors": applicable}), {discrepancy: parameters}, unit)
+    alone = settings.model_copy(update={"priors": applicable, "discrepancies": (discrepancy,)})
+    priors = priors_in_mpa(alone, [material], experiment)
     return fit(experiment, discrepancy=discrepancy, **_options(settings, material, priors, parameters, unit))
 
 
@@ -279,11 +280,17 @@ def parameters_of(
     return (*material.parameters, *error_model.parameters, *noise)
 
 
-def priors_in_mpa(
-    settings: SpecimenSettings, parameters: Mapping[str, tuple[Parameter, ...]], unit: StressUnit
-) -> Mapping[str, Prior]:
-    """Return the chosen priors in MPa and stretch."""
-    parameters_by_name = {p.symbol: p for group in parameters.values() for p in group}
+def priors_in_mpa(settings: SpecimenSettings, laws: Iterable[Material], experiment: Experiment) -> Mapping[str, Prior]:
+    """Return the chosen priors in MPa and stretch.
+
+    Raises
+    ------
+    InputError
+        When there is one of a parameter that no fit has.
+    """
+    unit = stress_unit(experiment.stress_unit)
+    of_fits = (parameters_of(settings, law, name, experiment) for law in laws for name in _names(settings))
+    parameters_by_name = {p.symbol: p for parameters in of_fits for p in parameters}
     unknown = sorted(set(settings.priors) - set(parameters_by_name))
     if unknown:
         raise InputError(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import repeat
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -12,12 +13,13 @@ from pydantic import Field, field_validator, model_validator
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import noises, priors, tolerances
-from tissuq.studies.settings import looked_up
+from tissuq.studies.settings import SizesOfErrors, looked_up
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
     from tissuq.experiments.reading.experiment_file import Reading
     from tissuq.experiments.units import StressUnit
+    from tissuq.mechanics import Material
     from tissuq.model.noise import Noise
     from tissuq.model.tolerances import Tolerances
 
@@ -76,7 +78,7 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         "What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a careful "
         "laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens].",
     )
-    tolerances: dict[str, float] | None = option(
+    tolerances: SizesOfErrors = option(
         None,
         "Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, length=2%, "
         "slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single "
@@ -97,15 +99,20 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
     def _all_or_named(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         if ALL in names and names != (ALL,):
             raise ValueError(f"'{ALL}' cannot be combined with other names; give '{ALL}', or names")
+        from tissuq.model.discrepancy import discrepancy_named
+
+        for name in names:
+            if name != ALL:
+                looked_up(discrepancy_named, name)
         return names
 
-    @field_validator("tolerances")
+    @field_validator("stable_in")
     @classmethod
-    def _errors_there_are(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        from tissuq.model.tolerances import Tolerances
+    def _modes_there_are(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        from tissuq.assessment.stable_posterior import modes_named
 
-        looked_up(lambda given: Tolerances(**given), sizes or {})
-        return sizes
+        looked_up(modes_named, names)
+        return names
 
     @field_validator("estimand")
     @classmethod
@@ -136,6 +143,12 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         tests = self.tests or (self,)
         of_tests = found or repeat(None, len(tests))
         return [test.reading(folder, of_test) for test, of_test in zip(tests, of_tests, strict=True)]
+
+    def fitted_laws(self, own: Mapping[str, Material] = MappingProxyType({})) -> dict[str, Material]:
+        """Return the laws that are fitted, by name; those in files of the user are given as ``own``."""
+        from tissuq.mechanics import material_named
+
+        return {self.material: own.get(self.material) or material_named(self.material)}
 
     def experiment(self, folder: Path = Path()) -> Experiment:
         """Read the measurements, of all tests together."""
@@ -178,3 +191,8 @@ class LawSettings(SpecimenSettings):
         if ALL in self.laws and self.laws != (ALL,):
             raise ValueError(f"'{ALL}' cannot be combined with other materials; give '{ALL}', or names")
         return self
+
+    def fitted_laws(self, own: Mapping[str, Material] = MappingProxyType({})) -> dict[str, Material]:
+        from tissuq.posterior.laws import laws_named
+
+        return laws_named(ALL if self.laws == (ALL,) else [own.get(name, name) for name in self.laws])

@@ -82,12 +82,12 @@ def load_posteriors(
     """
     run = beside / settings.run
     step("loading the run")
-    fitted = load(run, settings.discrepancy, law)
+    fitted = load(run, settings.discrepancy, settings.law_of(law))
     if fitted.model.discrepancy.name == NoDiscrepancy.name:
         return Posteriors(fitted)
     step("the posterior without discrepancy")
     try:
-        return Posteriors(fitted, load_without_discrepancy(run, law))
+        return Posteriors(fitted, load_without_discrepancy(run, fitted.model.material))
     except (ConvergenceError, ModelError) as error:
         return Posteriors(fitted, reason=f"The run's measurements cannot be fitted without discrepancy: {error}")
 

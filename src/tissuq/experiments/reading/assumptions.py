@@ -76,9 +76,11 @@ def _about_correction(table: Table, column: int, role: str) -> str:
 
 
 def _about_name(measured: MeasuredRows, column: int, role: str) -> str:
-    label = measured.table.label(column)
+    label, taken = measured.table.label(column), f"{role} by its unit alone, for its name is not known"
+    if role == "shear":
+        taken = "amount of shear, because the mode is simple shear and its values begin at 0, as no stretch does"
     return (
-        f"{DOUBTFUL_COLUMN} {label} was taken for the {role} by its unit alone, for its name is not known. If it is, "
+        f"{DOUBTFUL_COLUMN} {label} was taken for the {taken}. If it is, "
         f"say so: --column {role}={label}; if another column is, name that one there."
     )
 

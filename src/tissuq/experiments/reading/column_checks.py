@@ -25,7 +25,15 @@ from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tube_columns import PRESSURE
 from tissuq.experiments.units import measured_in
 
-__all__ = ["SPREAD_ROLES", "check_machine", "check_roles", "check_test", "check_together", "with_types"]
+__all__ = [
+    "SPREAD_ROLES",
+    "check_is_shear",
+    "check_machine",
+    "check_roles",
+    "check_test",
+    "check_together",
+    "with_types",
+]
 
 SPREAD_ROLES = ("sem", "sd", "n")
 """Of columns beside a mean of several specimens: their standard error, their standard deviation, and their number."""
@@ -150,7 +158,22 @@ def check_roles(table: Table, mapping: Mapping[str, str | int], is_shear: bool) 
             if is_shear
             else "a stretch, strain, displacement or length"
         )
-        raise InputError(f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.")
+        advice = " If it holds the amount of shear, give it so: --column shear=NAME." if is_shear else ""
+        raise InputError(
+            f"{table.file}: a column is given as {min(unfit)}, but this loading mode has {deformation}.{advice}"
+        )
+
+
+def check_is_shear(table: Table, column: int) -> None:
+    """Ask about a column that is called a stretch in simple shear, unless it begins at 0 as an amount of shear does."""
+    if _ratio_role(table, column) == "stretch":
+        (values,) = table.numbers([column])
+        raise InputError(
+            f"{table.place(column)} is called a stretch, and its values ({values.min():g} to {values.max():g}) are "
+            "those of one, which is 1 at rest; simple shear has an amount of shear, which is 0 there. If the column "
+            f'holds the amount of shear all the same, give --column shear="{table.names[column]}"; if the specimen '
+            "was stretched, give its mode, such as --mode uniaxial."
+        )
 
 
 def with_types(table: Table, choice: ColumnChoice, contents: Contents) -> ColumnChoice:

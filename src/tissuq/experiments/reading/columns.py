@@ -11,6 +11,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.column_checks import (
     SPREAD_ROLES,
+    check_is_shear,
     check_machine,
     check_roles,
     check_test,
@@ -221,8 +222,9 @@ def _choice(
         if load == "torque" and not contents.fitting("shear"):
             measures = ["twist"]
         elif is_shear:
+            is_stretch = len(contents.fitting("stretch")) == 1
             sheared = (role for role in ("shear", "rate", "sliding", "strain") if contents.fitting(role))
-            measures = [next(sheared, "shear")]
+            measures = [next(sheared, "stretch" if is_stretch else "shear")]
         if not is_shear and not contents.fitting(*measures):
             measures = ["displacement"] if contents.fitting("displacement") else ["length"]
         is_named = bool(contents.fitting(*measures)) or (is_shear and load != "torque")
@@ -235,7 +237,10 @@ def _choice(
             deformation = recognise(table, contents, measures, roles)
             name = contents.quantities[deformation]
             measure = next((measure for measure in measures if name in role_names(measure)), "strain")
-            measure = "shear" if is_shear and measure == "strain" else measure
+            if is_shear and measure == "stretch":
+                check_is_shear(table, deformation)
+                unnamed |= {deformation}
+            measure = "shear" if is_shear and measure in ("strain", "stretch") else measure
         by_unit_alone = measured_in(table.unit(deformation))
         if measure == "displacement" and by_unit_alone == "strain":
             measure = "strain"

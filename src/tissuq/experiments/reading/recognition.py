@@ -68,7 +68,8 @@ class ColumnChoice:
     strain_type, stress_type : str
         Which measure of strain, or of shear, and of stress.
     by_unit : frozenset of int
-        Which of the columns were told by their units alone, under names that are not known.
+        Which of the columns were told by their units alone, under names that are not known; or an amount of shear by
+        its numbers, under the name of a stretch.
     """
 
     deformation: int

@@ -37,6 +37,8 @@ LINES_FOR_ENCODING = 200
 """Lines with bytes beyond ASCII that show an encoding."""
 FORTRAN_EXPONENT = re.compile(r"(\d\.\d*|\.\d+)[dD]([+-]\d{2,3})\b")
 """As in ``1.234D+02``."""
+LINE_END = re.compile(r"(?<!\r)\r+\n")
+"""Of Windows, also where a program has made it twice (``\\r\\r\\n``): no line is between."""
 LONGEST_LINE = 100_000
 """Characters of a line of text."""
 
@@ -54,7 +56,7 @@ def read_lines(path: str | os.PathLike[str]) -> list[str]:
     """
     text = _decoded(path, _content(Path(path)))
     text = FORTRAN_EXPONENT.sub(r"\1e\2", text) if any(sign in text for sign in ("D+", "D-", "d+", "d-")) else text
-    lines = without_marks(text.replace("\u2212", "-")).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = LINE_END.sub("\n", without_marks(text.replace("\u2212", "-"))).replace("\r", "\n").split("\n")
     if len(max(lines, key=len)) > LONGEST_LINE:
         raise InputError(f"{path}: a line is longer than {LONGEST_LINE} characters; this is not a table in text form.")
     return lines
@@ -91,7 +93,7 @@ def _decoded(path: str | os.PathLike[str], content: bytes) -> str:
             text = content.decode(encoding)
         except UnicodeDecodeError:
             continue
-        text = re.sub("\0(?=\r?\n)", "", text)  # some machines (WinTest) end their first line with a NUL
+        text = re.sub("\0(?=\r*\n)", "", text)  # some machines (WinTest) end their first line with a NUL
         if "\0" not in text:
             return text
     raise InputError(f"{path} is a binary file, not text; export the table as CSV and give that file.")

@@ -88,7 +88,7 @@ class NoiseGrid:
         return [self._sum(model, seed) for model in models]
 
     def _sum(self, model: StatisticalModel, seed: int) -> Solution:
-        known: dict[float, Solution] = {}
+        solutions: dict[float, Solution] = {}
         sketch = replace(model, discrepancy=model.discrepancy.sketch)
         _, mean_sd = model.noise_of_tests
 
@@ -97,8 +97,8 @@ class NoiseGrid:
         ) -> float:
             """Return the logarithm of the posterior density of the logarithm of the noise, up to a constant."""
             noise_sd = np.exp(log_noise)
-            known[log_noise] = solve_known(at_noise(of, noise_sd))
-            log_evidence = known[log_noise].log_evidence
+            solutions[log_noise] = solve_known(at_noise(of, noise_sd))
+            log_evidence = solutions[log_noise].log_evidence
             if log_evidence is None:
                 raise ConvergenceError("a fit with known noise has no evidence, which weighs values of the noise.")
             return log_evidence + float(model.priors[SYMBOL].log_density(noise_sd)) + log_noise
@@ -111,7 +111,7 @@ class NoiseGrid:
         first = _spaced(max(float(low), ends[0]), min(float(high), ends[1]))
         nodes = _nodes(*_refined(partial(log_weight, sketch, self.known_solver(ROUGH)), first, ends))
         logs, log_weights = _widened(partial(log_weight, model, self.known_solver(FINE)), nodes, ends)
-        return _joined(model, [known[float(value)] for value in logs], logs, log_weights, seed)
+        return _joined(model, [solutions[float(value)] for value in logs], logs, log_weights, seed)
 
 
 def with_known_noise(model: StatisticalModel, noise_sd: FloatArray) -> StatisticalModel:
@@ -142,46 +142,49 @@ def _ends(prior: Prior) -> tuple[float, float]:
 
 
 def _spaced(low: float, high: float) -> FloatArray:
-    """Return places between two ends, no farther apart than the largest step."""
+    """Return values between two ends, no farther apart than the largest step."""
     return np.linspace(low, high, 2 + int((high - low) / MAX_STEP))
 
 
 def _refined(
     function: Callable[[float], float], first: FloatArray, ends: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return places between two ends, between which a function is known, and its values; elsewhere it is negligible."""
-    values = {float(place): function(float(place)) for place in first}
+    """Return values between two ends, between which a function is known, and its values; elsewhere it is negligible."""
+    values = {float(log_noise): function(float(log_noise)) for log_noise in first}
     while len(values) < MAX_VALUES:
-        places = np.array(sorted(values))
-        logs = np.array([values[place] for place in places])
+        log_noises = np.array(sorted(values))
+        logs = np.array([values[log_noise] for log_noise in log_noises])
         least = logs.max() - NEGLIGIBLE_DROP
         matters = np.maximum(logs[1:], logs[:-1]) > least
-        is_rough = matters & (np.abs(np.diff(logs)) > MAX_DROP) & (np.diff(places) > MIN_STEP)
-        new = list(0.5 * (places[1:] + places[:-1])[is_rough])
+        is_rough = matters & (np.abs(np.diff(logs)) > MAX_DROP) & (np.diff(log_noises) > MIN_STEP)
+        new = list(0.5 * (log_noises[1:] + log_noises[:-1])[is_rough])
         # Below the resolution of the tests, nothing but the prior depends on the noise: it is the end's.
-        new += [places[0] - MAX_STEP] if logs[0] > least and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP else []
-        new += [places[-1] + MAX_STEP] if logs[-1] > least else []
-        new = [float(np.clip(place, *ends)) for place in new]
-        if all(place in values for place in new):
+        new += [log_noises[0] - MAX_STEP] if logs[0] > least and logs[0] - logs[1] > -MIN_SLOPE * MAX_STEP else []
+        new += [log_noises[-1] + MAX_STEP] if logs[-1] > least else []
+        new = [float(np.clip(log_noise, *ends)) for log_noise in new]
+        if all(log_noise in values for log_noise in new):
             break
-        values |= {place: function(place) for place in new if place not in values}
-    places = np.array(sorted(values))
-    return places, np.array([values[place] for place in places])
+        values |= {log_noise: function(log_noise) for log_noise in new if log_noise not in values}
+    log_noises = np.array(sorted(values))
+    return log_noises, np.array([values[log_noise] for log_noise in log_noises])
 
 
-def _nodes(places: FloatArray, logs: FloatArray) -> FloatArray:
-    """Return equally spaced places over the range in which a function, roughly known, is not negligible."""
-    table, density = _table(places, logs)
+def _nodes(log_noises: FloatArray, logs: FloatArray) -> FloatArray:
+    """Return equally spaced values over the range in which a function, roughly known, is not negligible."""
+    table, density = _table(log_noises, logs)
     matters = table[density > np.exp(-NEGLIGIBLE_DROP)]
-    low, high = max(float(matters[0]), float(places[0])), float(matters[-1])
+    low, high = max(float(matters[0]), float(log_noises[0])), float(matters[-1])
     return np.linspace(low, high, 1 + max(INTERVALS, int(np.ceil((high - low) / MAX_NODE_STEP))))
 
 
 def _widened(
-    function: Callable[[float], float], places: FloatArray, ends: tuple[float, float]
+    function: Callable[[float], float], log_noises: FloatArray, ends: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return equally spaced places between two ends, more where the function is not negligible, and its values."""
-    values, step = {float(place): function(float(place)) for place in places}, float(places[1] - places[0])
+    """Return equally spaced values between two ends, more where the function is not negligible, and its values."""
+    values, step = (
+        {float(log_noise): function(float(log_noise)) for log_noise in log_noises},
+        float(log_noises[1] - log_noises[0]),
+    )
     while len(values) < MAX_VALUES:
         ordered = sorted(values)
         least, (first, second), last = max(values.values()) - WIDENING_DROP, ordered[:2], ordered[-1]
@@ -192,11 +195,11 @@ def _widened(
         else:
             break
     ordered = sorted(values)
-    return np.array(ordered), np.array([values[place] for place in ordered])
+    return np.array(ordered), np.array([values[log_noise] for log_noise in ordered])
 
 
 def _joined(
-    model: StatisticalModel, known: Sequence[Solution], logs: FloatArray, log_weights: FloatArray, seed: int
+    model: StatisticalModel, solutions: Sequence[Solution], logs: FloatArray, log_weights: FloatArray, seed: int
 ) -> Solution:
     """Return the posterior from those at values of the logarithm of the noise, and its log density at these."""
     table, density = _table(logs, log_weights)
@@ -207,27 +210,27 @@ def _joined(
     def marginal(symbol: str) -> Marginal:
         if symbol == SYMBOL:
             return marginal_of_table(np.exp(table), density / np.exp(table))
-        parts = [(float(share), solution.marginals[symbol]) for share, solution in zip(shares, known, strict=True)]
+        parts = [(float(share), solution.marginals[symbol]) for share, solution in zip(shares, solutions, strict=True)]
         return blended(parts, model.priors[symbol].support)
 
     matters = shares > NEGLIGIBLE_SHARE
-    known = [solution for solution, is_kept in zip(known, matters, strict=True) if is_kept]
+    solutions = [solution for solution, is_kept in zip(solutions, matters, strict=True) if is_kept]
     logs, shares = logs[matters], shares[matters] / shares[matters].sum()
     best = int(np.argmax(shares))
     members: dict[str, float] = {}
-    for share, solution in zip(shares, known, strict=True):
+    for share, solution in zip(shares, solutions, strict=True):
         for name, probability in solution.members.items():
             members[name] = members.get(name, 0.0) + float(share * probability)
     return Solution(
         model.with_errors(level=float(np.exp(shares @ logs))),
-        known[best].route,
-        f"the noise integrated over {len(known)} values; at each of them {known[best].reason}",
-        partial(_represented, model, known, shares, logs, wide=False),
+        solutions[best].route,
+        f"the noise integrated over {len(solutions)} values; at each of them {solutions[best].reason}",
+        partial(_represented, model, solutions, shares, logs, wide=False),
         Marginals(model.symbols, marginal),
-        partial(_represented, model, known, shares, logs, wide=True),
+        partial(_represented, model, solutions, shares, logs, wide=True),
         seed,
         log_evidence=float(log_weights.max() + np.log(total)),
-        log_evidence_error=float(shares @ [solution.log_evidence_error or 0.0 for solution in known])
+        log_evidence_error=float(shares @ [solution.log_evidence_error or 0.0 for solution in solutions])
         + float(abs(other / total - 1)),
         members=members,
     )
@@ -252,11 +255,11 @@ def _shares(logs: FloatArray, table: FloatArray, density: FloatArray) -> FloatAr
 
 
 def _represented(
-    model: StatisticalModel, known: Sequence[Solution], shares: FloatArray, logs: FloatArray, *, wide: bool
+    model: StatisticalModel, solutions: Sequence[Solution], shares: FloatArray, logs: FloatArray, *, wide: bool
 ) -> GaussianMixture:
     """Return the components of all solutions, fewer of those of less weight."""
     mixtures = []
-    for solution, share, log in zip(known, shares, logs, strict=True):
+    for solution, share, log in zip(solutions, shares, logs, strict=True):
         few = solution.few_components(max(1, int(share * MAX_COMPONENTS)), wide=wide)
         values = dict(zip(solution.model.nonlinear, few.settings.T, strict=True))
         values[SYMBOL] = np.full(len(few), np.exp(log))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from pydantic import field_validator
 
 from tissuq.experiments.modes import loading_mode
-from tissuq.finite_elements.case import Case, ClampedBar, Indentation
+from tissuq.finite_elements import Case, ClampedBar, Indentation, PlateWithHole
 from tissuq.model.tolerances import Tolerances
 from tissuq.parameters.priors import Prior, Uniform
 from tissuq.studies.campaign_settings import StructureStudyOptions
@@ -34,6 +34,7 @@ KNOWN_LAWS = {
 STRUCTURES: dict[str, Case] = {
     "bar": ClampedBar(elongation=1.5, fineness=0.5),
     "indentation": Indentation(depth=0.3, fineness=0.5),
+    "plate": PlateWithHole(elongation=2.0, fineness=0.5),
 }
 """Structures by name, with meshes that are the same for the truth: errors of a mesh have no part in coverage."""
 

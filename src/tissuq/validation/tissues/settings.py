@@ -6,7 +6,6 @@ from pydantic import Field, field_validator
 
 from tissuq.mechanics import material_named
 from tissuq.model.discrepancy import discrepancy_named
-from tissuq.model.tolerances import Tolerances
 from tissuq.studies.campaign_settings import TissueOptions
 from tissuq.studies.settings import looked_up
 from tissuq.validation.tissues.protocols import PROTOCOLS
@@ -54,12 +53,6 @@ class TissueSettings(TissueOptions):
         for name in names:
             looked_up(discrepancy_named, name)
         return names
-
-    @field_validator("tolerances")
-    @classmethod
-    def _known_errors(cls, sizes: dict[str, float] | None) -> dict[str, float] | None:
-        looked_up(lambda errors: Tolerances(**errors), sizes or {})
-        return sizes
 
     @field_validator("material")
     @classmethod

@@ -1,0 +1,116 @@
+"""What a next test may be for: a quantity of a finite-element model, linear in stresses of the material."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import LoadingMode
+from tissuq.inference.gaussian_mixture import GaussianMixture
+from tissuq.model.statistical_model import StatisticalModel
+from tissuq.next_test.candidates import OfStresses, Target
+
+__all__ = ["QuantityTarget", "quantity_target"]
+
+FloatArray = NDArray[np.float64]
+States = Sequence[tuple[LoadingMode, FloatArray]]
+
+MIN_DRAWS = 8
+"""Draws that give a quantity, at the least, from which it is learned."""
+DRAWS_PER_COMPONENT = 4
+"""Draws, at the least, for each principal component of the stresses that is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityTarget(Target):
+    """A quantity of a model, to first order in the stresses of its material.
+
+    Attributes
+    ----------
+    text, words : str
+        Its name, and what it is.
+    states : sequence of (LoadingMode, (1,) array)
+        K of them, whose stresses it follows.
+    fitted : OfStresses
+        How; the residual is that of draws which are left out of the fit.
+    explained : float
+        Share of the quantity's variance over draws that is not error.
+    """
+
+    text: str
+    words: str
+    states: States
+    fitted: OfStresses
+    explained: float
+
+    @property
+    def name(self) -> str:
+        """As it was asked for."""
+        return self.text
+
+    def title(self, model: StatisticalModel) -> str:
+        return self.words
+
+    def unit(self, model: StatisticalModel) -> str:
+        """Return nothing: the units of the model are the user's."""
+        return ""
+
+    @property
+    def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
+        """The modes and stretches (1,) of the stresses."""
+        yield from self.states
+
+    @property
+    def of_stresses(self) -> OfStresses:
+        """As it was fitted to draws."""
+        return self.fitted
+
+    def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
+        raise NotImplementedError("its stresses are predicted together with the others")
+
+
+def quantity_target(text: str, words: str, states: States, stresses: FloatArray, values: FloatArray) -> QuantityTarget:
+    """Return the target that draws of a posterior tell: a regression on principal components of their stresses.
+
+    Their number is that which predicts draws best that are left out, one at a time.
+
+    Parameters
+    ----------
+    text, words : str
+        Its name, and what it is.
+    states : sequence of (LoadingMode, (1,) array)
+    stresses : (N, K) array, MPa
+        Of every draw at the states.
+    values : (N,) array
+        Of the quantity; not a number where a draw has none.
+
+    Raises
+    ------
+    InputError
+        When few draws have a value, or all have the same.
+    """
+    is_present = np.isfinite(values)
+    stresses, values = stresses[is_present], values[is_present]
+    if len(values) < MIN_DRAWS or not np.ptp(values):
+        raise InputError(
+            f"target '{text}': {len(values)} draws give it, of which {len(np.unique(values))} different values; at "
+            f"least {MIN_DRAWS} draws are needed that differ. Make an ensemble of more (tissuq ensemble --draws)."
+        )
+    count, centre = len(values), values.mean()
+    left, singular, right = np.linalg.svd(stresses - stresses.mean(axis=0), full_matrices=False)
+    rank = min(int((singular > 1e-10 * singular[0]).sum()), count // DRAWS_PER_COMPONENT)
+    scores = left[:, :rank].T @ (values - centre)
+    errors = []
+    for used in range(1, rank + 1):
+        leverage = 1 / count + (left[:, :used] ** 2).sum(axis=1)
+        residual = values - centre - left[:, :used] @ scores[:used]
+        errors.append(float(np.mean((residual / (1 - leverage)) ** 2)))
+    used = int(np.argmin(errors)) + 1
+    weights = right[:used].T @ (scores[:used] / singular[:used])
+    intercept, error = float(centre - stresses.mean(axis=0) @ weights), errors[used - 1]
+    fitted = OfStresses(weights, intercept, float(np.sqrt(error)))
+    return QuantityTarget(text, words, states, fitted, max(0.0, 1 - error / float(values.var())))
