@@ -50,7 +50,7 @@ def test_what_is_no_stress_of_the_material_stays_after_every_test(posterior, dra
     quantity = quantity_target("q", "a force", STATES, stresses, planar + error)
     stress = target_named("planar:1.15", posterior.model)
     expected = NextTest(posterior.solution, [quantity, stress], "same").expected(CANDIDATE)
-    residual = quantity.fitted.residual_sd
+    residual = quantity.residual_sd
     assert residual == pytest.approx(planar.std(), rel=0.35)
     assert quantity.explained == pytest.approx(0.5, abs=0.3)
     assert expected.sd_after[0] > residual

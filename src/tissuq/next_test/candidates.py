@@ -26,9 +26,9 @@ __all__ = [
     "MODULUS",
     "Candidate",
     "ModulusTarget",
-    "OfStresses",
     "ParameterTarget",
     "StressTarget",
+    "Stresses",
     "Target",
     "candidate_named",
     "default_candidates",
@@ -208,21 +208,19 @@ def _why_not(material: Material, mode: LoadingMode) -> str:
 MODULUS = "modulus"
 
 
-class OfStresses(NamedTuple):
-    """A quantity of stresses: intercept + sum of weight_k * stress_k + an error.
+class Stresses(NamedTuple):
+    """K stresses in M components.
 
     Attributes
     ----------
-    weights : (K,) array
-    intercept : float
-        Which no error of all stresses multiplies.
-    residual_sd : float
-        Of the error.
+    mean, root : (M, K) and (M, K, r) arrays
+    scatter : (M,) array
+        Standard deviation of what is independent from stress to stress.
     """
 
-    weights: FloatArray
-    intercept: float = 0.0
-    residual_sd: float = 0.0
+    mean: FloatArray
+    root: FloatArray
+    scatter: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,17 +246,19 @@ class Target(ABC):
 
     @property
     def points(self) -> Iterator[tuple[LoadingMode, FloatArray]]:
-        """A mode and a stretch (1,) of it for each stress that it is made of, where it is of stresses."""
+        """A mode and a stretch (1,) of it for each of the K stresses that it is made of."""
         return iter(())
 
     @property
-    def of_stresses(self) -> OfStresses:
-        """How it is made of these stresses: it is the one stress, unless a subclass says otherwise."""
-        return OfStresses(np.ones(1))
+    def offset(self) -> float:
+        """The part of its mean that no error of all stresses multiplies."""
+        return 0.0
 
     @abstractmethod
-    def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
-        """Return means (M,) and roots (M, p) in every component, where it is no stress."""
+    def moments(
+        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return means (M,) and roots (M, q) in every component, in which the stresses at its points are given."""
 
 
 @dataclass(frozen=True)
@@ -281,7 +281,9 @@ class ParameterTarget(Target):
     def is_stiffness(self, model: StatisticalModel) -> bool:
         return self.symbol in model.column_symbols
 
-    def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
+    def moments(
+        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
+    ) -> tuple[FloatArray, FloatArray]:
         mean, root = values_of(model, components, [self.symbol])
         return mean[:, 0], root[:, 0]
 
@@ -298,7 +300,9 @@ class ModulusTarget(Target):
     def title(self, model: StatisticalModel) -> str:
         return "initial shear modulus"
 
-    def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
+    def moments(
+        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
+    ) -> tuple[FloatArray, FloatArray]:
         return modulus_moments(model, components)
 
 
@@ -322,8 +326,10 @@ class StressTarget(Target):
         """The mode, and the stretch."""
         yield self.mode, np.array([self.stretch])
 
-    def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
-        raise NotImplementedError("a stress is predicted together with the others")
+    def moments(
+        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
+    ) -> tuple[FloatArray, FloatArray]:
+        return stresses.mean[:, 0], np.concatenate([stresses.root[:, 0], stresses.scatter[:, None]], axis=1)
 
 
 def target_named(text: str | Target, model: StatisticalModel) -> Target:

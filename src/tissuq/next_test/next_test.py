@@ -18,7 +18,7 @@ from tissuq.model.error_model import widening_of_lag
 from tissuq.model.measurement_errors import ErrorPoints
 from tissuq.model.statistical_model import StatisticalModel
 from tissuq.model.tolerances import BETWEEN_SPECIMENS, Tolerances, specimens_of
-from tissuq.next_test.candidates import Candidate, Target, farthest_range, reach_of
+from tissuq.next_test.candidates import Candidate, Stresses, Target, farthest_range, reach_of
 from tissuq.next_test.expected_variance import expected_variances, joint_stresses, states_of
 from tissuq.prediction.moments import stress_moments, stress_slopes
 
@@ -105,7 +105,7 @@ class NextTest:
         for number, components in enumerate(self._batches):
             mixture, noise_sd = self._mixture(components, candidate)
             variances = expected_variances(mixture, noise_sd, self._uniforms(number, mixture, noise_sd))
-            centre = (mixture.weights @ mixture.mean)[noise_sd.shape[1] :] - self._intercepts
+            centre = (mixture.weights @ mixture.mean)[noise_sd.shape[1] :] - self._offsets
             prior, expected = (
                 variance + self._common_error(self.errors_after) ** 2 * (variances.prior + centre**2)
                 for variance in (variances.prior, variances.expected)
@@ -123,7 +123,7 @@ class NextTest:
         mean, root = self._targets(self._components, *self._stresses(self._components, []))
         centre, covariance = GaussianMixture(self._components.weights, self._components.settings, mean, root).moments()
         variance = np.diag(covariance)
-        of_stresses = centre - self._intercepts
+        of_stresses = centre - self._offsets
         return np.sqrt(variance + self._common_error(self.errors_now) ** 2 * (variance + of_stresses**2))
 
     @property
@@ -157,9 +157,9 @@ class NextTest:
         return error * np.array([target.is_stiffness(self.model) for target in self.targets])
 
     @property
-    def _intercepts(self) -> FloatArray:
+    def _offsets(self) -> FloatArray:
         """The part (t,) of each target that such an error does not multiply."""
-        return np.array([target.of_stresses.intercept for target in self.targets])
+        return np.array([target.offset for target in self.targets])
 
     @cached_property
     def _batches(self) -> list[GaussianMixture]:
@@ -193,21 +193,16 @@ class NextTest:
 
     def _targets(self, components: GaussianMixture, mean: FloatArray, root: FloatArray) -> Column:
         """Return means (M, t) and roots (M, t, r) of the targets; stresses among them are the last ones given."""
-        width, columns = root.shape[2], []
-        scatter = _scatter(self.model, components)
-        column = mean.shape[1] - sum(1 for target in self.targets for _ in target.points)
+        scatter, columns = _scatter(self.model, components), []
+        start = mean.shape[1] - sum(1 for target in self.targets for _ in target.points)
         for target in self.targets:
-            target_root, target_mean = np.zeros((len(mean), width + 1)), np.zeros(len(mean))
-            if count := sum(1 for _ in target.points):
-                of_target, (weights, intercept, residual_sd) = slice(column, column + count), target.of_stresses
-                target_mean = intercept + mean[:, of_target] @ weights
-                target_root[:, :width] = np.einsum("mkr,k->mr", root[:, of_target], weights)
-                target_root[:, width] = np.hypot(scatter * np.linalg.norm(weights), residual_sd)
-                column += count
-            else:
-                target_mean, linear = target.moments(self.model, components)
-                target_root[:, : linear.shape[1]] = linear
+            end = start + sum(1 for _ in target.points)
+            stresses = Stresses(mean[:, start:end], root[:, start:end], scatter)
+            target_mean, known_root = target.moments(self.model, components, stresses)
+            target_root = np.zeros((len(mean), root.shape[2] + 1))
+            target_root[:, : known_root.shape[1]] = known_root
             columns.append((target_mean, target_root))
+            start = end
         return np.stack([mean for mean, _ in columns], axis=1), np.stack([root for _, root in columns], axis=1)
 
     def _mixture(self, components: GaussianMixture, candidate: Candidate) -> tuple[GaussianMixture, FloatArray]:
@@ -221,7 +216,7 @@ class NextTest:
         noise_sd = self._noise(components, candidate, points, curve)
         if self.specimen == "other":
             test = self._error_points(components, candidate, points, curve)
-            columns = list(self._errors_of_specimen(test, mean, target_mean - self._intercepts))
+            columns = list(self._errors_of_specimen(test, mean, target_mean - self._offsets))
             root = np.concatenate([root, *(column[:, :, None] for column, _ in columns)], axis=2)
             target_root = np.concatenate([target_root, *(column[:, :, None] for _, column in columns)], axis=2)
             noise_sd = np.hypot(noise_sd, self.tolerances.noise(test))

@@ -12,7 +12,7 @@ from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.model.statistical_model import StatisticalModel
-from tissuq.next_test.candidates import OfStresses, Target
+from tissuq.next_test.candidates import Stresses, Target
 
 __all__ = ["QuantityTarget", "quantity_target"]
 
@@ -27,7 +27,7 @@ DRAWS_PER_COMPONENT = 4
 
 @dataclass(frozen=True, eq=False)
 class QuantityTarget(Target):
-    """A quantity of a model, to first order in the stresses of its material.
+    """A quantity of a model, to first order: intercept + sum of weight_k * stress_k + an error.
 
     Attributes
     ----------
@@ -35,8 +35,9 @@ class QuantityTarget(Target):
         Its name, and what it is.
     states : sequence of (LoadingMode, (1,) array)
         K of them, whose stresses it follows.
-    fitted : OfStresses
-        How; the residual is that of draws which are left out of the fit.
+    weights : (K,) array, unit of the quantity / MPa
+    intercept, residual_sd : float
+        The latter of the error: that of draws which are left out of the fit.
     explained : float
         Share of the quantity's variance over draws that is not error.
     """
@@ -44,7 +45,9 @@ class QuantityTarget(Target):
     text: str
     words: str
     states: States
-    fitted: OfStresses
+    weights: FloatArray
+    intercept: float
+    residual_sd: float
     explained: float
 
     @property
@@ -65,12 +68,16 @@ class QuantityTarget(Target):
         yield from self.states
 
     @property
-    def of_stresses(self) -> OfStresses:
-        """As it was fitted to draws."""
-        return self.fitted
+    def offset(self) -> float:
+        """The intercept."""
+        return self.intercept
 
-    def moments(self, model: StatisticalModel, components: GaussianMixture) -> tuple[FloatArray, FloatArray]:
-        raise NotImplementedError("its stresses are predicted together with the others")
+    def moments(
+        self, model: StatisticalModel, components: GaussianMixture, stresses: Stresses
+    ) -> tuple[FloatArray, FloatArray]:
+        error = np.hypot(stresses.scatter * np.linalg.norm(self.weights), self.residual_sd)
+        root = np.einsum("mkr,k->mr", stresses.root, self.weights)
+        return self.intercept + stresses.mean @ self.weights, np.concatenate([root, error[:, None]], axis=1)
 
 
 def quantity_target(text: str, words: str, states: States, stresses: FloatArray, values: FloatArray) -> QuantityTarget:
@@ -112,5 +119,5 @@ def quantity_target(text: str, words: str, states: States, stresses: FloatArray,
     used = int(np.argmin(errors)) + 1
     weights = right[:used].T @ (scores[:used] / singular[:used])
     intercept, error = float(centre - stresses.mean(axis=0) @ weights), errors[used - 1]
-    fitted = OfStresses(weights, intercept, float(np.sqrt(error)))
-    return QuantityTarget(text, words, states, fitted, max(0.0, 1 - error / float(values.var())))
+    explained = max(0.0, 1 - error / float(values.var()))
+    return QuantityTarget(text, words, states, weights, intercept, float(np.sqrt(error)), explained)
