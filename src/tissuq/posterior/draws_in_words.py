@@ -34,12 +34,12 @@ def named_draws(numbers: Iterable[int], places: Sequence[str] = ()) -> str:
     >>> named_draws(range(9))
     'draws 1, 2, 3, 4, 5, 6 and 3 others'
     """
-    each = [str(number + 1) for number in numbers]
+    names = [str(number + 1) for number in numbers]
     if places:
-        each = [f"{number} {place}" for number, place in zip(each, places, strict=True)]
-    others = len(each) - MAX_DRAWS_NAMED
-    more = f" and {others} other{'s' * (others > 1)}" if others > 0 else ""
-    return f"draw{'s' * (len(each) > 1)} {', '.join(each[:MAX_DRAWS_NAMED])}{more}"
+        names = [f"{name} {place}" for name, place in zip(names, places, strict=True)]
+    unnamed = len(names) - MAX_DRAWS_NAMED
+    more = f" and {unnamed} other{'s' * (unnamed > 1)}" if unnamed > 0 else ""
+    return f"draw{'s' * (len(names) > 1)} {', '.join(names[:MAX_DRAWS_NAMED])}{more}"
 
 
 def failed_draws(
@@ -61,8 +61,8 @@ def failed_draws(
     """
     sentences = []
     for family in dict.fromkeys(failure.family for failure in failures):
-        failed = sorted((each for each in failures if each.family == family), key=lambda each: each.reached)
-        named = named_draws([each.number for each in failed], [place.format(each.reached) for each in failed])
+        failed = sorted((draw for draw in failures if draw.family == family), key=lambda draw: draw.reached)
+        named = named_draws([draw.number for draw in failed], [place.format(draw.reached) for draw in failed])
         sentences.append(
             f"{len(failed)} of {totals[family]} {families[family]} failed ({named}; first reason: "
             f"{failed[0].problem}). {advice} Every step shows only the draws that reached it, which may no longer be a "

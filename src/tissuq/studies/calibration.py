@@ -113,12 +113,12 @@ def run_calibration(
     if settings.material is not None:
         check_material(settings.material, settings.parameter_priors, settings.unit)
     data = _read(settings, folder)
-    forward = settings.forward_model(folder, {name: each.units for name, each in data.items()}, **running)
+    forward = settings.forward_model(folder, {name: measured.units for name, measured in data.items()}, **running)
     start = perf_counter()
     names = ("discrepancy", "zero_load", "runs", "refine", "design", "kernel", "trend", "method", "seed")
     calibration = calibrate(
-        {name: each.control for name, each in data.items()},
-        {name: each.measured for name, each in data.items()},
+        {name: measured.control for name, measured in data.items()},
+        {name: measured.measured for name, measured in data.items()},
         forward,
         settings.parameter_priors,
         noise_sd=settings.noises,

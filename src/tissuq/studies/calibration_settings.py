@@ -127,8 +127,8 @@ class CalibrationSettings(ModelSettings):
     @field_validator("noise_sd", mode="before")
     @classmethod
     def _positive_or_unknown(cls, value: Any) -> Any:
-        for each in value.values() if isinstance(value, dict) else [value]:
-            positive_or_unknown(each, "the unit of the measured values")
+        for sd in value.values() if isinstance(value, dict) else [value]:
+            positive_or_unknown(sd, "the unit of the measured values")
         return value
 
     @model_validator(mode="before")
@@ -183,8 +183,8 @@ class CalibrationSettings(ModelSettings):
             of = ", ".join(self.quantities) if several else "one quantity, and has no name"
             raise ValueError(f"the noise (noise_sd) is of {of}; it is given for {', '.join(self.noise_sd)}")
         if several and isinstance(self.noise_sd, float):
-            each = ",".join(f"{name}=SD" for name in self.quantities)
-            raise ValueError(f"every quantity has a noise of its own: --noise-sd {each}, or unknown")
+            sds = ",".join(f"{name}=SD" for name in self.quantities)
+            raise ValueError(f"every quantity has a noise of its own: --noise-sd {sds}, or unknown")
         if several and self.measured is not None:
             raise ValueError("the columns of several quantities are called as these are: leave out measured")
 
