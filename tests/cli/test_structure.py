@@ -77,6 +77,32 @@ def test_a_plate_with_a_hole_has_the_same_files_of_a_solid(cli, here, run):
 
 
 @pytest.mark.finite_elements
+def test_a_mesh_of_your_own_is_copied_and_its_recipe_goes_on(cli, here, run):
+    """A block that a plane compresses, uniformly: its force is known from the material's own curve."""
+    fem, meshio = pytest.importorskip("felupe"), pytest.importorskip("meshio")
+    block = fem.Rectangle(b=(2.0, 3.0), n=3)
+    meshio.Mesh(np.pad(block.points, ((0, 0), (0, 1))), [("quad", block.cells)]).write(here / "block.vtu")
+    mesh = ["--mesh", "block.vtu", "--hold", "ymin=y", "--hold", "xmin=x", "--shape", "axisymmetric"]
+    few = ["--draws", 3, "--steps", 1, "--workers", 1]
+    said = cli("structure", "run", *mesh, "--move", "ymax=y:-0.3", *few)
+    assert said.status == 0, said.err
+    folder = here / "runs" / "run-block"
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "4 axisymmetric quadrilaterals with one pressure" in page
+    assert "not known: compute it with a finer mesh" in page
+    points = meshio.read(folder / "fields.vtu")
+    np.testing.assert_allclose(points.points[:, :2], block.points)
+    np.testing.assert_allclose(points.point_data["mean displacement"][block.points[:, 1] == 3.0, 1], -0.3)
+    said = cli("structure", "--config", folder / "run.toml", "--no-figures", "--out", "again", "--workers", 1)
+    assert said.status == 0, said.err
+    tables = [(path / "forces.csv").read_text(encoding="utf-8") for path in (folder, here / "again")]
+    assert tables[0] == tables[1]
+    meshio.Mesh(np.pad(1.1 * block.points, ((0, 0), (0, 1))), [("quad", block.cells)]).write(here / "block.vtu")
+    said = cli("structure", "run", *mesh, "--move", "ymax=y:-0.3", *few)
+    assert (said.status, "holds a simulation of another mesh" in said.err) == (2, True)
+
+
+@pytest.mark.finite_elements
 def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others(cli, here, run):
     import xarray as xr
 
@@ -132,6 +158,10 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
         (["run", "--size", "depth=deep"], ["depth must be a number", "deep"]),
         (["run", "--size", "depth=7"], ["must be less than the height"]),
         (["run", "--size", "depth=0.1", "--size", "depth=0.2"], ["given twice for 'depth'"]),
+        (["run", "--hold", "ymin=xyz"], ["give the mesh of the body, too: --mesh FILE"]),
+        (["run", "--mesh", "none.msh", "--move", "ymax=y:1"], ["'none.msh' cannot be read"]),
+        (["run", "--mesh", "none.msh", "--move", "ymax:1"], ["'ymax:1' is not a movement (--move); write SET=AXIS"]),
+        (["run", "--mesh", "none.msh"], ["needs either --move SET=AXIS:DISTANCE or --press"]),
         (["run", "--draws", "1"], ["draws", "greater than or equal to 2"]),
         (["run", "--discrepancy", "gp"], ["no discrepancy 'gp'", "auto"]),
     ],

@@ -107,7 +107,7 @@ def test_a_case_of_ones_own_has_the_engineering_stress_of_a_draw(draws):
 def test_the_weights_of_the_cells_are_the_volumes_of_rings():
     """By Pappus' theorem: the area of a rectangle, times the way of its centre."""
     case = Indentation(depth=0.1)
-    points, cells = case.mesh()
+    points, cells = case.mesh()[:2]
     corners = points[cells]
     area = np.ptp(corners[..., 0], axis=1) * np.ptp(corners[..., 1], axis=1)
     volumes = Solver(case, NEO_HOOKEAN, [0.5], 100.0)._volumes.sum(axis=0)

@@ -30,7 +30,7 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     """Compute the force in a case with draws of a posterior; the same command resumes a stopped simulation."""
     from tissuq.report.run_folder import check_apart
     from tissuq.report.simulation import simulation_result
-    from tissuq.report.source_run import SOURCE, check_source, copy_source
+    from tissuq.report.source_run import SOURCE, check_mesh, check_source, copy_mesh, copy_source, stored_mesh
     from tissuq.report.terminal import print_warnings
     from tissuq.studies.stream import open_pool
     from tissuq.studies.structure import load_posteriors, run_simulation
@@ -38,14 +38,16 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     call.check_source("run", "the RUN folder of a fit", "simulation")
     settings, beside, law = call.settings, call.beside, call.law
     source = beside / settings.run
-    stored_settings = settings.model_copy(update={"run": SOURCE})
-    named = settings.sized_case().name
+    case = settings.sized_case(beside)
+    stored_settings = settings.model_copy(update={"run": SOURCE} | stored_mesh(settings.mesh))
+    named = Path(settings.mesh).stem if settings.mesh else case.name
     of_run = beside if call.config else Path(settings.run)
     folder = call.how.out or Path("runs") / f"{of_run.resolve().name}-{named}"
     if not call.config:  # a repeated simulation may continue in its own folder, which holds the run
         check_apart(folder, source)
     check_folder(folder, stored_settings)
     check_source(source, folder)
+    check_mesh(case, folder)
     with call.monitor.steps() as step, warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always", UserWarning)
         posteriors = load_posteriors(settings, beside, law, step)
@@ -53,10 +55,13 @@ def structure(call: Call[SimulationSettings, StructureOptions]) -> None:
     def prepare() -> None:
         write_campaign_recipe(folder, stored_settings)
         copy_source(source, folder)
+        copy_mesh(case, folder)
 
     processes = 1 if law else call.how.workers or os.cpu_count() or 1  # others cannot load a law from a file
     campaign = call.campaign_in(folder)
     with open_pool(processes, call.how.scheduler) as pool:
-        study = run_simulation(settings, posteriors, folder, prepare=prepare, pool=pool, progress=campaign)
+        study = run_simulation(
+            settings, posteriors, folder, beside=beside, prepare=prepare, pool=pool, progress=campaign
+        )
     print_warnings(list(dict.fromkeys(str(warning.message) for warning in raised)))
     call.put_into(folder, simulation_result(study, folder), figures=call.how.figures)

@@ -1,14 +1,17 @@
 """Finite elements with the draws of a posterior: materials for FElupe, cases, and the uncertainty of what they give."""
 
-from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, Supports, cases
+from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, RigidTip, Supports, cases
 from tissuq.finite_elements.material import FElupeMaterial
+from tissuq.finite_elements.mesh_file import BodyFromFile
 from tissuq.finite_elements.plate import PlateWithHole
 from tissuq.finite_elements.response import Response, bar_force, case_forces, indentation_force, respond
 from tissuq.finite_elements.simulation import Failure, Simulation, simulate
+from tissuq.finite_elements.sphere import SphericalIndentation
 from tissuq.finite_elements.spread import Band, Shares, band_of, shares_of
 
 __all__ = [
     "Band",
+    "BodyFromFile",
     "Case",
     "ClampedBar",
     "FElupeMaterial",
@@ -17,8 +20,10 @@ __all__ = [
     "Mesh",
     "PlateWithHole",
     "Response",
+    "RigidTip",
     "Shares",
     "Simulation",
+    "SphericalIndentation",
     "Supports",
     "band_of",
     "bar_force",

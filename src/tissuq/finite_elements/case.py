@@ -16,10 +16,13 @@ from tissuq.registry import variants
 __all__ = [
     "ACROSS",
     "AXIAL",
+    "CELL_KINDS",
     "Case",
+    "CellKind",
     "ClampedBar",
     "Indentation",
     "Mesh",
+    "RigidTip",
     "Supports",
     "cases",
     "graded",
@@ -32,32 +35,99 @@ AXIAL, ACROSS = 0, 1
 """Columns of points and displacements."""
 
 
+class CellKind(NamedTuple):
+    """Cells of one form: their name in meshio, FElupe's region, their plural, and the corners of their faces."""
+
+    meshio: str
+    region: str
+    plural: str
+    faces: tuple[tuple[int, ...], ...]
+
+
+QUAD, TRIANGLE = ((0, 1, 2, 3),), ((0, 1, 2),)
+HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
+CELL_KINDS = {
+    (2, 4): CellKind("quad", "RegionQuad", "quadrilaterals", QUAD),
+    (2, 8): CellKind("quad8", "RegionQuadraticQuad", "quadrilaterals of 8 points", QUAD),
+    (2, 6): CellKind("triangle6", "RegionQuadraticTriangle", "triangles of 6 points", TRIANGLE),
+    (3, 8): CellKind("hexahedron", "RegionHexahedron", "hexahedra", HEXAHEDRON),
+    (3, 20): CellKind("hexahedron20", "RegionQuadraticHexahedron", "hexahedra of 20 points", HEXAHEDRON),
+    (3, 10): CellKind("tetra10", "RegionQuadraticTetra", "tetrahedra of 10 points", TETRAHEDRON),
+}
+"""By dimensions and points of a cell; with one pressure a cell, linear triangles and tetrahedra would lock."""
+
+
 class Mesh(NamedTuple):
-    """Quadrilaterals in a half plane through the axis of a body of revolution, or hexahedra.
+    """Cells of one kind, in a half plane through the axis of a body of revolution, in a plane, or of a solid.
 
     Attributes
     ----------
     points : (n, 2) or (n, 3) array, mm
-        Along the axis, and the distance from it; of hexahedra also the height over the plane in which a section is
-        shown.
-    cells : (c, 4) or (c, 8) integer array
-        Corners, in order; of hexahedra the lower four first.
+        Along the axis, and the distance from it; of solids also the height over the plane in which a section is shown.
+    cells : (c, k) integer array
+        Points of every cell in the order of VTK; those of `CELL_KINDS`.
+    is_plane : bool
+        Whether cells with two dimensions are of a body in plane strain, 1 mm thick, not of a body of revolution.
+    is_half : bool
+        Whether what lies on the other side of the axis is the mirror image.
+    xyz : tuple of int
+        The columns of points that are x, y and z in files; unless given, x is across, y along the axis.
     """
 
     points: FloatArray
     cells: NDArray[np.intp]
+    is_plane: bool = False
+    is_half: bool = True
+    xyz: tuple[int, ...] = ()
 
     @property
     def is_solid(self) -> bool:
-        """Whether cells are hexahedra."""
+        """Whether cells have three dimensions."""
         return bool(self.points.shape[1] == 3)
 
     @property
+    def kind(self) -> CellKind:
+        """The kind of its cells."""
+        return CELL_KINDS[self.points.shape[1], self.cells.shape[1]]
+
+    def vectors(self, values: FloatArray) -> FloatArray:
+        """Return points or displacements (n, 2 or 3) with the axes of files (n, 3), right-handed."""
+        if self.xyz:
+            return np.asarray(np.pad(values[:, self.xyz], ((0, 0), (0, 3 - len(self.xyz)))))
+        height = values[:, 2] if self.is_solid else np.zeros(len(values))
+        return np.stack([values[:, ACROSS], values[:, AXIAL], -height], axis=-1)
+
+    @property
+    def words(self) -> str:
+        """What its cells are, as in a sentence."""
+        return f"{'' if self.is_solid else 'plane ' if self.is_plane else 'axisymmetric '}{self.kind.plural}"
+
+    @property
     def section(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Quadrilaterals (p, 4) of points that show a section, and the cells (p,) that they are of."""
-        faces = self.cells[:, :4]
-        shown = ~self.points[faces, 2:].any(axis=(1, 2))
-        return faces[shown], np.flatnonzero(shown)
+        """Faces (p, 3 or 4) by their points that show a section, and the cells (p,) that they are of: the lowest."""
+        faces = np.concatenate([self.cells[:, face] for face in self.kind.faces])
+        lowest = self.points[:, 2:].min(axis=0)
+        shown = np.isclose(self.points[faces, 2:], lowest, atol=1e-9 * float(np.ptp(self.points))).all(axis=(1, 2))
+        return faces[shown], np.tile(np.arange(len(self.cells)), len(self.kind.faces))[shown]
+
+
+class RigidTip(NamedTuple):
+    """A smooth rigid body that is pressed against points, without friction: they may touch it or come off.
+
+    Attributes
+    ----------
+    points : (n,) boolean array
+        Points of the mesh that may touch it.
+    start : float, mm
+        Where its tip is at first, along the axis.
+    radius : float, mm
+        Of a sphere whose centre is on the axis; infinite: a plane across it.
+    """
+
+    points: NDArray[np.bool_]
+    start: float
+    radius: float = inf
 
 
 class Supports(NamedTuple):
@@ -68,17 +138,20 @@ class Supports(NamedTuple):
     fixed : (n, 2) or (n, 3) boolean array
         Displacements that stay zero.
     moved : (n,) boolean array
-        Points whose displacement along the axis is given.
+        Points whose displacement along the axis is given; none where a tip is pressed against the body.
     direction : float
         1 or -1: along the axis or against it; less where symmetry leaves the points a part of the way.
     parts : float
         Number of such bodies, by symmetry, that bear the force side by side.
+    tip : RigidTip, optional
+        What is pressed against the body.
     """
 
     fixed: NDArray[np.bool_]
     moved: NDArray[np.bool_]
     direction: float
     parts: float = 1.0
+    tip: RigidTip | None = None
 
 
 @dataclass(frozen=True)

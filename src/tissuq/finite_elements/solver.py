@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.case import AXIAL, Case
+from tissuq.finite_elements.contact import Contact, Touch
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.mechanics import Material
 
@@ -92,11 +93,10 @@ class Solver:
         self._bulk_ratio = bulk_ratio
         self._umat = FElupeMaterial(material, values=values)
         self._modulus = self._umat.unit = _stiffness(material, self._umat.energy.initial_shear_modulus)
-        if mesh.is_solid:
-            region = fem.RegionHexahedron(fem.Mesh(*mesh, "hexahedron"))
-            field, width = fem.Field(region, dim=3), 1.0
+        region = getattr(fem, mesh.kind.region)(fem.Mesh(mesh.points, mesh.cells, mesh.kind.meshio))
+        if mesh.is_solid or mesh.is_plane:
+            field, width = fem.Field(region, dim=3) if mesh.is_solid else fem.FieldPlaneStrain(region, dim=2), 1.0
         else:
-            region = fem.RegionQuad(fem.Mesh(*mesh, "quad"))
             field = fem.FieldAxisymmetric(region, dim=2)
             width = 2 * np.pi * field.radius
         self._field = fem.FieldContainer([field])
@@ -106,6 +106,7 @@ class Solver:
         held[:, AXIAL] |= supports.moved
         self._held, self._free = np.flatnonzero(held.ravel()), np.flatnonzero(~held.ravel())
         self._moved = supports.moved
+        self._contact = Contact.of(mesh, supports, width * region.dV) if supports.tip else None
         self._rate = np.zeros_like(mesh.points)
         self._rate[supports.moved, AXIAL] = supports.direction
         self._path = [(0.0, np.zeros_like(mesh.points))]
@@ -131,13 +132,16 @@ class Solver:
 
     def force(self) -> float:
         """Return the force (N) that moves the moved points on."""
-        internal = self._residual(self._path[-1][1]).reshape(self._rate.shape)[self._moved, AXIAL]
+        travel, u = self._path[-1]
+        if self._contact:
+            return float(self._parts * self._contact.at(u, travel).force * self._modulus)
+        internal = self._residual(u, travel).reshape(self._rate.shape)[self._moved, AXIAL]
         return float(self._parts * internal.sum() * np.sign(self._rate.sum()) * self._modulus)
 
     def fields(self) -> CellFields:
         """Return the displacements, and means over cells weighted by volume."""
-        u = self._path[-1][1]
-        self._residual(u)
+        travel, u = self._path[-1]
+        self._residual(u, travel)
         F, J, squares = self._strains()
         cauchy = np.einsum("ijqc,kjqc->ikqc", self._solid.results.stress[0], F) / J * self._modulus
         deviator = cauchy - np.einsum("iiqc->qc", cauchy) / 3 * np.eye(3)[:, :, None, None]
@@ -152,7 +156,7 @@ class Solver:
 
     def shares_beyond(self, max_invariants: tuple[float, float]) -> tuple[float, float]:
         """Return the shares of volume and of strain energy where I1 - 3 or I2 - 3 is beyond the given ones."""
-        self._residual(self._path[-1][1])
+        self._residual(*self._path[-1][::-1])
         F, _, squares = self._strains()
         max_1, max_2 = max_invariants
         is_beyond = (squares.sum(axis=-1) - 3 > max_1) | ((1 / squares).sum(axis=-1) - 3 > max_2)
@@ -162,12 +166,10 @@ class Solver:
 
     def strain_path(self) -> StrainPath:
         """Return how the body deforms around the last equilibrium."""
-        from scipy.sparse.linalg import spsolve
-
-        u, rates = self._path[-1][1], self._rate.ravel().copy()
-        self._residual(u)
-        tangent = self._solid.assemble.matrix().tocsr()[self._free]
-        rates[self._free] = spsolve(tangent[:, self._free].tocsc(), -tangent[:, self._held] @ rates[self._held])
+        travel, u = self._path[-1]
+        self._residual(u, travel)
+        touch = self._contact.at(u, travel) if self._contact else None
+        rates = self._rates(touch)
         F, J, _ = self._strains()
         self._field[0].values[:] = rates.reshape(u.shape)
         F_rate = self._field.extract()[0] - np.eye(3)[:, :, None, None]
@@ -175,16 +177,19 @@ class Solver:
         matrices, matrix_rates = (np.moveaxis(each, (0, 1), (-2, -1)).reshape(-1, 3, 3) for each in (F, F_rate))
         left, stretches, right = np.linalg.svd(matrices)
         log_rates = np.einsum("nia,nij,naj->na", left, matrix_rates, right) / stretches
-        share = np.abs(self._rate).max()
+        share = np.abs(self._rate).max() if touch is None else 1.0
         cells = self._volumes.sum(axis=0)
         J_rate = J * log_rates.sum(axis=1).reshape(J.shape)
         J_mean, J_mean_rate = ((values * self._volumes).sum(axis=0) / cells for values in (J, J_rate))
+        volumetric = self._bulk_ratio * ((J_mean - 1) * J_mean_rate * cells).sum() / share
+        if touch:  # what the tip's own elasticity takes
+            volumetric += self._parts * (touch.residual @ rates + touch.force)
         logs = np.log(stretches)
         return StrainPath(
             logs - logs.mean(axis=1, keepdims=True),
             log_rates - log_rates.mean(axis=1, keepdims=True),
             self._volumes.ravel() / share,
-            float(self._bulk_ratio * ((J_mean - 1) * J_mean_rate * cells).sum() / share),
+            float(volumetric),
         )
 
     def _strains(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -197,13 +202,30 @@ class Solver:
     def _attempt(self, goal: float) -> str:
         """Add the equilibrium at a travel to the path, from the last one or from where the last two point."""
         state, problem = self._state(), ""
-        for guess in (self._path[-1][1], self._extrapolated(goal)):
+        for guess in (self._predicted(goal), self._extrapolated(goal)):
             displacement, problem = self._equilibrium(guess, goal)
             if displacement is not None:
                 self._path = [self._path[-1], (goal, displacement)]
                 return ""
             self._restore(state)
         return problem
+
+    def _predicted(self, goal: float) -> FloatArray:
+        """Return the last displacements, or where the tip would carry them if all points in touch stayed so."""
+        travel, u = self._path[-1]
+        if self._contact is None:
+            return u
+        self._residual(u, travel)
+        return np.asarray(u + (goal - travel) * self._rates(self._contact.at(u, travel)).reshape(u.shape))
+
+    def _rates(self, touch: Touch | None) -> FloatArray:
+        """Return the displacements (d n,) by a unit of travel around the state that was computed last."""
+        from scipy.sparse.linalg import spsolve
+
+        rates, tangent = self._rate.ravel().copy(), self._tangent(touch)
+        right = -tangent[:, self._held] @ rates[self._held] - (touch.residual_rate[self._free] if touch else 0.0)
+        rates[self._free] = spsolve(tangent[:, self._free].tocsc(), right)
+        return rates
 
     def _extrapolated(self, goal: float) -> FloatArray:
         """Return displacements on the straight line through the last two equilibria."""
@@ -215,7 +237,7 @@ class Solver:
         """Return displacements in equilibrium, or the reason why Newton's method found none."""
         from scipy.sparse.linalg import spsolve
 
-        u, residual, prescribed = guess, self._residual(guess), self._rate * travel
+        u, residual, prescribed = guess, self._residual(guess, travel), self._rate * travel
         moved = self._rate != 0
         fractions: Sequence[float] = STEP_FRACTIONS
         if not np.allclose(u[moved], prescribed[moved]):
@@ -223,14 +245,14 @@ class Solver:
         for _ in range(MAX_ITERATIONS):
             if not np.isfinite(residual).all():
                 return None, "cells turned inside out"
-            tangent = self._solid.assemble.matrix().tocsr()[self._free]
+            tangent = self._tangent(self._contact.at(u, travel) if self._contact else None)
             change = np.zeros(u.size)
             change[self._held] = (prescribed - u).ravel()[self._held]
             right = -residual[self._free] - tangent[:, self._held] @ change[self._held]
             change[self._free] = spsolve(tangent[:, self._free].tocsc(), right)
             self.iterations += 1
             previous = residual
-            u, residual = self._step(u, residual, change.reshape(u.shape), fractions)
+            u, residual = self._step(u, travel, residual, change.reshape(u.shape), fractions)
             fractions = STEP_FRACTIONS
             if self._is_balanced(residual, previous):
                 return u, ""
@@ -243,26 +265,31 @@ class Solver:
         return free < TOLERANCE * held or previous_free / 2 < free < ROUNDING_TOLERANCE * held
 
     def _step(
-        self, u: FloatArray, residual: FloatArray, change: FloatArray, fractions: Sequence[float]
+        self, u: FloatArray, travel: float, residual: FloatArray, change: FloatArray, fractions: Sequence[float]
     ) -> tuple[FloatArray, FloatArray]:
         """Return displacements and residual after the largest fraction of a change that is within the limit."""
         state, limit = self._state(), MAX_RESIDUAL_GROWTH * np.linalg.norm(residual[self._free])
         for share in fractions:
             self._restore(state)
             tried = u + share * change
-            tried_residual = self._residual(tried)
+            tried_residual = self._residual(tried, travel)
             if np.linalg.norm(tried_residual[self._free]) < limit:
                 break
         return tried, tried_residual
 
-    def _residual(self, u: FloatArray) -> FloatArray:
-        """Return the internal forces of displacements (n, d), (d n,), in initial shear moduli times mm^2."""
+    def _tangent(self, touch: Touch | None) -> Any:
+        """Return the rows of the stiffness matrix of what is free."""
+        stiffness = self._solid.assemble.matrix().tocsr()
+        return (stiffness if touch is None else stiffness + touch.stiffness)[self._free]
+
+    def _residual(self, u: FloatArray, travel: float) -> FloatArray:
+        """Return the forces of displacements (n, d) at a travel, (d n,), in initial shear moduli times mm^2."""
         self._field[0].values[:] = u
         try:
             internal = self._solid.assemble.vector(self._field).toarray()
         except np.linalg.LinAlgError:
             return np.full(u.size, np.nan)
-        return np.asarray(internal[:, 0])
+        return np.asarray(internal[:, 0] + (self._contact.at(u, travel).residual if self._contact else 0.0))
 
     def _state(self) -> State:
         """Return displacements, pressures and volumes, which Newton's method changes together."""

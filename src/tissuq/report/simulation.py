@@ -167,7 +167,7 @@ def _summary(study: SimulationStudy, table: pd.DataFrame) -> dict[str, Any]:
     simulation = study.simulation
     last = {key: None if value != value else value for key, value in table.iloc[-1].to_dict().items()}
     return {
-        "case": study.settings.case,
+        "case": simulation.case.name,
         "sizes": vars(simulation.case),
         "draws": len(simulation.forces[COMPLETE]),
         "complete_draws": int(np.isfinite(simulation.forces[COMPLETE][:, -1]).sum()),
@@ -282,7 +282,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
             f"of the force: sd {noise}{said}."
         )
         sections.append(Section("Sources of uncertainty", (words,)))
-    if len(simulation.fields.get("largest", ())) > 1:
+    if len(simulation.fields.get("largest", ())) > 1 and len(simulation.case.mesh().section[0]):
         fields = Picture(
             "fields", lambda: figures()["fields"], "Deformed section with mean and standard deviation of the largest "
             "stretch",
@@ -302,7 +302,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         f" On a mesh of twice the fineness the force of one draw at {change[1]:.3g} mm changes by "
         f"{100 * change[0]:+.1f} %."
         if change
-        else ""
+        else " How far the force is off by the size of the cells is not known: compute it with a finer mesh, too."
     )
     mesh = simulation.case.mesh()
     computed = (
@@ -310,14 +310,14 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         f"{draws} draws of the posterior, each stable in every loading mode over the measured range, each a complete "
         f"material including the discrepancy in the energy. Bulk modulus: {settings.bulk_ratio:g} times the draw's "
         "initial shear modulus.",
-        f"{len(mesh.cells)} {'hexahedra' if mesh.is_solid else 'axisymmetric quadrilaterals'} with one pressure and "
+        f"{len(mesh.cells)} {mesh.words} with one pressure and "
         "one volume each (mean dilatation), FElupe's; Newton's method with load steps that are halved where it fails."
         f"{finer}",
         *_first_order(simulation),
         "Numbers after ± are bootstrap standard errors from the number of draws. "
         f"{simulation.seconds:.0f} s of one processor.",
     )
-    sizes = [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items()]
+    sizes = [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items() if value]
     return (*sections, Section("How it was computed", (computed, Table(["size", "value"], sizes))))
 
 
@@ -335,10 +335,12 @@ def _first_order(simulation: Simulation) -> Iterator[str]:
         )
 
 
-def _size(name: str, value: float | str) -> str:
+def _size(name: str, value: float | str | dict[str, str]) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {word}" for key, word in value.items())
     if isinstance(value, str):
         return value
-    return f"{value:g}" if name == "fineness" else f"{value:g} mm"
+    return f"{value:g}" if name in ("fineness", "parts") else f"{value:g} mm"
 
 
 def _lead(simulation: Simulation, table: pd.DataFrame) -> str:

@@ -79,7 +79,7 @@ def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str,
         figures = {"forces": _forces(simulation, table_of_bands)}
         if MATERIAL_ONLY in simulation.forces:
             figures["shares"] = _shares(simulation, table_of_bands)
-        if len(simulation.fields.get("largest", ())) > 1:
+        if len(simulation.fields.get("largest", ())) > 1 and len(simulation.case.mesh().section[0]):
             figures["fields"] = _fields(simulation)
     return figures
 
@@ -188,7 +188,7 @@ def _fields(simulation: Simulation) -> Figure:
     largest = simulation.fields["largest"][:, cells]
     deformed = mesh.points + simulation.fields["displacement"].mean(axis=0)
     corners = deformed[faces, :2]
-    limits = _limits(corners, largest.mean(axis=0) - 1)
+    limits = _limits(corners, largest.mean(axis=0) - 1, mesh.is_half)
     height = 3.8 * min(1.1, max(0.3, limits[3] - limits[2]) / (limits[1] - limits[0])) + 1.3
     figure = Figure(figsize=(10.4, height))
     for axis, values, title, colors in zip(
@@ -196,36 +196,38 @@ def _fields(simulation: Simulation) -> Figure:
         ("Largest principal stretch: mean of the draws", "and its standard deviation between draws"),
         ("viridis", "magma"), strict=True,
     ):  # fmt: skip
-        _draw_section(axis, corners, values, colors, figure)
+        _draw_section(axis, corners, values, colors, figure, mesh.is_half)
         axis.set_title(title)
         axis.set_xlim(limits[0], limits[1])
         axis.set_ylim(limits[2], limits[3])
-        axis.set_xlabel("distance from the axis [mm]")
+        axis.set_xlabel("distance from the axis [mm]" if mesh.is_half else "across the axis [mm]")
     figure.axes[0].set_ylabel("along the axis [mm]")
     return figure
 
 
-def _limits(corners: FloatArray, strain: FloatArray) -> tuple[float, float, float, float]:
+def _limits(corners: FloatArray, strain: FloatArray, is_half: bool) -> tuple[float, float, float, float]:
     """Return the part of the section that is shown: where it is strained, with some of the rest."""
     body = corners.reshape(-1, 2)
     shown = corners[strain > MIN_STRAIN * strain.max()].reshape(-1, 2)
     low, high = shown.min(axis=0), shown.max(axis=0)
-    margin = MARGIN * (high - low)[AXIAL], MARGIN * high[ACROSS]
+    margin = MARGIN * (high - low)[AXIAL], MARGIN * (high[ACROSS] if is_half else (high - low)[ACROSS])
     right = min(high[ACROSS] + margin[1], body[:, ACROSS].max())
+    left = -right if is_half else max(low[ACROSS] - margin[1], body[:, ACROSS].min())
     bottom, top = max(low[AXIAL] - margin[0], body[:, AXIAL].min()), min(high[AXIAL] + margin[0], body[:, AXIAL].max())
-    air = 0.03 * (top - bottom)
-    return -1.02 * right, 1.02 * right, bottom - air, top + air
+    air, aside = 0.03 * (top - bottom), 0.01 * (right - left)
+    return left - aside, right + aside, bottom - air, top + air
 
 
-def _draw_section(axis: Axes, corners: FloatArray, values: FloatArray, colors: str, figure: Figure) -> None:
-    """Draw both halves of a section through the axis."""
+def _draw_section(
+    axis: Axes, corners: FloatArray, values: FloatArray, colors: str, figure: Figure, is_half: bool
+) -> None:
+    """Draw a section, or both of its halves."""
     from matplotlib.collections import PolyCollection
 
-    half = corners[:, :, [ACROSS, AXIAL]]
-    section = np.concatenate([half, half * [-1, 1]])
-    drawn = PolyCollection(
-        list(section), array=np.tile(values, 2), cmap=colors, edgecolors=(0, 0, 0, 0.25), linewidths=0.3
-    )
+    section = corners[:, :, [ACROSS, AXIAL]]
+    if is_half:
+        section, values = np.concatenate([section, section * [-1, 1]]), np.tile(values, 2)
+    drawn = PolyCollection(list(section), array=values, cmap=colors, edgecolors=(0, 0, 0, 0.25), linewidths=0.3)
     axis.add_collection(drawn)
     axis.set_aspect("equal")
     figure.colorbar(drawn, ax=axis, shrink=0.85)
@@ -234,17 +236,15 @@ def _draw_section(axis: Axes, corners: FloatArray, values: FloatArray, colors: s
 def write_vtu(
     path: Path, mesh: Mesh, points: Mapping[str, NDArray[np.float64]], cells: Mapping[str, NDArray[np.float64]]
 ) -> None:
-    """Write a mesh with fields of its points and its cells; x is the distance from the axis, y is along it.
+    """Write a mesh with fields of its points and its cells; unless it has axes of its own, y is along the axis.
 
     Fields of points with several columns are displacements with the axes of the mesh, and become vectors.
     """
     import meshio
 
-    fields = {name: _vectors(values) if values.ndim > 1 else values for name, values in points.items()}
+    fields = {name: mesh.vectors(values) if values.ndim > 1 else values for name, values in points.items()}
     blocks = {name: [values] for name, values in cells.items()}
-    written = meshio.Mesh(
-        _vectors(mesh.points), [("hexahedron" if mesh.is_solid else "quad", mesh.cells)], fields, blocks
-    )
+    written = meshio.Mesh(mesh.vectors(mesh.points), [(mesh.kind.meshio, mesh.cells)], fields, blocks)
     written.write(path, file_format="vtu", binary=False)
 
 
@@ -256,8 +256,3 @@ def write_collection(path: Path, files: Sequence[tuple[float, str]]) -> None:
         SubElement(collection, "DataSet", timestep=f"{time:.12g}", part="0", file=name)
     indent(file)
     ElementTree(file).write(path, encoding="utf-8", xml_declaration=True)
-
-
-def _vectors(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    height = values[:, 2] if values.shape[1] > 2 else np.zeros(len(values))
-    return np.stack([values[:, ACROSS], values[:, AXIAL], -height], axis=-1)  # right-handed as before

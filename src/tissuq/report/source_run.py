@@ -7,10 +7,12 @@ import shutil
 from pathlib import Path
 
 from tissuq.errors import InputError
+from tissuq.finite_elements.case import Case
+from tissuq.finite_elements.mesh_file import BodyFromFile
 from tissuq.report.run_folder import INPUT, RECIPE
 from tissuq.studies.earlier_run import POSTERIORS
 
-__all__ = ["SOURCE", "check_source", "copy_source"]
+__all__ = ["SOURCE", "check_mesh", "check_source", "copy_mesh", "copy_source", "stored_mesh"]
 
 SOURCE = "source"
 """The folder with the copies."""
@@ -47,3 +49,28 @@ def copy_source(run: Path, folder: Path) -> None:
             (scratch / name).parent.mkdir(exist_ok=True)
             shutil.copyfile(run / name, scratch / name)
         scratch.rename(stored)
+
+
+def stored_mesh(mesh: str | None) -> dict[str, str]:
+    """Return what the recipe of a simulation says of the mesh that it is of, if there is one."""
+    return {} if mesh is None else {"mesh": f"mesh{Path(mesh).suffix}"}
+
+
+def check_mesh(case: Case, folder: Path) -> None:
+    """Refuse a folder that holds a simulation of another mesh.
+
+    Raises
+    ------
+    InputError
+        When it does.
+    """
+    if isinstance(case, BodyFromFile):
+        stored = folder / stored_mesh(case.file)["mesh"]
+        if stored.is_file() and stored.read_bytes() != case.content():
+            raise InputError(f"'{folder}' holds a simulation of another mesh; choose another folder with --out.")
+
+
+def copy_mesh(case: Case, folder: Path) -> None:
+    """Copy the mesh that a case is of, if it is of one, into the folder of a simulation."""
+    if isinstance(case, BodyFromFile):
+        (folder / stored_mesh(case.file)["mesh"]).write_bytes(case.content())

@@ -97,6 +97,7 @@ def run_simulation(
     posteriors: Posteriors,
     folder: Path,
     *,
+    beside: Path = Path(),
     prepare: Callable[[], None] = lambda: None,
     pool: Executor | None = None,
     progress: Callable[[int], AbstractContextManager[Step]] = lambda total: nullcontext(silent),
@@ -109,6 +110,8 @@ def run_simulation(
     posteriors : Posteriors
     folder : Path
         Exists, or `prepare` makes it; holds the results so far, if any.
+    beside : Path
+        Where the mesh lies, unless its name is absolute.
     prepare : callable
         Called when it is certain that there is something to compute.
     pool : Executor, optional
@@ -130,7 +133,7 @@ def run_simulation(
 
     simulation = simulate(
         posteriors.fitted,
-        settings.sized_case(),
+        settings.sized_case(beside),
         settings.draws,
         without=posteriors.without,
         steps=settings.steps,

@@ -1,0 +1,321 @@
+"""Bodies of the user's own: a mesh in a file that meshio reads, by whose sets of points it is held and moved."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import redirect_stdout
+from dataclasses import dataclass, field
+from hashlib import sha256
+from io import StringIO
+from math import inf
+from pathlib import Path
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tissuq.errors import InputError
+from tissuq.finite_elements.case import AXIAL, CELL_KINDS, Case, FloatArray, Mesh, RigidTip, Supports
+
+__all__ = ["BodyFromFile", "MeshFile", "read_mesh"]
+
+Shape = Literal["axisymmetric", "plane", "solid"]
+
+AXES = "xyz"
+INCLUDE = re.compile(r"^\*INCLUDE\s*,\s*INPUT\s*=\s*(?P<file>[^\n]+)$", re.IGNORECASE | re.MULTILINE)
+PLANE_ELEMENT = re.compile(r"(TYPE\s*=\s*)(?:CAX|CPE|CPS)([468])\w*", re.IGNORECASE)
+AS_MESHIO_KNOWS_IT = {"4": "CPS4", "6": "CPE6", "8": "S8R"}
+ORIENTATIONS = {
+    "quad": ((1, 3), (0, 3, 2, 1)),
+    "quad8": ((1, 3), (0, 3, 2, 1, 7, 6, 5, 4)),
+    "triangle6": ((1, 2), (0, 2, 1, 5, 4, 3)),
+    "hexahedron": ((1, 3, 4), (0, 3, 2, 1, 4, 7, 6, 5)),
+    "hexahedron20": ((1, 3, 4), (0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17)),
+    "tetra10": ((1, 2, 3), (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)),
+}
+"""Points that lie along the axes of a cell from its first one, and the order of its points in its mirror image."""
+WITHOUT_CONTACT = ("quad8", "hexahedron20")
+"""Cells whose corners a constant pressure pulls outwards, so that points cannot be held by contact one by one."""
+NEARLY = 1e-6
+"""Distance from the end of a body within which a point is at it, over the size of the body."""
+
+
+class MeshFile(NamedTuple):
+    """What a file holds: points (n, 2 or 3), mm, cells (c, k) of one kind, and sets of points by name."""
+
+    points: FloatArray
+    cells: NDArray[np.intp]
+    sets: Mapping[str, NDArray[np.intp]]
+
+
+def read_mesh(path: Path) -> MeshFile:
+    """Return the mesh in a file, with the sets in it and those at its ends, ``xmin`` to ``zmax``.
+
+    Sets are those of points (``*NSET``), and the points of named groups of cells (physical groups of Gmsh, ``*ELSET``).
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, or has no cells of a kind that can be used, or several.
+    """
+    import meshio
+
+    try:
+        with redirect_stdout(StringIO()):
+            is_deck = path.suffix.lower() == ".inp"
+            found = meshio.read(StringIO(_deck_text(path)), "abaqus") if is_deck else meshio.read(path)
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read: {error.strerror or error}.") from error
+    except (Exception, SystemExit) as error:  # meshio's readers raise whatever a damaged file leads to, or exit
+        reason = str(error) if not isinstance(error, SystemExit) else "it is none of the formats that its name says"
+        raise InputError(f"'{path}' cannot be read as a mesh ({reason or type(error).__name__}).") from error
+    return _used(path, found)
+
+
+def _deck_text(path: Path, depth: int = 0) -> str:
+    """Return a deck with its included files, and names of plane elements that meshio knows."""
+    if depth > 10:
+        raise ValueError("files include each other")
+    text = path.read_text(encoding="utf-8", errors="replace").replace("\r\n", "\n")
+    text = INCLUDE.sub(lambda match: _deck_text(path.parent / match["file"].strip(), depth + 1).rstrip("\n"), text)
+    return PLANE_ELEMENT.sub(lambda match: match[1] + AS_MESHIO_KNOWS_IT[match[2]], text)
+
+
+def _used(path: Path, found: Any) -> MeshFile:
+    """Return the cells with most dimensions, the points that they use, and the sets among these."""
+    names = {kind.meshio: dimensions for (dimensions, _), kind in CELL_KINDS.items()}
+    blocks = [block for block in found.cells if block.dim == max(block.dim for block in found.cells)]
+    kinds = sorted({block.type for block in blocks})
+    if len(kinds) != 1 or kinds[0] not in names:
+        known = ", ".join(names)
+        linear = " Make triangles and tetrahedra of second order (gmsh -order 2)." * bool(
+            {"triangle", "tetra"} & {*kinds}
+        )
+        raise InputError(f"'{path}' has cells {', '.join(kinds) or 'of no kind'}; use one of {known}.{linear}")
+    cells = np.concatenate([block.data for block in blocks]).astype(np.intp)
+    used, cells = np.unique(cells, return_inverse=True)
+    cells = cells.reshape(len(cells.ravel()) // blocks[0].data.shape[1], -1)
+    dimensions = names[kinds[0]]
+    points = np.asarray(found.points, dtype=np.float64)[used]
+    size = float(np.ptp(points, axis=0).max())
+    if points[:, dimensions:].size and np.ptp(points[:, dimensions:], axis=0).max() > NEARLY * size:
+        raise InputError(f"'{path}' has plane cells in space; they must lie in the x-y plane.")
+    points = points[:, :dimensions]
+    numbers = np.full(len(found.points), -1)
+    numbers[used] = np.arange(len(used))
+    sets = {name: numbers[members] for name, members in _sets(found)}
+    ends = {
+        f"{AXES[axis]}{end}": np.flatnonzero(np.abs(points[:, axis] - value) < NEARLY * size)
+        for axis in range(dimensions)
+        for end, value in (("min", points[:, axis].min()), ("max", points[:, axis].max()))
+    }
+    return MeshFile(points, cells, ends | {name: members[members >= 0] for name, members in sets.items()})
+
+
+def _sets(found: Any) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Yield the sets of points of a file, and the points of its named groups of cells."""
+    for name, members in found.point_sets.items():
+        yield name, np.asarray(members, dtype=np.intp)
+    numbers = found.cell_data.get("gmsh:physical", ())
+    groups = {name: rows for name, rows in found.cell_sets.items() if not name.startswith("gmsh:")}
+    for name, (number, dimensions) in found.field_data.items():
+        blocks = zip(found.cells, numbers, strict=False)
+        groups[name] = [np.flatnonzero((of_block == number) & (block.dim == dimensions)) for block, of_block in blocks]
+    for name, rows in groups.items():
+        blocks = zip(found.cells, rows, strict=False)
+        parts = [block.data[np.asarray(row, dtype=np.intp)].ravel() for block, row in blocks if row is not None]
+        yield name, np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *parts]))
+
+
+@dataclass(frozen=True)
+class BodyFromFile(Case):
+    """A body whose mesh is in a file: sets of points are held, and one is moved, or a rigid tip is pressed against it.
+
+    Coordinates are in mm. A body of revolution lies in the x-y plane, y being its axis; a plane one is in plane strain,
+    1 mm thick. Its error of the mesh is not known, unless it is computed with another mesh, too.
+
+    Parameters
+    ----------
+    file : str
+        Of a format that meshio reads: ``.msh``, ``.inp``, ``.vtu`` and others.
+    hold : mapping of str to str
+        The directions in which sets of points are held: ``{"BASE": "xyz"}``.
+    move : str, optional
+        The set that moves along ``axis`` by ``distance``.
+    press : str, optional
+        Instead: the set against which a tip is pressed without friction, which begins at its outermost point.
+    axis : str
+        ``"x"``, ``"y"`` or ``"z"``; of a body of revolution ``"y"``.
+    distance : float
+        How far, mm; negative: against the axis.
+    tip_radius : float
+        Of a sphere whose centre is where the other coordinates are zero, mm; zero: a plane.
+    shape : str, optional
+        ``"axisymmetric"`` or ``"plane"``, of a mesh with two dimensions.
+    parts : float
+        Number of such bodies, by symmetry, that bear the force side by side.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be used, there is no such set, or the body is left free to move as a whole.
+
+    Examples
+    --------
+    >>> import meshio, tempfile, tissuq as tq
+    >>> corners = [[0, 0], [2, 0], [2, 1], [0, 1]]
+    >>> path = tempfile.mkdtemp() + "/disc.vtu"
+    >>> meshio.Mesh([[*p, 0] for p in corners], [("quad", [[0, 1, 2, 3]])]).write(path)
+    >>> disc = tq.finite_elements.BodyFromFile(
+    ...     path, {"ymin": "y", "xmin": "x"}, move="ymax", axis="y", distance=-0.1, shape="axisymmetric"
+    ... )
+    >>> tq.finite_elements.respond(disc, tq.materials()["neo-hookean"](), [0.0005], steps=1).force.round(5).tolist()
+    [0.00438]
+    """
+
+    name: ClassVar[str] = "mesh"
+    description: ClassVar[str] = "a body whose mesh is in a file"
+    travel_name: ClassVar[str] = "travel"
+
+    file: str = field(default="", repr=False)
+    hold: Mapping[str, str] | None = None
+    move: str = ""
+    press: str = ""
+    axis: str = "y"
+    distance: float = 0.0
+    tip_radius: float = 0.0
+    shape: str = ""
+    parts: float = 1.0
+    digest: str = ""
+
+    def __post_init__(self) -> None:
+        if bool(self.move) == bool(self.press) or not self.file:
+            raise InputError("a body from a file needs its mesh, and either a set that moves or one that is pressed.")
+        if not (np.isfinite(self.distance) and self.distance and self.parts > 0 and self.tip_radius >= 0):
+            raise InputError(
+                f"a body from a file moves by a number of mm other than zero, not {self.distance:g}; its parts "
+                f"({self.parts:g}) and the radius of the tip ({self.tip_radius:g} mm) are positive numbers."
+            )
+        object.__setattr__(self, "hold", dict(self.hold or {}))
+        object.__setattr__(self, "digest", sha256(self.content()).hexdigest()[:16])
+        found = self._found()
+        dimensions = found.points.shape[1]
+        shape = self.shape or ("solid" if dimensions == 3 else "")
+        if shape not in get_args(Shape) or (shape == "solid") != (dimensions == 3):
+            wanted = "solid" if dimensions == 3 else "axisymmetric or plane"
+            raise InputError(
+                f"the mesh '{self.file}' has {dimensions} dimensions: its shape is {wanted}, not '{shape}'."
+            )
+        object.__setattr__(self, "shape", shape)
+        if self.axis not in (("y",) if shape == "axisymmetric" else tuple(AXES[:dimensions])):
+            wanted = "y, its axis" if shape == "axisymmetric" else ", ".join(AXES[:dimensions])
+            raise InputError(f"a body of the shape {shape} moves along {wanted}, not '{self.axis}'.")
+        if shape == "axisymmetric" and found.points[:, 0].min() < -NEARLY * float(np.ptp(found.points)):
+            raise InputError(f"the mesh '{self.file}' has points at negative x, the distance from the axis.")
+        if self.press and self._mesh_and_sets()[0].kind.meshio in WITHOUT_CONTACT:
+            raise InputError(f"a tip cannot be pressed against cells of the mesh '{self.file}'; use linear ones.")
+        self._check_held()
+
+    def content(self) -> bytes:
+        """Return the file, or a deck together with the files that it includes."""
+        try:
+            is_deck = self.file.lower().endswith(".inp")
+            return _deck_text(Path(self.file)).encode() if is_deck else Path(self.file).read_bytes()
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"the mesh '{self.file}' cannot be read: {reason}.") from error
+
+    @property
+    def travel(self) -> float:
+        return abs(self.distance)
+
+    def mesh(self) -> Mesh:
+        return self._mesh_and_sets()[0]
+
+    def supports(self, points: FloatArray) -> Supports:
+        _, sets = self._mesh_and_sets()
+        fixed, columns = np.zeros(points.shape, dtype=bool), self._columns
+        for name, axes in (self.hold or {}).items():
+            for axis in axes:
+                fixed[sets[name], columns.index(AXES.index(axis))] = True
+        chosen = np.zeros(len(points), dtype=bool)
+        chosen[sets[self.move or self.press]] = True
+        direction = float(np.sign(self.distance))
+        if self.move:
+            fixed[chosen, AXIAL] = False
+            return Supports(fixed, chosen, direction, self.parts)
+        outermost = float((direction * points[chosen, AXIAL]).min() * direction)
+        tip = RigidTip(chosen, outermost, self.tip_radius or inf)
+        return Supports(fixed, np.zeros(len(points), dtype=bool), direction, self.parts, tip)
+
+    @property
+    def _columns(self) -> tuple[int, ...]:
+        """The coordinates of the file that are along the axis, across it, and up, where the body is thinner."""
+        axis, sizes = AXES.index(self.axis), np.ptp(self._found().points, axis=0)
+        return axis, *sorted(set(range(len(sizes))) - {axis}, key=lambda other: -sizes[other])
+
+    def _found(self) -> MeshFile:
+        return _read_once(self.file, self.digest)
+
+    def _mesh_and_sets(self) -> tuple[Mesh, Mapping[str, NDArray[np.intp]]]:
+        found, columns = self._found(), self._columns
+        points = found.points[:, columns]
+        is_half = self.shape == "axisymmetric"
+        xyz = tuple(columns.index(axis) for axis in range(len(columns)))
+        mesh = Mesh(points, found.cells, self.shape == "plane", is_half, xyz)
+        ends, order = map(list, ORIENTATIONS[mesh.kind.meshio])
+        corners = points[found.cells]
+        turned = np.linalg.det(corners[:, ends] - corners[:, :1]) < 0
+        cells = np.where(turned[:, None], found.cells[:, order], found.cells)
+        return mesh._replace(cells=cells), found.sets
+
+    def _check_held(self) -> None:
+        """Refuse sets that there are not, and supports that leave the body free to move as a whole."""
+        mesh, sets = self._mesh_and_sets()
+        axes = AXES[: mesh.points.shape[1]]
+        for name in (*(self.hold or {}), self.move or self.press):
+            if name not in sets or not len(sets[name]):
+                raise InputError(
+                    f"the mesh '{self.file}' has no set of points '{name}'; its sets are {', '.join(sets)}."
+                )
+        for name, directions in (self.hold or {}).items():
+            if not directions or set(directions) - set(axes):
+                raise InputError(f"the set '{name}' is held in directions such as {axes}, not '{directions}'.")
+        supports = self.supports(mesh.points)
+        held = supports.fixed.copy()
+        held[:, AXIAL] |= supports.moved
+        motions = _rigid_motions(mesh.points, self.shape)
+        free = len(motions) - np.linalg.matrix_rank(motions[:, held], tol=1e-6)
+        if free:
+            raise InputError(
+                f"the supports leave the body of '{self.file}' free to move or turn as a whole ({free} of "
+                f"{len(motions)} ways): hold more sets, such as ymin={axes}."
+            )
+
+
+_READ: dict[str, MeshFile] = {}
+
+
+def _read_once(file: str, digest: str) -> MeshFile:
+    """Return the mesh of a file whose content has this digest; it is read once a process."""
+    if digest not in _READ:
+        _READ.clear()
+        _READ[digest] = read_mesh(Path(file))
+    return _READ[digest]
+
+
+def _rigid_motions(points: FloatArray, shape: str) -> FloatArray:
+    """Return the displacements (m, n, d) of the motions that leave a body as it is, of a size of one."""
+    centred = (points - points.mean(axis=0)) / np.ptp(points)
+    count, dimensions = points.shape
+    if shape == "axisymmetric":
+        return np.asarray(np.broadcast_to(np.eye(2)[AXIAL], (1, count, 2)))
+    shifts = [np.broadcast_to(axis, points.shape) for axis in np.eye(dimensions)]
+    turns = []
+    for first in range(dimensions):
+        for second in range(first):
+            turn = np.zeros_like(points)
+            turn[:, first], turn[:, second] = -centred[:, second], centred[:, first]
+            turns.append(turn)
+    return np.stack([*shifts, *turns])

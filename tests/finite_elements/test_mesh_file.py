@@ -1,0 +1,198 @@
+"""Bodies from files: every kind of cell against closed forms, contact against Hertz, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tissuq.errors import InputError
+from tissuq.experiments.modes import loading_mode
+from tissuq.finite_elements import BodyFromFile, SphericalIndentation, first_order, respond
+from tissuq.finite_elements.mesh_file import read_mesh
+from tissuq.finite_elements.solver import Solver
+from tissuq.mechanics import engineering_stress, material_named
+
+fem = pytest.importorskip("felupe", reason="FElupe is not installed")
+meshio = pytest.importorskip("meshio", reason="meshio is not installed")
+
+YEOH, VALUES = material_named("yeoh"), [1e-3, 2e-3, 1e-3]
+WIDTH, HEIGHT, DEPTH = 2.0, 3.0, 1.5
+
+
+def _meshes():
+    """Blocks and rectangles of every kind of cell, by name."""
+    cube = fem.Cube(b=(WIDTH, HEIGHT, DEPTH), n=3)
+    square = fem.Rectangle(b=(WIDTH, HEIGHT), n=3)
+    return {
+        "hexahedron": cube,
+        "hexahedron20": cube.add_midpoints_edges(),
+        "tetra10": cube.triangulate().add_midpoints_edges(),
+        "quad": square,
+        "quad8": square.add_midpoints_edges(),
+        "triangle6": square.triangulate().add_midpoints_edges(),
+    }
+
+
+def _written(path, name, mirrored=False):
+    mesh = _meshes()[name]
+    points = np.pad(mesh.points, ((0, 1), (0, 3 - mesh.dim)))  # the last point is in no cell
+    points[-1] = 50.0, 0.0, 0.0
+    points = points * [1, -1 if mirrored else 1, 1]
+    meshio.Mesh(points, [(name, mesh.cells)]).write(path)
+    return str(path)
+
+
+def _stress(mode, stretch):
+    return float(np.ravel(engineering_stress(YEOH, loading_mode(mode), [stretch], [VALUES]))[0])
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("name", ["hexahedron", "hexahedron20", "tetra10"])
+def test_a_block_that_is_pulled_is_in_uniaxial_tension(tmp_path, name, axis):
+    path = _written(tmp_path / "block.vtu", name, mirrored=axis == "x")
+    hold = {"xmin": "x", "ymax" if axis == "x" else "ymin": "y", "zmin": "z"}
+    length = dict(zip("xyz", (WIDTH, HEIGHT, DEPTH), strict=True))[axis]
+    case = BodyFromFile(path, hold, move=f"{axis}max", axis=axis, distance=0.2 * length, parts=4.0)
+    found = respond(case, YEOH, VALUES, steps=2, bulk_ratio=1e5)
+    area = WIDTH * HEIGHT * DEPTH / length
+    expected = [4 * area * _stress("uniaxial", stretch) for stretch in (1.1, 1.2)]
+    np.testing.assert_allclose(found.force, expected, rtol=1e-4)
+    assert found.fields.largest == pytest.approx(1.2, rel=1e-4)
+
+
+@pytest.mark.parametrize("shape", ["axisymmetric", "plane"])
+@pytest.mark.parametrize("name", ["quad", "quad8", "triangle6"])
+def test_a_cylinder_and_a_sheet_have_the_force_of_their_state(tmp_path, name, shape):
+    path = _written(tmp_path / "block.vtu", name)
+    case = BodyFromFile(path, {"ymin": "y", "xmin": "x"}, move="ymax", distance=-0.3, shape=shape)
+    found = respond(case, YEOH, VALUES, steps=1, bulk_ratio=1e5)
+    stress, area = (_stress("uniaxial", 0.9), np.pi * WIDTH**2) if shape == "axisymmetric" else (
+        _stress("planar", 0.9), WIDTH)  # fmt: skip
+    assert found.force[0] == pytest.approx(-stress * area, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["hexahedron", "tetra10", "quad", "triangle6"])
+def test_a_plane_that_is_pressed_on_a_block_compresses_it(tmp_path, name):
+    """The penalty lets the block be a little longer than the way of the plane."""
+    path = _written(tmp_path / "block.vtu", name)
+    is_solid = _meshes()[name].dim == 3
+    hold = {"xmin": "x", "ymin": "y"} | ({"zmin": "z"} if is_solid else {})
+    case = BodyFromFile(path, hold, press="ymax", distance=-0.3, shape="" if is_solid else "axisymmetric")
+    found = respond(case, YEOH, VALUES, steps=2, bulk_ratio=1e5)
+    area = WIDTH * DEPTH if is_solid else np.pi * WIDTH**2
+    expected = [-area * _stress("uniaxial", 1 - travel / HEIGHT) for travel in found.travel]
+    np.testing.assert_allclose(found.force, expected, rtol=0.01)
+    assert (found.force < expected).all()
+
+
+@pytest.mark.finite_elements
+def test_a_shallow_sphere_has_the_force_of_hertz():
+    """F = 16/9 E sqrt(R) d^1.5 of an incompressible half space, E = 3 mu."""
+    modulus = 2e-3
+    case = SphericalIndentation(depth=0.01, tip_radius=1.0, height=15.0, radius=15.0, fineness=2.0)
+    found = respond(case, material_named("neo-hookean"), [modulus / 2], steps=2)
+    np.testing.assert_allclose(found.force, 16 / 9 * 3 * modulus * found.travel**1.5, rtol=3e-3)
+
+
+def test_a_sphere_is_also_one_of_a_mesh(tmp_path):
+    sizes = {"depth": 0.3, "fineness": 0.3}
+    wanted = SphericalIndentation(**sizes)
+    points = wanted.mesh().points[:, ::-1]
+    flipped = wanted.mesh().cells[:, [0, 3, 2, 1]]
+    meshio.Mesh(np.pad(points, ((0, 0), (0, 1))), [("quad", flipped)]).write(tmp_path / "disc.vtu")
+    case = BodyFromFile(
+        str(tmp_path / "disc.vtu"), {"ymin": "xy", "xmin": "x"}, press="ymax", distance=-0.3, tip_radius=1.5,
+        shape="axisymmetric",
+    )  # fmt: skip
+    one, other = (respond(kind, YEOH, VALUES, steps=2).force for kind in (wanted, case))
+    np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+def test_the_power_of_stresses_on_the_rates_of_strain_is_the_force_under_a_tip(posterior):
+    """What follows to first order from a draw is exact for that draw itself."""
+    case, draws = SphericalIndentation(depth=0.3, fineness=0.3), posterior.ensemble(4)
+    followed = first_order.first_order_forces(case, draws, draws[1], 2, 2000.0)
+    np.testing.assert_allclose(followed.forces[1], respond(case, draws[1], steps=2).force, rtol=1e-6)
+
+
+def test_forces_are_the_same_with_the_axes_in_another_order(tmp_path):
+    """A clamped block, whose fields are not uniform, lying in three ways."""
+    mesh = _meshes()["hexahedron"]
+    forces = []
+    for axis in range(3):
+        points = np.roll(mesh.points, axis, axis=1)
+        meshio.Mesh(points, [("hexahedron", mesh.cells)]).write(tmp_path / f"{axis}.vtu")
+        name = "xyz"[(axis + 1) % 3]
+        case = BodyFromFile(
+            str(tmp_path / f"{axis}.vtu"), {f"{name}min": "xyz", f"{name}max": "xyz".replace(name, "")},
+            move=f"{name}max", axis=name, distance=0.4,
+        )  # fmt: skip
+        forces.append(respond(case, YEOH, VALUES, steps=1).force[0])
+        assert Solver(case, YEOH, VALUES, 100.0)._volumes.sum() == pytest.approx(WIDTH * HEIGHT * DEPTH)
+        vectors = case.mesh().vectors(case.mesh().points)
+        np.testing.assert_allclose(np.sort(vectors, axis=0), np.sort(points, axis=0))
+    np.testing.assert_allclose(forces, forces[0], rtol=1e-7)
+
+
+DECK = """*INCLUDE, INPUT=points.inp
+*ELEMENT, TYPE=CAX4H, ELSET=DISC
+1, 1, 2, 5, 4
+2, 2, 3, 6, 5
+*NSET, NSET=Bottom
+1, 2, 3
+"""
+
+
+def test_a_deck_gives_its_mesh_and_its_sets(tmp_path):
+    (tmp_path / "points.inp").write_text(
+        "*NODE\n" + "".join(f"{n + 1}, {n % 3}., {n // 3}.\n" for n in range(6)), encoding="utf-8"
+    )
+    (tmp_path / "disc.inp").write_text(DECK, encoding="utf-8")
+    found = read_mesh(tmp_path / "disc.inp")
+    assert found.cells.tolist() == [[0, 1, 4, 3], [1, 2, 5, 4]]
+    assert {name: members.tolist() for name, members in found.sets.items()} == {
+        "xmin": [0, 3], "xmax": [2, 5], "ymin": [0, 1, 2], "ymax": [3, 4, 5],
+        "Bottom": [0, 1, 2], "DISC": [0, 1, 2, 3, 4, 5],
+    }  # fmt: skip
+
+
+def test_groups_of_gmsh_are_sets(tmp_path):
+    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    text = '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n1 1 "base"\n2 2 "body"\n$EndPhysicalNames\n'
+    text += "$Nodes\n4\n" + "".join(f"{n} {x} {y} {z}\n" for n, (x, y, z) in enumerate(points, 1)) + "$EndNodes\n"
+    text += "$Elements\n2\n1 1 2 1 1 1 2\n2 3 2 2 1 1 2 3 4\n$EndElements\n"
+    (tmp_path / "disc.msh").write_text(text, encoding="utf-8")
+    sets = read_mesh(tmp_path / "disc.msh").sets
+    assert (sets["base"].tolist(), sets["body"].tolist()) == ([0, 1], [0, 1, 2, 3])
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "reason"),
+    [
+        ("quad", {"hold": {"TOP": "y"}}, r"no set of points 'TOP'; its sets are xmin, xmax, ymin, ymax"),
+        ("quad", {"hold": {"ymin": "z"}}, "'ymin' is held in directions such as xy, not 'z'"),
+        ("quad", {"shape": ""}, "has 2 dimensions: its shape is axisymmetric or plane, not ''"),
+        ("quad", {"axis": "x"}, "axisymmetric moves along y, its axis, not 'x'"),
+        ("quad", {"distance": 0.0}, "a number of mm other than zero, not 0"),
+        ("quad", {"press": "ymin"}, "either a set that moves or one that is pressed"),
+        ("quad8", {"move": "", "press": "ymax"}, "cannot be pressed against cells"),
+        ("hexahedron", {"shape": "", "hold": {"ymin": "y"}}, r"free to move or turn as a whole \(3 of 6 ways\)"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path, name, options, reason):
+    options = {"hold": {"ymin": "y", "xmin": "x"}, "move": "ymax", "distance": 0.1, "shape": "axisymmetric"} | options
+    with pytest.raises(InputError, match=reason):
+        BodyFromFile(_written(tmp_path / "block.vtu", name), **options)
+
+
+def test_files_that_hold_no_such_mesh_are_refused(tmp_path):
+    (tmp_path / "text.msh").write_text("nothing\n", encoding="utf-8")
+    linear = fem.Rectangle(n=2).triangulate()
+    meshio.Mesh(linear.points, [("triangle", linear.cells)]).write(tmp_path / "linear.vtu")
+    for file, reason in (
+        ("text.msh", "cannot be read as a mesh"),
+        ("linear.vtu", r"cells triangle; use one of quad, .*gmsh -order 2"),
+        ("none.msh", "none.msh' cannot be read"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            BodyFromFile(str(tmp_path / file), {"ymin": "xy"}, move="ymax", distance=1.0, shape="plane")
