@@ -103,6 +103,29 @@ def test_a_mesh_of_your_own_is_copied_and_its_recipe_goes_on(cli, here, run):
 
 
 @pytest.mark.finite_elements
+def test_a_pressure_gives_a_displacement_in_every_file(cli, here, run):
+    import xarray as xr
+
+    fem, meshio = pytest.importorskip("felupe"), pytest.importorskip("meshio")
+    ring = fem.Rectangle(a=(1.0, 0.0), b=(1.5, 0.1), n=(4, 2))
+    meshio.Mesh(np.pad(ring.points, ((0, 0), (0, 1))), [("quad", ring.cells)]).write(here / "tube.vtu")
+    said = cli(
+        "structure", "run", "--mesh", "tube.vtu", "--shape", "axisymmetric", "--hold", "ymin=y", "--hold", "ymax=y",
+        "--inflate", "xmin=0.05", "--watch", "xmax=x", "--draws", 3, "--steps", 2, "--workers", 1, "--out", "tube",
+    )  # fmt: skip
+    assert said.status == 0, said.err
+    assert "displacement at pressure 0.05 kPa" in said.out
+    rows = list(csv.DictReader((here / "tube" / "displacements.csv").open(encoding="utf-8")))
+    assert [float(row["pressure_kPa"]) for row in rows] == [0.025, 0.05]
+    with xr.open_dataset(here / "tube" / "curves.nc") as curves:
+        assert curves["displacement_complete"].attrs["units"] == "mm"
+        assert curves["displacement_complete"].mean("draw").values[-1] == pytest.approx(float(rows[-1]["mean"]))
+    page = (here / "tube" / "report.html").read_text(encoding="utf-8")
+    assert "From the posterior to a displacement" in page
+    assert "force" not in page.split("How to repeat")[0].split("<body")[1].lower().replace("enforce", "")
+
+
+@pytest.mark.finite_elements
 def test_few_full_runs_leave_curves_of_all_draws_and_say_the_error_of_the_others(cli, here, run):
     import xarray as xr
 
@@ -160,8 +183,13 @@ def test_a_folder_of_something_else_is_refused(cli, here, run):
         (["run", "--size", "depth=0.1", "--size", "depth=0.2"], ["given twice for 'depth'"]),
         (["run", "--hold", "ymin=xyz"], ["give the mesh of the body, too: --mesh FILE"]),
         (["run", "--mesh", "none.msh", "--move", "ymax=y:1"], ["'none.msh' cannot be read"]),
-        (["run", "--mesh", "none.msh", "--move", "ymax:1"], ["'ymax:1' is not a movement (--move); write SET=AXIS"]),
-        (["run", "--mesh", "none.msh"], ["needs either --move SET=AXIS:DISTANCE or --press"]),
+        (
+            ["run", "--mesh", "none.msh", "--move", "ymax:1"],
+            ["'ymax:1' is not what --move needs; write SET=AXIS"],
+        ),
+        (["run", "--mesh", "none.msh", "--inflate", "ymax=2"], ["--inflate inner=2 --watch outer=x"]),
+        (["run", "--case", "inflated"], ["give the mesh of the body, too"]),
+        (["run", "--mesh", "none.msh"], ["needs one of --move ymax=y:-0.4"]),
         (["run", "--draws", "1"], ["draws", "greater than or equal to 2"]),
         (["run", "--discrepancy", "gp"], ["no discrepancy 'gp'", "auto"]),
     ],

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tissuq.errors import InputError
 from tissuq.experiments.modes import loading_mode
-from tissuq.finite_elements import BodyFromFile, SphericalIndentation, first_order, respond
+from tissuq.finite_elements import BodyFromFile, InflatedBody, SphericalIndentation, first_order, respond
 from tissuq.finite_elements.mesh_file import read_mesh
+from tissuq.finite_elements.response import Solve
 from tissuq.finite_elements.solver import Solver
 from tissuq.mechanics import engineering_stress, material_named
 
@@ -132,6 +135,59 @@ def test_forces_are_the_same_with_the_axes_in_another_order(tmp_path):
         vectors = case.mesh().vectors(case.mesh().points)
         np.testing.assert_allclose(np.sort(vectors, axis=0), np.sort(points, axis=0))
     np.testing.assert_allclose(forces, forces[0], rtol=1e-7)
+
+
+def _ring(path, cells=24):
+    """A ring of a tube with radii 1 and 1.5, of a quarter of a circle or of its section."""
+    mesh = fem.Rectangle(a=(1.0, 0.0), b=(1.5, 0.1), n=(cells + 1, 2))
+    meshio.Mesh(np.pad(mesh.points, ((0, 0), (0, 1))), [("quad", mesh.cells)]).write(path)
+    return str(path)
+
+
+def _pressure_of_tube(widening, inner=1.0, outer=1.5):
+    """The pressure (kPa) of a thick incompressible tube in plane strain whose inside moves outwards, by quadrature."""
+    radii = np.linspace(inner, outer, 20001)
+    hoop = np.sqrt(radii**2 + (inner + widening) ** 2 - inner**2) / radii
+    C10, C20, C30 = VALUES
+    x = hoop**2 + hoop**-2 - 2  # I1 - 3
+    slope = 2 * (C10 + 2 * C20 * x + 3 * C30 * x**2) * (hoop**2 - hoop**-2)
+    return 1e3 * np.trapezoid(slope / (radii * hoop**2), radii)
+
+
+@pytest.mark.parametrize("shape", ["axisymmetric", "solid"])
+def test_a_tube_under_pressure_widens_as_its_closed_form_says(tmp_path, shape):
+    """In the solid a sector of three degrees, whose flat sides are held across themselves, is nearly the tube."""
+    expected = _pressure_of_tube(0.2)
+    if shape == "axisymmetric":
+        case = InflatedBody(
+            _ring(tmp_path / "ring.vtu"), {"ymin": "y", "ymax": "y"}, press="xmin", distance=expected,
+            shape=shape, watch="xmin", direction="x",
+        )  # fmt: skip
+    else:
+        ring = fem.Cube(a=(1.0, 0.0, 0.0), b=(1.5, np.pi / 2, 0.1), n=(13, 31, 2))
+        radius, angle, height = ring.points.T
+        points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
+        inside = np.flatnonzero(np.isclose(radius, 1.0))
+        written = meshio.Mesh(points, [("hexahedron", ring.cells)], point_sets={"inside": inside})
+        written.write(tmp_path / "tube.inp")
+        hold = {"xmin": "x", "ymin": "y", "zmin": "z", "zmax": "z"}
+        case = InflatedBody(str(tmp_path / "tube.inp"), hold, press="inside", distance=expected, watch="inside")
+    found = respond(case, YEOH, VALUES, steps=2, bulk_ratio=1e5)
+    mean_cosine = 1.0 if shape == "axisymmetric" else np.cos(np.linspace(0, np.pi / 2, 31)).mean()
+    assert found.force[-1] / mean_cosine == pytest.approx(0.2, rel=5e-3)
+    assert found.problem == ""
+
+
+def test_draws_under_pressure_are_not_followed_to_first_order_and_not_scaled(posterior, tmp_path):
+    case = InflatedBody(
+        _ring(tmp_path / "ring.vtu", 4), {"ymin": "y", "ymax": "y"}, press="xmin", distance=0.05, shape="axisymmetric",
+        watch="xmax",
+    )  # fmt: skip
+    draws = posterior.ensemble(4)
+    with pytest.raises(InputError, match="answers with a displacement: compute all draws in full"):
+        first_order.first_order_forces(case, draws, draws[1], 1, 2000.0)
+    neo_hookean = Solve.of(case, replace(draws[1], discrepancy=None), 1, 2000.0)
+    assert neo_hookean.modulus == 1.0
 
 
 DECK = """*INCLUDE, INPUT=points.inp

@@ -87,10 +87,10 @@ class ModelEnsemble:
         """
         times, families = self.times[quantity], self.curves[quantity]
         complete = families[COMPLETE]
-        table = force_table(times, complete, complete, None, 0.0, "time", "")
+        table = force_table(times, complete, complete, None, 0.0, "time")
         if not self.is_shared:
             return table
-        shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time", "")
+        shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time")
         names = [name for name in (*SHARES, "discrepancy_sd", *(f"alone_{part}" for part in BAND)) if name in shared]
         errors = [f"{name}_error" for name in names if f"{name}_error" in shared]
         return table.assign(**{name: shared[name] for name in (*names, *errors)}, shared_draws=shared["draws"])

@@ -1,6 +1,7 @@
 """Finite elements with the draws of a posterior: materials for FElupe, cases, and the uncertainty of what they give."""
 
 from tissuq.finite_elements.case import Case, ClampedBar, Indentation, Mesh, RigidTip, Supports, cases
+from tissuq.finite_elements.inflated import InflatedBody
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.finite_elements.mesh_file import BodyFromFile
 from tissuq.finite_elements.plate import PlateWithHole
@@ -17,6 +18,7 @@ __all__ = [
     "FElupeMaterial",
     "Failure",
     "Indentation",
+    "InflatedBody",
     "Mesh",
     "PlateWithHole",
     "Response",

@@ -21,6 +21,7 @@ __all__ = [
     "CellKind",
     "ClampedBar",
     "Indentation",
+    "Inflation",
     "Mesh",
     "RigidTip",
     "Supports",
@@ -130,6 +131,24 @@ class RigidTip(NamedTuple):
     radius: float = inf
 
 
+class Inflation(NamedTuple):
+    """A pressure on a part of the surface, which follows it.
+
+    Attributes
+    ----------
+    points : (n,) boolean array
+        Faces of which all points are among these are under pressure; the travel is the pressure, kPa.
+    watched : (n,) boolean array
+        Points whose mean displacement is the response.
+    column : int
+        Its direction, a column of the points.
+    """
+
+    points: NDArray[np.bool_]
+    watched: NDArray[np.bool_]
+    column: int
+
+
 class Supports(NamedTuple):
     """What holds the body, and what moves it along the axis.
 
@@ -138,20 +157,20 @@ class Supports(NamedTuple):
     fixed : (n, 2) or (n, 3) boolean array
         Displacements that stay zero.
     moved : (n,) boolean array
-        Points whose displacement along the axis is given; none where a tip is pressed against the body.
+        Points whose displacement along the axis is given; none where there is a load.
     direction : float
         1 or -1: along the axis or against it; less where symmetry leaves the points a part of the way.
     parts : float
         Number of such bodies, by symmetry, that bear the force side by side.
-    tip : RigidTip, optional
-        What is pressed against the body.
+    load : RigidTip or Inflation, optional
+        What is pressed against the body, or the pressure on it.
     """
 
     fixed: NDArray[np.bool_]
     moved: NDArray[np.bool_]
     direction: float
     parts: float = 1.0
-    tip: RigidTip | None = None
+    load: RigidTip | Inflation | None = None
 
 
 @dataclass(frozen=True)
@@ -167,7 +186,11 @@ class Case(ABC):
     name: ClassVar[str]
     description: ClassVar[str]
     travel_name: ClassVar[str]
-    """What the travel is called: a depth, an elongation."""
+    """What the travel is called: a depth, an elongation; of a body under pressure that pressure."""
+    travel_unit: ClassVar[str] = "mm"
+    response: ClassVar[str] = "force"
+    """What the body answers with: a force, or the displacement of points."""
+    response_unit: ClassVar[str] = "N"
     mesh_order: ClassVar[int] = 1
     """Power of the size of the cells in which the force errs: one where strains are singular, as at sharp edges."""
 
@@ -180,7 +203,16 @@ class Case(ABC):
     @property
     @abstractmethod
     def travel(self) -> float:
-        """How far the moved points go, mm."""
+        """How far the moved points go, mm, or the pressure, kPa."""
+
+    @property
+    def travel_column(self) -> str:
+        """The name of the travel in tables."""
+        return f"{self.travel_name}_{self.travel_unit}"
+
+    def shown(self, travel: float) -> str:
+        """Return a travel as text, with its unit."""
+        return f"{travel:.3g} {self.travel_unit}"
 
     @abstractmethod
     def mesh(self) -> Mesh:

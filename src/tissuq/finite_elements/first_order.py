@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.errors import ConvergenceError
+from tissuq.errors import ConvergenceError, InputError
 from tissuq.finite_elements.case import Case
 from tissuq.finite_elements.material import distortional_energy
 from tissuq.finite_elements.solver import Solver
@@ -76,7 +76,11 @@ def first_order_forces(
     ------
     ConvergenceError
         When the reference does not reach the end.
+    InputError
+        When the response of the case is no force.
     """
+    if case.response != Case.response:
+        raise InputError(f"case '{case.name}' answers with a {case.response}: compute all draws in full, not a few.")
     moduli = np.array([distortional_energy(draw).initial_shear_modulus for draw in ensemble])
     number = [draw is reference for draw in ensemble].index(True)
     columns, uneven = [], []
@@ -87,8 +91,8 @@ def first_order_forces(
             if problem:
                 raise ConvergenceError(
                     f"case '{case.name}': the draw in the middle ended at a {case.travel_name} of "
-                    f"{solver.reached:.3g} mm ({problem}), so that the others cannot follow from it: compute all in "
-                    "full (no --full-runs)."
+                    f"{case.shown(solver.reached)} ({problem}), so that the others cannot follow from it: compute all "
+                    "in full (no --full-runs)."
                 )
             path = solver.strain_path()
             powers = ensemble.stresses_at(through(path.logs, path.rates)) * path.volumes

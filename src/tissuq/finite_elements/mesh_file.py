@@ -233,12 +233,21 @@ class BodyFromFile(Case):
     def mesh(self) -> Mesh:
         return self._mesh_and_sets()[0]
 
-    def supports(self, points: FloatArray) -> Supports:
-        _, sets = self._mesh_and_sets()
-        fixed, columns = np.zeros(points.shape, dtype=bool), self._columns
+    @property
+    def _named(self) -> tuple[str, ...]:
+        """The sets that do something, besides those that are held."""
+        return (self.move or self.press,)
+
+    def _held(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return which displacements of points are held."""
+        sets, columns, fixed = self._mesh_and_sets()[1], self._columns, np.zeros(points.shape, dtype=bool)
         for name, axes in (self.hold or {}).items():
             for axis in axes:
                 fixed[sets[name], columns.index(AXES.index(axis))] = True
+        return fixed
+
+    def supports(self, points: FloatArray) -> Supports:
+        fixed, sets = self._held(points), self._mesh_and_sets()[1]
         chosen = np.zeros(len(points), dtype=bool)
         chosen[sets[self.move or self.press]] = True
         direction = float(np.sign(self.distance))
@@ -274,7 +283,7 @@ class BodyFromFile(Case):
         """Refuse sets that there are not, and supports that leave the body free to move as a whole."""
         mesh, sets = self._mesh_and_sets()
         axes = AXES[: mesh.points.shape[1]]
-        for name in (*(self.hold or {}), self.move or self.press):
+        for name in (*(self.hold or {}), *self._named):
             if name not in sets or not len(sets[name]):
                 raise InputError(
                     f"the mesh '{self.file}' has no set of points '{name}'; its sets are {', '.join(sets)}."

@@ -124,7 +124,9 @@ def respond(
     """
     travels = case.steps(steps) if travel is None else np.atleast_1d(np.asarray(travel, dtype=np.float64))
     if not np.isfinite(travels).all() or travels[0] <= 0 or (np.diff(travels) <= 0).any():
-        raise InputError(f"each {case.travel_name} must be a positive number of mm, and larger than the one before.")
+        raise InputError(
+            f"each {case.travel_name} must be a positive number of {case.travel_unit}, and larger than the one before."
+        )
     with one_thread():
         return _followed(Solver(case, material, values, bulk_ratio), travels, max_invariants, at_step)
 
@@ -169,7 +171,7 @@ def case_forces(
     if response.problem:
         raise ConvergenceError(
             f"case '{case.name}' with material '{kind.name}' ended at a {case.travel_name} of "
-            f"{response.reached:.3g} mm: {response.problem}."
+            f"{response.reached:.3g} {case.travel_unit}: {response.problem}."
         )
     return response.force
 
@@ -251,7 +253,7 @@ class Solve:
     ) -> Solve:
         """Return the task of a draw."""
         linear = all(parameter.is_linear for material, _ in draw.parts for parameter in material.parameters)
-        if draw.discrepancy is not None or not linear:
+        if draw.discrepancy is not None or not linear or case.response != Case.response:
             return cls(case, draw, 1.0, steps, bulk_ratio, max_invariants)
         modulus = distortional_energy(draw).initial_shear_modulus
         if not modulus > 0:  # the solver refuses it with a reason

@@ -131,7 +131,7 @@ class Simulation:
         """
         complete = self.forces[COMPLETE]
         material_only, without = self.forces.get(MATERIAL_ONLY, complete), self.forces.get(WITHOUT)
-        table = force_table(self.travel, complete, material_only, without, self.noise_sd, self.case.travel_name)
+        table = force_table(self.travel, complete, material_only, without, self.noise_sd, self.case.travel_column)
         if self.mesh_changes:
             middle, spread = table["mean"] * self.mesh_factor, table["mean"] * np.abs(self.mesh_factor - 1) / 4
             table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * self.mesh_factor, spread)
@@ -304,7 +304,8 @@ def _check_any(case: Case, forces: FloatArray, problems: Sequence[str]) -> None:
         reasons = "; ".join(sorted(set(filter(None, problems))))
         raise ConvergenceError(
             f"of {len(forces)} draws, fewer than {MIN_DRAWS} reached the first {case.travel_name} of "
-            f"{case.steps(forces.shape[1])[0]:.3g} mm ({reasons}): use more steps, a coarser mesh or another material."
+            f"{case.shown(case.steps(forces.shape[1])[0])} ({reasons}): use more steps, a coarser mesh or another "
+            "material."
         )
 
 

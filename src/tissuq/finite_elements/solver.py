@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tissuq.errors import InputError, ModelError
 from tissuq.finite_elements.case import AXIAL, Case
-from tissuq.finite_elements.contact import Contact, Touch
+from tissuq.finite_elements.loads import Action, load_on
 from tissuq.finite_elements.material import FElupeMaterial
 from tissuq.mechanics import Material
 
@@ -106,7 +106,9 @@ class Solver:
         held[:, AXIAL] |= supports.moved
         self._held, self._free = np.flatnonzero(held.ravel()), np.flatnonzero(~held.ravel())
         self._moved = supports.moved
-        self._contact = Contact.of(mesh, supports, width * region.dV) if supports.tip else None
+        self._load = load_on(mesh, supports, width * region.dV, self._modulus)
+        self._travel_unit = case.travel_unit
+        self._gives_force = case.response == Case.response
         self._rate = np.zeros_like(mesh.points)
         self._rate[supports.moved, AXIAL] = supports.direction
         self._path = [(0.0, np.zeros_like(mesh.points))]
@@ -126,15 +128,15 @@ class Solver:
             if not problem:
                 continue
             if step <= full_step / 2**MAX_HALVINGS:
-                return f"{problem}, also with load steps of {step:.2g} mm"
+                return f"{problem}, also with load steps of {step:.2g} {self._travel_unit}"
             step /= 2
         return ""
 
     def force(self) -> float:
-        """Return the force (N) that moves the moved points on."""
+        """Return the force (N) that moves the moved points on, or the displacement (mm) by a pressure."""
         travel, u = self._path[-1]
-        if self._contact:
-            return float(self._parts * self._contact.at(u, travel).force * self._modulus)
+        if self._load:
+            return self._load.at(u, travel).response * (self._parts * self._modulus if self._gives_force else 1.0)
         internal = self._residual(u, travel).reshape(self._rate.shape)[self._moved, AXIAL]
         return float(self._parts * internal.sum() * np.sign(self._rate.sum()) * self._modulus)
 
@@ -168,8 +170,8 @@ class Solver:
         """Return how the body deforms around the last equilibrium."""
         travel, u = self._path[-1]
         self._residual(u, travel)
-        touch = self._contact.at(u, travel) if self._contact else None
-        rates = self._rates(touch)
+        action = self._load.at(u, travel) if self._load else None
+        rates = self._rates(action)
         F, J, _ = self._strains()
         self._field[0].values[:] = rates.reshape(u.shape)
         F_rate = self._field.extract()[0] - np.eye(3)[:, :, None, None]
@@ -177,13 +179,13 @@ class Solver:
         matrices, matrix_rates = (np.moveaxis(each, (0, 1), (-2, -1)).reshape(-1, 3, 3) for each in (F, F_rate))
         left, stretches, right = np.linalg.svd(matrices)
         log_rates = np.einsum("nia,nij,naj->na", left, matrix_rates, right) / stretches
-        share = np.abs(self._rate).max() if touch is None else 1.0
+        share = np.abs(self._rate).max() if action is None else 1.0
         cells = self._volumes.sum(axis=0)
         J_rate = J * log_rates.sum(axis=1).reshape(J.shape)
         J_mean, J_mean_rate = ((values * self._volumes).sum(axis=0) / cells for values in (J, J_rate))
         volumetric = self._bulk_ratio * ((J_mean - 1) * J_mean_rate * cells).sum() / share
-        if touch:  # what the tip's own elasticity takes
-            volumetric += self._parts * (touch.residual @ rates + touch.force)
+        if action:  # what the tip's own elasticity takes
+            volumetric += self._parts * (action.residual @ rates + action.response)
         logs = np.log(stretches)
         return StrainPath(
             logs - logs.mean(axis=1, keepdims=True),
@@ -211,19 +213,19 @@ class Solver:
         return problem
 
     def _predicted(self, goal: float) -> FloatArray:
-        """Return the last displacements, or where the tip would carry them if all points in touch stayed so."""
+        """Return the last displacements, or where the load would carry them if all points in touch stayed so."""
         travel, u = self._path[-1]
-        if self._contact is None:
+        if self._load is None:
             return u
         self._residual(u, travel)
-        return np.asarray(u + (goal - travel) * self._rates(self._contact.at(u, travel)).reshape(u.shape))
+        return np.asarray(u + (goal - travel) * self._rates(self._load.at(u, travel)).reshape(u.shape))
 
-    def _rates(self, touch: Touch | None) -> FloatArray:
+    def _rates(self, action: Action | None) -> FloatArray:
         """Return the displacements (d n,) by a unit of travel around the state that was computed last."""
         from scipy.sparse.linalg import spsolve
 
-        rates, tangent = self._rate.ravel().copy(), self._tangent(touch)
-        right = -tangent[:, self._held] @ rates[self._held] - (touch.residual_rate[self._free] if touch else 0.0)
+        rates, tangent = self._rate.ravel().copy(), self._tangent(action)
+        right = -tangent[:, self._held] @ rates[self._held] - (action.residual_rate[self._free] if action else 0.0)
         rates[self._free] = spsolve(tangent[:, self._free].tocsc(), right)
         return rates
 
@@ -245,7 +247,7 @@ class Solver:
         for _ in range(MAX_ITERATIONS):
             if not np.isfinite(residual).all():
                 return None, "cells turned inside out"
-            tangent = self._tangent(self._contact.at(u, travel) if self._contact else None)
+            tangent = self._tangent(self._load.at(u, travel) if self._load else None)
             change = np.zeros(u.size)
             change[self._held] = (prescribed - u).ravel()[self._held]
             right = -residual[self._free] - tangent[:, self._held] @ change[self._held]
@@ -277,10 +279,10 @@ class Solver:
                 break
         return tried, tried_residual
 
-    def _tangent(self, touch: Touch | None) -> Any:
+    def _tangent(self, action: Action | None) -> Any:
         """Return the rows of the stiffness matrix of what is free."""
         stiffness = self._solid.assemble.matrix().tocsr()
-        return (stiffness if touch is None else stiffness + touch.stiffness)[self._free]
+        return (stiffness if action is None else stiffness + action.stiffness)[self._free]
 
     def _residual(self, u: FloatArray, travel: float) -> FloatArray:
         """Return the forces of displacements (n, d) at a travel, (d n,), in initial shear moduli times mm^2."""
@@ -289,7 +291,7 @@ class Solver:
             internal = self._solid.assemble.vector(self._field).toarray()
         except np.linalg.LinAlgError:
             return np.full(u.size, np.nan)
-        return np.asarray(internal[:, 0] + (self._contact.at(u, travel).residual if self._contact else 0.0))
+        return np.asarray(internal[:, 0] + (self._load.at(u, travel).residual if self._load else 0.0))
 
     def _state(self) -> State:
         """Return displacements, pressures and volumes, which Newton's method changes together."""

@@ -66,4 +66,4 @@ class SphericalIndentation(Case):
         surface = (axial > self.height - tolerance) & (radial < self.tip_radius)
         fixed = np.stack([base, base | (radial < tolerance)], axis=-1)
         tip = RigidTip(surface, self.height, self.tip_radius)
-        return Supports(fixed, np.zeros(len(points), dtype=bool), -1.0, tip=tip)
+        return Supports(fixed, np.zeros(len(points), dtype=bool), -1.0, load=tip)

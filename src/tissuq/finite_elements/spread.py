@@ -134,8 +134,7 @@ def force_table(
     material_only: FloatArray,
     without: FloatArray | None,
     noise_sd: float,
-    travel_name: str = "travel",
-    unit: str = "mm",
+    travel_name: str = "travel_mm",
 ) -> pd.DataFrame:
     """Return band and shares of the variance at every step, each with its standard error (``_error``).
 
@@ -149,8 +148,7 @@ def force_table(
     noise_sd : float
         Standard deviation of a new measurement of the force, N.
     travel_name : str
-    unit : str
-        Of the travel; empty where it has none.
+        Name of its column.
 
     Returns
     -------
@@ -163,7 +161,7 @@ def force_table(
 
     rows = []
     for step, travel_at_step in enumerate(travel):
-        row: dict[str, Any] = {f"{travel_name}_{unit}" if unit else travel_name: float(travel_at_step)}
+        row: dict[str, Any] = {travel_name: float(travel_at_step)}
         is_reached = np.isfinite(complete[:, step]) & np.isfinite(material_only[:, step])
         row["draws"] = int(is_reached.sum())
         if row["draws"] > 1:

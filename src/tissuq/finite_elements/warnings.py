@@ -28,7 +28,13 @@ def simulation_warnings(simulation: Simulation) -> list[str]:
 
 def _failed(simulation: Simulation) -> list[str]:
     totals = {family: len(forces) for family, forces in simulation.forces.items()}
-    return failed_draws(simulation.failures, totals, FAMILIES, "at {:.3g} mm", "failures.csv has all of them.")
+    return failed_draws(
+        simulation.failures,
+        totals,
+        FAMILIES,
+        f"at {{:.3g}} {simulation.case.travel_unit}",
+        "failures.csv has all of them.",
+    )
 
 
 def _extrapolated(simulation: Simulation) -> list[str]:
@@ -39,8 +45,9 @@ def _extrapolated(simulation: Simulation) -> list[str]:
     if energy < MIN_ENERGY_SHARE:
         return []
     max_1, max_2 = simulation.max_invariants
+    at = simulation.case.shown(simulation.travel[last])
     return [
-        f"At {simulation.travel[last]:.3g} mm, {100 * volume:.2g} % of the volume, with {100 * energy:.0f} % of the "
+        f"At {at}, {100 * volume:.2g} % of the volume, with {100 * energy:.0f} % of the "
         f"strain energy, is strained beyond what was measured (I1 - 3 up to {max_1:.3g}, I2 - 3 up to {max_2:.3g}). "
         "There the energy of every draw goes on as it ends, with an error that grows with the strain."
     ]
@@ -78,6 +85,6 @@ def _coarse_mesh(simulation: Simulation) -> list[str]:
         return []
     change, travel = simulation.mesh_change
     return [
-        f"On a mesh of twice the fineness the force at {travel:.3g} mm changes by {100 * change:+.1f} %: the mesh is "
-        "too coarse for this force."
+        f"On a mesh of twice the fineness the {simulation.case.response} at {simulation.case.shown(travel)} "
+        f"changes by {100 * change:+.1f} %: the mesh is too coarse for it."
     ]

@@ -17,7 +17,7 @@ from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.simulation_figures import (
     SHARES,
     force_figure,
-    force_unit,
+    handy_unit,
     is_mesh_free,
     mesh_ratio,
     prefix_of,
@@ -55,25 +55,25 @@ def simulation_result(study: SimulationStudy, folder: Path) -> Result:
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     caption = (
-        f"Force over {case.travel_name}: mean and {percent} % band over draws of the posterior, without the noise of a "
-        f"measurement{against}.{_of_cells(table)}"
+        f"{case.response.capitalize()} over {case.travel_name}: mean and {percent} % band over draws of the posterior, "
+        f"without the noise of a measurement{against}.{_of_cells(table)}"
     )
     titled = f"Case '{case.name}' with {study.settings.draws} draws"
     files = {
-        "forces.csv": table,
+        f"{case.response}s.csv": table,
         "summary.json": _summary(study, table),
         "curves.nc": bytes(_curves(study).to_netcdf(engine="h5netcdf")),
         "middle_draw.pvd": lambda path: _write_fields(study, path.parent),
     }
     return Result(
         command="structure",
-        title="From the posterior to a force",
+        title=f"From the posterior to a {case.response}",
         subject=f"{case.description} · {model.experiment.name}, {model.material.name}, discrepancy "
         f"{model.discrepancy.name} · {_completed(simulation)}",
         numbers=_numbers(study, table),
         finding=_lead(simulation, table),
         next_step=_next_step(simulation),
-        picture=Picture("answer", lambda: force_figure(simulation, table), "Band of the force", caption),
+        picture=Picture("answer", lambda: force_figure(simulation, table), f"Band of the {case.response}", caption),
         tables=(Table(headers, rows, titled, note=_of_cells(table).strip()),),
         sections=_sections(study, table),
         warnings=tuple(study.warnings),
@@ -108,11 +108,12 @@ def _of_cells(table: pd.DataFrame) -> str:
 def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     """Return the force at the last step, the largest share of its variance, and how much of the body extrapolates."""
     simulation, last = study.simulation, _last_step(table)
-    unit, factor = force_unit(table)
+    unit, factor = handy_unit(table, simulation.case.response_unit)
     percent = f"{100 * band_probability(int(last['draws'])):.0f} % band"
     mean, low, high = (last[f"{prefix_of(table)}{name}"] * factor for name in ("mean", "low", "high"))
-    name = simulation.case.travel_name
-    numbers = [Number(f"force at {name} {last[f'{name}_mm']:.3g} mm", mean, low, high, unit, percent)]
+    case = simulation.case
+    at = f"{case.response} at {case.travel_name} {case.shown(last[case.travel_column])}"
+    numbers = [Number(at, mean, low, high, unit, percent)]
     shares = {name: last[name] for name in SHARES if name in last and np.isfinite(last[name])}
     if len(shares) > 1:
         largest = max(shares, key=lambda name: shares[name])
@@ -133,10 +134,11 @@ def _next_step(simulation: Simulation) -> str:
 def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]:
     """Return headers and rows of the forces as text."""
     simulation, table = study.simulation, study.simulation.table()
-    unit, factor = force_unit(table)
+    unit, factor = handy_unit(table, simulation.case.response_unit)
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
     is_compared, is_shared = WITHOUT in simulation.forces, MATERIAL_ONLY in simulation.forces
-    headers = [f"{simulation.case.travel_name}, mm", "draws", f"force, {unit}", "sd", percent]
+    case = simulation.case
+    headers = [f"{case.travel_name}, {case.travel_unit}", "draws", f"{case.response}, {unit}", "sd", percent]
     headers += ["parameters", "discrepancy"] * is_shared + ["noise"]
     headers += ["without discrepancy", percent] * is_compared
     prefix = prefix_of(table)
@@ -144,7 +146,7 @@ def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]
     rows = []
     for row in table.to_dict("records"):
         numbers = {str(key): value for key, value in row.items()}
-        cells = [f"{row[f'{simulation.case.travel_name}_mm']:.3g}", str(row["draws"]), *_band(numbers, factor, prefix)]
+        cells = [f"{row[case.travel_column]:.3g}", str(row["draws"]), *_band(numbers, factor, prefix)]
         for name in (["parameters", "discrepancy"] if is_shared else []) + ["noise"]:
             cells.append(_percent(numbers[name], numbers[f"{name}_error"]))
         if is_compared:
@@ -198,11 +200,12 @@ def _curves(study: SimulationStudy) -> xr.Dataset:
     import xarray as xr
 
     simulation = study.simulation
-    coordinates = {"travel": ("travel", simulation.travel, {"units": "mm", "long_name": simulation.case.travel_name})}
+    case = simulation.case
+    coordinates = {"travel": ("travel", simulation.travel, {"units": case.travel_unit, "long_name": case.travel_name})}
     curves: dict[str, Any] = {}
     for family, forces in simulation.forces.items():
         draw = "draw_without" if family == WITHOUT else "draw"
-        curves[f"force_{family}"] = ((draw, "travel"), forces, {"units": "N"})
+        curves[f"{case.response}_{family}"] = ((draw, "travel"), forces, {"units": case.response_unit})
     for symbol in simulation.ensembles[COMPLETE][0].values:
         values = [draw.values[symbol] for draw in simulation.ensembles[COMPLETE]]
         curves[f"parameter_{symbol}"] = (("draw",), values)
@@ -245,16 +248,17 @@ def _write_fields(study: SimulationStudy, folder: Path) -> None:
 def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...]:
     """Return what a page folds: strains beyond, sources of uncertainty, fields, failures, how it was computed."""
     simulation, settings = study.simulation, study.settings
-    unit, factor = force_unit(table)
-    draws = len(simulation.forces[COMPLETE])
+    unit, factor = handy_unit(table, simulation.case.response_unit)
+    case, draws = simulation.case, len(simulation.forces[COMPLETE])
     figures = cache(lambda: simulation_figures(simulation, table))
     noise = f"{significant(simulation.noise_sd * factor)} {unit}"
-    origin = "the same share of the largest force as the test's noise is of its largest stress"
+    origin = f"the same share of the largest {case.response} as the test's noise is of its largest stress"
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f}"
     against = ", against those of a fit without discrepancy" if WITHOUT in simulation.forces else ""
     forces = Picture(
-        "forces", lambda: figures()["forces"], "Band of the force, and what is strained beyond the measurements",
-        f"Left: force over {simulation.case.travel_name}: mean and {percent} % band over draws of the posterior, "
+        "forces", lambda: figures()["forces"],
+        f"Band of the {case.response}, and what is strained beyond the measurements",
+        f"Left: {case.response} over {case.travel_name}: mean and {percent} % band over draws of the posterior, "
         f"without the noise of a measurement{against}.{_of_cells(table)} Right: how much of the body "
         "is strained beyond the measured I1 or I2, and how much of the strain energy is there.",
     )  # fmt: skip
@@ -262,15 +266,15 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
     if MATERIAL_ONLY in simulation.forces:
         shares = Picture(
             "shares", lambda: figures()["shares"], "Shares of the variance, and standard deviations",
-            f"Left: shares of the variance of a new measurement of the force; shaded, ± one standard error of {draws} "
-            "draws (bootstrap). Right: how much the force would spread by each part alone; where the total is less "
-            "than its parts, they compensate each other.",
+            f"Left: shares of the variance of a new measurement of the {case.response}; shaded, ± one standard error "
+            f"of {draws} draws (bootstrap). Right: how much the {case.response} would spread by each part alone; where "
+            "the total is less than its parts, they compensate each other.",
         )  # fmt: skip
         said = ", as given" if settings.force_noise is not None else f": {origin}"
         sentences = (
-            "Q is the force of a draw with its discrepancy, Q0 that of the same draw with its material parameters "
-            "alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of a new "
-            f"measurement's noise (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
+            f"Q is the {case.response} of a draw with its discrepancy, Q0 that of the same draw with its material "
+            "parameters alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of "
+            f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
         )
@@ -279,7 +283,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         said = " (as given)" if settings.force_noise is not None else f" ({origin})"
         words = (
             "The posterior is without discrepancy: the band is due to the parameters alone. Noise of a new measurement "
-            f"of the force: sd {noise}{said}."
+            f"of the {case.response}: sd {noise}{said}."
         )
         sections.append(Section("Sources of uncertainty", (words,)))
     if len(simulation.fields.get("largest", ())) > 1 and len(simulation.case.mesh().section[0]):
@@ -295,14 +299,15 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
             [FAMILIES[failure.family], f"{failure.number + 1}", f"{failure.reached:.3g}", failure.problem]
             for failure in simulation.failures
         ]
-        failed = Table(["draws", "number", "reached, mm", "reason"], failures, text_columns=(0, 3))
+        failed = Table(["draws", "number", f"reached, {case.travel_unit}", "reason"], failures, text_columns=(0, 3))
         sections.append(Section("Draws that were not completed", (failed,)))
     change = simulation.mesh_change
     finer = (
-        f" On a mesh of twice the fineness the force of one draw at {change[1]:.3g} mm changes by "
-        f"{100 * change[0]:+.1f} %."
+        f" On a mesh of twice the fineness the {case.response} of one draw at {case.shown(change[1])} changes "
+        f"by {100 * change[0]:+.1f} %."
         if change
-        else " How far the force is off by the size of the cells is not known: compute it with a finer mesh, too."
+        else f" How far the {case.response} is off by the size of the cells is not known: compute it with a finer "
+        "mesh, too."
     )
     mesh = simulation.case.mesh()
     computed = (
@@ -317,7 +322,9 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
         "Numbers after ± are bootstrap standard errors from the number of draws. "
         f"{simulation.seconds:.0f} s of one processor.",
     )
-    sizes = [[name.replace("_", " "), _size(name, value)] for name, value in vars(simulation.case).items() if value]
+    sizes = [
+        [name.replace("_", " "), _size(name, value, case.travel_unit)] for name, value in vars(case).items() if value
+    ]
     return (*sections, Section("How it was computed", (computed, Table(["size", "value"], sizes))))
 
 
@@ -335,23 +342,24 @@ def _first_order(simulation: Simulation) -> Iterator[str]:
         )
 
 
-def _size(name: str, value: float | str | dict[str, str]) -> str:
+def _size(name: str, value: float | str | dict[str, str], unit: str) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key}: {word}" for key, word in value.items())
     if isinstance(value, str):
         return value
-    return f"{value:g}" if name in ("fineness", "parts") else f"{value:g} mm"
+    return f"{value:g}" if name in ("fineness", "parts") else f"{value:g} {unit}"
 
 
 def _lead(simulation: Simulation, table: pd.DataFrame) -> str:
     """Return the finding in a sentence or two."""
-    unit, factor = force_unit(table)
+    unit, factor = handy_unit(table, simulation.case.response_unit)
     last_step = _last_step(table)
     mean, _, ends = _band(last_step, factor, prefix_of(table))
     percent = f"{100 * band_probability(int(last_step['draws'])):.0f} %"
-    name = simulation.case.travel_name
-    article, travel = "an" if name[0] in "aeiou" else "a", last_step[f"{name}_mm"]
-    text = f"At {article} {name} of {travel:.3g} mm the force is {mean} {unit} ({percent}: {ends} {unit})."
+    case = simulation.case
+    article, travel = "an" if case.travel_name[0] in "aeiou" else "a", case.shown(last_step[case.travel_column])
+    text = f"At {article} {case.travel_name} of {travel} the {case.response} is {mean} {unit}"
+    text += f" ({percent}: {ends} {unit})."
     if WITHOUT in simulation.forces:
         without, _, without_ends = _band(last_step, factor * mesh_ratio(last_step), "without_")
         text += f" Without discrepancy it is {without} {unit} ({without_ends} {unit})."

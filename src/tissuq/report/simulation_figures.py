@@ -25,7 +25,7 @@ __all__ = [
     "SHARES",
     "draw_shares",
     "force_figure",
-    "force_unit",
+    "handy_unit",
     "is_mesh_free",
     "mesh_ratio",
     "prefix_of",
@@ -36,16 +36,16 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
-UNITS = (("N", 1.0), ("mN", 1e3), ("µN", 1e6))
+UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
 SHARES = {"parameters": BAND, "discrepancy": TRUTH, "noise": BASE}
 MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
 
 
-def force_unit(table: pd.DataFrame) -> tuple[str, float]:
-    """Return the unit in which the largest mean force is a handy number, and how many of it are a newton."""
+def handy_unit(table: pd.DataFrame, unit: str) -> tuple[str, float]:
+    """Return the unit in which the largest mean is a handy number, and how many of it are one of the given ones."""
     largest = float(table["mean"].abs().max())
-    return next((pair for pair in UNITS if largest * pair[1] >= 1), UNITS[-1])
+    return next((pair for pair in UNITS[unit] if largest * pair[1] >= 1), UNITS[unit][-1])
 
 
 def is_mesh_free(table: pd.DataFrame) -> bool:
@@ -92,8 +92,8 @@ def force_figure(simulation: Simulation, table: pd.DataFrame) -> Figure:
 
 
 def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> None:
-    unit, factor = force_unit(table)
-    travel = _from_zero(table[f"{simulation.case.travel_name}_mm"])
+    unit, factor = handy_unit(table, simulation.case.response_unit)
+    travel = _from_zero(table[simulation.case.travel_column])
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
     bands = [
         (prefix_of(table), "with discrepancy" if MATERIAL_ONLY in simulation.forces else "posterior", BAND, "-", 0.25)
@@ -106,8 +106,8 @@ def _draw_forces(axis: Axes, simulation: Simulation, table: pd.DataFrame) -> Non
         low, mean, high = (_from_zero(table[f"{prefix}{name}"] * times) * factor for name in ("low", "mean", "high"))
         pieces.band(axis, travel, low, high, color=color, strength=alpha, label=f"{label}, {percent}")
         pieces.line(axis, travel, mean, style=line, color=color, label="mean")
-    axis.set_xlabel(f"{simulation.case.travel_name} [mm]")
-    axis.set_ylabel(f"force [{unit}]")
+    axis.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
+    axis.set_ylabel(f"{simulation.case.response} [{unit}]")
     axis.set_xlim(0, simulation.case.travel)
     axis.legend(fontsize=9)
 
@@ -131,7 +131,7 @@ def _forces(simulation: Simulation, table: pd.DataFrame) -> Figure:
         )
     share_axis.set_title("Strained beyond the measured range")
     share_axis.set_ylabel("mean share [%]")
-    share_axis.set_xlabel(f"{simulation.case.travel_name} [mm]")
+    share_axis.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
     share_axis.set_xlim(0, simulation.case.travel)
     share_axis.set_ylim(0, 103)
     share_axis.legend(fontsize=9)
@@ -148,11 +148,11 @@ def _shares(simulation: Simulation, table: pd.DataFrame) -> Figure:
 
     figure = Figure(figsize=(9.6, 3.9))
     axis, sd_axis = figure.subplots(1, 2)
-    travel = table[f"{simulation.case.travel_name}_mm"].to_numpy()
+    travel = table[simulation.case.travel_column].to_numpy()
     draw_shares(axis, travel, table, SHARES)
-    unit, factor = force_unit(table)
+    unit, factor = handy_unit(table, simulation.case.response_unit)
     sizes = {
-        "force of a draw": (table["sd"], INK, "-"),
+        f"{simulation.case.response} of a draw": (table["sd"], INK, "-"),
         "of its parameters alone": (table["alone_sd"], BAND, "--"),
         "what the discrepancy adds": (table["discrepancy_sd"], TRUTH, "--"),
         "noise": (np.full(len(travel), simulation.noise_sd), BASE, "--"),
@@ -163,7 +163,7 @@ def _shares(simulation: Simulation, table: pd.DataFrame) -> Figure:
     sd_axis.set_ylim(0)
     for panel in (axis, sd_axis):
         panel.set_xlim(0, simulation.case.travel * 1.02)
-        panel.set_xlabel(f"{simulation.case.travel_name} [mm]")
+        panel.set_xlabel(f"{simulation.case.travel_name} [{simulation.case.travel_unit}]")
         panel.legend(fontsize=9)
     return figure
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import fields
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tissuq.errors import InputError
 from tissuq.registry import find
@@ -21,7 +21,9 @@ __all__ = ["SimulationSettings"]
 
 
 BODY = "A body of your own"
-MOVEMENT = re.compile(r"(?P<set>.+)=(?P<axis>[xyz]):(?P<distance>[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)", re.IGNORECASE)
+NUMBER = r"(?P<size>[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)"
+MOVEMENT = re.compile(rf"(?P<set>.+)=(?P<axis>[xyz]):{NUMBER}", re.IGNORECASE)
+LOADS = {"move": MOVEMENT, "press": MOVEMENT, "inflate": re.compile(f"(?P<set>.+)={NUMBER}", re.IGNORECASE)}
 
 
 def _bulk_ratio() -> float:
@@ -87,6 +89,13 @@ class SimulationSettings(RunSettings):
     tip_radius: float = option(
         0.0, "Instead of the plane: a sphere over the axis, of this radius, mm.", unit="mm", ge=0, lt=inf, group=BODY
     )
+    inflate: str | None = option(
+        None, "Instead: set whose faces are under pressure, kPa: inner=2; the answer is then what --watch names.",
+        unit="kPa", group=BODY,
+    )  # fmt: skip
+    watch: str | None = option(
+        None, "Set whose mean displacement is the answer to a pressure, and its direction: outer=x.", group=BODY
+    )
     shape: str | None = option(None, "axisymmetric (around y) or plane (strain), of a mesh in a plane.", group=BODY)
     parts: float = option(1.0, "Such bodies, by symmetry, that bear the force side by side.", gt=0, lt=inf, group=BODY)
 
@@ -103,9 +112,15 @@ class SimulationSettings(RunSettings):
 
         if self.mesh is not None:
             return self._body(beside / self.mesh)
-        if self.hold or self.move or self.press or self.case == BodyFromFile.name:
+        if (
+            self.hold
+            or any(getattr(self, name) for name in LOADS)
+            or issubclass(find(Case, "case", self.case, InputError), BodyFromFile)
+        ):
             raise InputError("give the mesh of the body, too: --mesh FILE --hold ymin=xyz --move ymax=y:-0.4.")
         kind = find(Case, "case", self.case, InputError)
+        if self.hold or any(getattr(self, name) for name in LOADS) or issubclass(kind, BodyFromFile):
+            raise InputError("give the mesh of the body, too: --mesh FILE --hold ymin=xyz --move ymax=y:-0.4.")
         sizes = {field.name: field.default for field in fields(kind)}
         for name, value in self.sizes.items():
             if name not in sizes:
@@ -117,18 +132,30 @@ class SimulationSettings(RunSettings):
         return kind(**self.sizes)
 
     def _body(self, file: Path) -> Case:
+        from tissuq.finite_elements.inflated import InflatedBody
         from tissuq.finite_elements.mesh_file import BodyFromFile
 
-        if bool(self.move) == bool(self.press) or self.sizes:
+        given = {name: text for name in LOADS if (text := getattr(self, name)) is not None}
+        if len(given) != 1 or self.sizes or bool(self.watch) != bool(self.inflate):
             raise InputError(
-                "a body from a mesh has no --size, and needs either --move SET=AXIS:DISTANCE or --press "
-                "SET=AXIS:DISTANCE, as in --move ymax=y:-0.4."
+                "a body from a mesh has no --size, and needs one of --move ymax=y:-0.4, --press ymax=y:-0.4, and "
+                "--inflate inner=2 --watch outer=x."
             )
-        match = MOVEMENT.fullmatch((self.move or self.press or "").strip())
+        ((name, text),) = given.items()
+        match = LOADS[name].fullmatch(text.strip())
         if match is None:
-            option_name, text = ("--move", self.move) if self.move else ("--press", self.press)
-            raise InputError(f"'{text}' is not a movement ({option_name}); write SET=AXIS:DISTANCE, as in ymax=y:-0.4.")
-        return BodyFromFile(
-            str(file), self.hold, match["set"] if self.move else "", match["set"] if self.press else "", match["axis"],
-            float(match["distance"]), self.tip_radius, self.shape or "", self.parts,
-        )  # fmt: skip
+            form = "SET=PRESSURE, as in inner=2" if self.inflate else "SET=AXIS:DISTANCE, as in ymax=y:-0.4"
+            raise InputError(f"'{text}' is not what --{name} needs; write {form}.")
+        common: dict[str, Any] = {
+            "hold": self.hold,
+            "distance": float(match["size"]),
+            "shape": self.shape or "",
+            "parts": self.parts,
+        }
+        if self.inflate:
+            watched, _, direction = (self.watch or "").rpartition("=")
+            return InflatedBody(str(file), press=match["set"], watch=watched, direction=direction, **common)
+        sets: dict[str, Any] = (
+            {"move": match["set"]} if self.move else {"press": match["set"], "tip_radius": self.tip_radius}
+        )
+        return BodyFromFile(str(file), axis=match["axis"], **sets, **common)

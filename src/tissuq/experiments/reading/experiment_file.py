@@ -14,6 +14,7 @@ import numpy as np
 
 from tissuq.errors import InputError
 from tissuq.experiments.experiment import Experiment
+from tissuq.experiments.modes import Uniaxial
 from tissuq.experiments.modes.mode import SHEAR
 from tissuq.experiments.reading.assumptions import assumptions
 from tissuq.experiments.reading.columns import choose_columns
@@ -56,6 +57,7 @@ from tissuq.experiments.reading.stated_mode import (
 )
 from tissuq.experiments.reading.table import Table
 from tissuq.experiments.reading.tables import read_table
+from tissuq.experiments.reading.volume import volume_step
 
 __all__ = [
     "Reading",
@@ -345,6 +347,8 @@ def read_rows(
         rows = np.arange(0, len(used), step)
         used = used.kept(rows, f"one row in {step} asked for").with_step(f"one row in {step}")
     check_signs(used, choices, bool(is_positive), options.get("turn"))
+    if mode.name == Uniaxial.name and (volume := volume_step(used)):
+        used = used.with_step(volume)
     used = used.with_step(f"{len(used)} rows ({used.table.span})")
     sheet, tested = table.file.removeprefix(str(path)), tested_stresses(used, mode, shown)
     experiment = Experiment(
