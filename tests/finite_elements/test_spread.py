@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tissuq.errors import InputError
+from tissuq.experiments.modes import loading_mode
 from tissuq.finite_elements.spread import band_of, band_probability, shares_of, standard_errors
 
 GENERATOR = np.random.default_rng(0)
@@ -70,3 +71,36 @@ def test_bootstrap_errors_are_the_spread_between_samples_of_every_column():
     found = standard_errors(statistics, draws, draws - 1)
     np.testing.assert_allclose(found["mean"], sd / 20, rtol=0.2)
     np.testing.assert_allclose(found["difference"], 0, atol=1e-12)
+
+
+def test_independent_sources_are_taken_out_of_parameters_and_discrepancy():
+    """A quantity whose parts have variances 4, 1, 0.09 (linear) + 0.5 (square), 0.25, all independent."""
+    generator = np.random.default_rng(5)
+    own, rest, score, scale = generator.standard_normal((4, 40000, 1))
+    beyond = 0.3 * score + 0.5 * (score**2 - 1)
+    complete = 2 * own + rest + beyond + 0.5 * scale
+    sources = {"extrapolation": np.hstack([score, score**2 - 1]), "test_scale": 0.05 * scale}
+    found = shares_of(complete, 2 * own + 0.4 * scale, 1.0, sources)
+    total = 4 + 1 + 0.59 + 0.25 + 1
+    for name, variance in {"parameters": 4, "discrepancy": 1, "extrapolation": 0.59, "test_scale": 0.25}.items():
+        assert getattr(found, name)[0] == pytest.approx(variance / total, abs=0.012), name
+    names = "parameters", "discrepancy", "extrapolation", "test_scale", "noise"
+    assert sum(getattr(found, name)[0] for name in names) == pytest.approx(1.0, rel=1e-12)
+    few = shares_of(complete[:14], complete[:14], 0.0, {name: values[:14] for name, values in sources.items()})
+    assert np.isnan(few.extrapolation).all()
+    assert few.parameters[0] == pytest.approx(1.0)
+
+
+def test_draws_of_a_posterior_tell_how_they_go_on_and_what_their_tests_share(posterior):
+    """The quantity is the planar stress beyond the data, of which the score is all that is random at the end."""
+    ensemble = posterior.ensemble(64)
+    assert set(ensemble.sources) <= {"extrapolation", "test_scale"}
+    score = ensemble.sources["extrapolation"][:, 0]
+    assert score.mean() == pytest.approx(0, abs=0.1)
+    assert score.std() == pytest.approx(1, abs=0.15)
+    _, high = ensemble.ranges["planar"]
+    at_both = (1 + share * (high - 1) for share in (0.9, 1.5))
+    within, beyond = (ensemble.stress(loading_mode("planar"), np.array([at])) for at in at_both)
+    shares = [shares_of(stress, stress, 0.0, ensemble.sources).extrapolation[0] for stress in (within, beyond)]
+    assert shares[0] < 0.08
+    assert 0.8 < shares[1] <= 1

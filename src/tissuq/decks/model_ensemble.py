@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from tissuq.errors import ConvergenceError
 from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY, MIN_DRAWS
 from tissuq.finite_elements.spread import BAND, PROBABILITY, SHARES, band_probability, force_table
 from tissuq.posterior.draws_in_words import failed_draws
+from tissuq.posterior.ensemble import Ensemble
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,6 +61,8 @@ class ModelEnsemble:
         Of the complete draws that ended well.
     seconds : float
         Of all runs of the solver, s.
+    sources : mapping of str to (N, k) array
+        What the draws of all materials differ by besides parameters and discrepancy, as in `Ensemble.sources`.
     """
 
     times: Mapping[str, FloatArray]
@@ -68,6 +71,7 @@ class ModelEnsemble:
     failures: tuple[FailedRun, ...]
     folders: tuple[str, ...]
     seconds: float
+    sources: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def draws(self) -> int:
@@ -87,10 +91,10 @@ class ModelEnsemble:
         """
         times, families = self.times[quantity], self.curves[quantity]
         complete = families[COMPLETE]
-        table = force_table(times, complete, complete, None, 0.0, "time")
+        table = force_table(times, complete, complete, None, 0.0, "time", self.sources)
         if not self.is_shared:
             return table
-        shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time")
+        shared = force_table(times, complete, families[MATERIAL_ONLY], None, 0.0, "time", self.sources)
         names = [name for name in (*SHARES, "discrepancy_sd", *(f"alone_{part}" for part in BAND)) if name in shared]
         errors = [f"{name}_error" for name in names if f"{name}_error" in shared]
         return table.assign(**{name: shared[name] for name in (*names, *errors)}, shared_draws=shared["draws"])
@@ -105,8 +109,10 @@ class ModelEnsemble:
         return [*_failed(self), *_beyond(self), *_too_few(self)]
 
 
-def gathered(tasks: Sequence[ModelRun], results: Sequence[Mapping[str, Any]]) -> ModelEnsemble:
-    """Return the ensemble of runs.
+def gathered(
+    tasks: Sequence[ModelRun], results: Sequence[Mapping[str, Any]], ensembles: Collection[Ensemble] = ()
+) -> ModelEnsemble:
+    """Return the ensemble of runs, with the draws of its materials.
 
     Raises
     ------
@@ -131,7 +137,18 @@ def gathered(tasks: Sequence[ModelRun], results: Sequence[Mapping[str, Any]]) ->
         tuple(_failures(pairs)),
         tuple(result["folder"] for result in by_family[COMPLETE] if not result["problem"]),
         sum(float(result["seconds"]) for result in results),
+        _sources(ensembles),
     )
+
+
+def _sources(ensembles: Collection[Ensemble]) -> dict[str, FloatArray]:
+    """Return what the draws of materials differ by, those of one run once."""
+    columns: dict[str, list[FloatArray]] = {}
+    for ensemble in ensembles:
+        for name, values in ensemble.sources.items():
+            if not any(np.array_equal(values, others) for others in columns.setdefault(name, [])):
+                columns[name].append(values)
+    return {name: np.concatenate(values, axis=1) for name, values in columns.items()}
 
 
 def on_common_times(curves: Sequence[Any]) -> tuple[FloatArray, FloatArray]:

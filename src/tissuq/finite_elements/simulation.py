@@ -131,7 +131,8 @@ class Simulation:
         """
         complete = self.forces[COMPLETE]
         material_only, without = self.forces.get(MATERIAL_ONLY, complete), self.forces.get(WITHOUT)
-        table = force_table(self.travel, complete, material_only, without, self.noise_sd, self.case.travel_column)
+        sources, column = self.ensembles[COMPLETE].sources, self.case.travel_column
+        table = force_table(self.travel, complete, material_only, without, self.noise_sd, column, sources)
         if self.mesh_changes:
             middle, spread = table["mean"] * self.mesh_factor, table["mean"] * np.abs(self.mesh_factor - 1) / 4
             table["mesh_free_mean"], table["mesh_free_sd"] = middle, np.hypot(table["sd"] * self.mesh_factor, spread)

@@ -18,11 +18,13 @@ __all__ = [
     "BAND",
     "PROBABILITY",
     "SHARES",
+    "SOURCES",
     "Band",
     "Shares",
     "band_of",
     "band_probability",
     "force_table",
+    "parts_of",
     "shares_of",
     "standard_errors",
 ]
@@ -30,6 +32,8 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 
 PROBABILITY = 0.95
+MIN_DRAWS_A_COLUMN = 5
+"""Draws for every column of a source, below which its part cannot be told."""
 BOOTSTRAP_RESAMPLES = 400
 """Number of bootstrap resamples of the draws for standard errors."""
 
@@ -49,11 +53,15 @@ class Shares:
     """Shares of the variance of a new measurement; they add up to one, and a single one can be negative or above one.
 
     With Q a draw's quantity and Q0 that of its parameters alone, Var Q = Cov(Q, Q0) + Cov(Q, Q - Q0): the parameters'
-    part and the discrepancy's. A negative one means that the two compensate each other in the posterior.
+    part and the discrepancy's. A negative one means that the two compensate each other in the posterior. What draws
+    differ by independently of both, `Ensemble.sources`, is taken out of these first: its part is what of Q is linear in
+    its columns, by least squares.
 
     Attributes
     ----------
     parameters, discrepancy, noise : (s,) arrays
+    extrapolation, test_scale : (s,) arrays
+        Not a number where the draws do not differ by these, or are fewer than five for every column.
     correlation : (s,) array
         Correlation of Q0 and Q - Q0; not a number without discrepancy.
 
@@ -66,6 +74,8 @@ class Shares:
     discrepancy: FloatArray
     noise: FloatArray
     correlation: FloatArray
+    extrapolation: FloatArray
+    test_scale: FloatArray
 
 
 def band_probability(draws: int) -> float:
@@ -94,17 +104,51 @@ def band_of(values: FloatArray) -> Band:
     return Band(values.mean(axis=0), values.std(axis=0, ddof=1), low, high)
 
 
-def shares_of(complete: FloatArray, material_only: FloatArray, noise_sd: float = 0.0) -> Shares:
-    """Return what the variance of draws (N, s) is due to, given the same draws (N, s) without their discrepancy."""
-    centred, centred_material = complete - complete.mean(axis=0), material_only - material_only.mean(axis=0)
-    discrepancy = centred - centred_material
-    total = (centred**2).mean(axis=0) * len(complete) / (len(complete) - 1) + noise_sd**2
-    terms = centred_material, discrepancy
-    covariances = [(centred * term).sum(axis=0) / (len(complete) - 1) for term in terms]
+def shares_of(
+    complete: FloatArray,
+    material_only: FloatArray,
+    noise_sd: float = 0.0,
+    sources: Mapping[str, FloatArray] | None = None,
+) -> Shares:
+    """Return what the variance of draws (N, s) is due to, given the same draws (N, s) without their discrepancy.
+
+    ``sources`` are those of `tissuq.Ensemble`, columns (N, k) by name.
+    """
+    return _shares(complete, parts_of(complete, material_only, sources or {}), noise_sd)
+
+
+def parts_of(
+    complete: FloatArray, material_only: FloatArray, sources: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the parts (N, s) that draws are made of, by what they are due to, and Q0 and Q - Q0 as they are."""
+    parts = {"Q0": material_only, "rest": complete - material_only}
+    remaining = {"parameters": material_only - material_only.mean(axis=0)}
+    remaining["discrepancy"] = complete - complete.mean(axis=0) - remaining["parameters"]
+    columns = np.concatenate([np.zeros((len(complete), 0)), *sources.values()], axis=1)
+    if columns.size and len(complete) >= MIN_DRAWS_A_COLUMN * columns.shape[1]:
+        columns = columns - columns.mean(axis=0)
+        for name, part in remaining.items():
+            remaining[name] = part - columns @ np.linalg.lstsq(columns, part, rcond=None)[0]
+        weights = np.linalg.lstsq(columns, complete - complete.mean(axis=0), rcond=None)[0]
+        ends = np.cumsum([0, *(values.shape[1] for values in sources.values())])
+        for name, start, end in zip(sources, ends, ends[1:], strict=False):
+            parts[name] = columns[:, start:end] @ weights[start:end]
+    return parts | remaining
+
+
+def _shares(complete: FloatArray, parts: Mapping[str, FloatArray], noise_sd: float) -> Shares:
+    """Return the shares of the variance of draws (N, s) that are due to their parts."""
+    centred = complete - complete.mean(axis=0)
+    total = (centred**2).sum(axis=0) / (len(complete) - 1) + noise_sd**2
+    unknown = np.full(len(total), np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
-        size = np.sqrt((centred_material**2).sum(axis=0) * (discrepancy**2).sum(axis=0))
-        correlation = (centred_material * discrepancy).sum(axis=0) / size
-        return Shares(covariances[0] / total, covariances[1] / total, noise_sd**2 / total, correlation)
+        due_to = {
+            name: (centred * parts[name]).sum(axis=0) / (len(complete) - 1) / total if name in parts else unknown
+            for name in SOURCES
+        }
+        first, second = (values - values.mean(axis=0) for values in (parts["Q0"], parts["rest"]))
+        correlation = (first * second).sum(axis=0) / np.sqrt((first**2).sum(axis=0) * (second**2).sum(axis=0))
+        return Shares(noise=noise_sd**2 / total, correlation=correlation, **due_to)
 
 
 def standard_errors(
@@ -125,7 +169,10 @@ def standard_errors(
 
 
 BAND = ("mean", "sd", "low", "high")
-SHARES = ("parameters", "discrepancy", "noise", "correlation")
+SOURCES = ("parameters", "discrepancy", "extrapolation", "test_scale")
+"""What the variance of draws may be due to."""
+SHARES = (*SOURCES, "noise", "correlation")
+ALWAYS = (*BAND, "parameters", "discrepancy", "noise", "correlation")
 
 
 def force_table(
@@ -135,6 +182,7 @@ def force_table(
     without: FloatArray | None,
     noise_sd: float,
     travel_name: str = "travel_mm",
+    sources: Mapping[str, FloatArray] | None = None,
 ) -> pd.DataFrame:
     """Return band and shares of the variance at every step, each with its standard error (``_error``).
 
@@ -149,6 +197,8 @@ def force_table(
         Standard deviation of a new measurement of the force, N.
     travel_name : str
         Name of its column.
+    sources : mapping of str to (N, k) array
+        What else the draws differ by, as in `Ensemble.sources`.
 
     Returns
     -------
@@ -165,7 +215,8 @@ def force_table(
         is_reached = np.isfinite(complete[:, step]) & np.isfinite(material_only[:, step])
         row["draws"] = int(is_reached.sum())
         if row["draws"] > 1:
-            row |= _with_errors(complete[is_reached, step], material_only[is_reached, step], noise_sd)
+            reached = {name: columns[is_reached] for name, columns in (sources or {}).items()}
+            row |= _with_errors(complete[is_reached, step], material_only[is_reached, step], noise_sd, reached)
             row["discrepancy_sd"] = float((complete - material_only)[is_reached, step].std(ddof=1))
         for name, values in (("alone", material_only[is_reached, step]), ("without", _reached(without, step))):
             if len(values) > 1:
@@ -178,13 +229,18 @@ def _reached(values: FloatArray | None, step: int) -> FloatArray:
     return np.zeros(0) if values is None else values[np.isfinite(values[:, step]), step]
 
 
-def _with_errors(complete: FloatArray, material_only: FloatArray, noise_sd: float) -> dict[str, float]:
-    def statistics(complete: FloatArray, material_only: FloatArray) -> dict[str, FloatArray]:
-        band, shares = band_of(complete), shares_of(complete, material_only, noise_sd)
-        return {name: getattr(band, name) for name in BAND} | {name: getattr(shares, name) for name in SHARES}
+def _with_errors(
+    complete: FloatArray, material_only: FloatArray, noise_sd: float, sources: Mapping[str, FloatArray]
+) -> dict[str, float]:
+    draws = complete[:, None]
+    parts = parts_of(draws, material_only[:, None], sources)
 
-    draws = complete[:, None], material_only[:, None]
-    estimates, errors = statistics(*draws), standard_errors(statistics, *draws)
+    def statistics(complete: FloatArray, *values: FloatArray) -> dict[str, FloatArray]:
+        band, shares = band_of(complete), _shares(complete, dict(zip(parts, values, strict=True)), noise_sd)
+        both = {name: getattr(band, name) for name in BAND} | {name: getattr(shares, name) for name in SHARES}
+        return {name: values for name, values in both.items() if name in ALWAYS or name in parts}
+
+    estimates, errors = statistics(draws, *parts.values()), standard_errors(statistics, draws, *parts.values())
     return {name: float(estimates[name][0]) for name in estimates} | {
         f"{name}_error": float(errors[name][0]) for name in errors
     }

@@ -62,7 +62,8 @@ def _compensated(simulation: Simulation) -> list[str]:
     smallest = 0.0
     for step in steps:
         rows = is_reached[:, step]
-        shares = shares_of(complete[rows, step, None], material_only[rows, step, None], simulation.noise_sd)
+        reached = {name: columns[rows] for name, columns in simulation.ensembles[COMPLETE].sources.items()}
+        shares = shares_of(complete[rows, step, None], material_only[rows, step, None], simulation.noise_sd, reached)
         smallest = min(smallest, float(shares.parameters[0]), float(shares.discrepancy[0]))
     if smallest > MAX_NEGATIVE_SHARE:
         return []

@@ -64,12 +64,18 @@ class EnergyDraw(StretchMaterial):
         The energy of a discrepancy that is one.
     continuation : Continuation or None
         The energy of all beyond the range of the data of such a discrepancy.
+    beyond_score : float
+        Quantile of the normal distribution at which the draw goes on beyond that range, less steeply or more.
+    test_scale : float
+        The factor of the error that all tests have in common.
     """
 
     number: int
     parts: tuple[tuple[Material, tuple[float, ...]], ...]
     discrepancy: PiecewiseEnergy | None
     continuation: Continuation | None = None
+    beyond_score: float = 0.0
+    test_scale: float = 1.0
 
     parameters = ()
     source = "tissuq"
@@ -142,6 +148,21 @@ class Ensemble(Sequence[EnergyDraw]):
     def admissible_share(self) -> float:
         """The share of the posterior that is admissible, as far as the tried draws tell."""
         return len(self.draws) / self.tried
+
+    @property
+    def sources(self) -> dict[str, FloatArray]:
+        """What the draws differ by besides parameters and discrepancy, independently of these: columns (N, k) by name.
+
+        ``extrapolation``, the score of how a draw goes on beyond the data and its square, where any does so;
+        ``test_scale``, the factor that all tests have in common, where there is one.
+        """
+        score, scale = (np.array([getattr(draw, name) for draw in self]) for name in ("beyond_score", "test_scale"))
+        columns = {}
+        if any(draw.continuation is not None for draw in self):
+            columns["extrapolation"] = np.stack([score, score**2 - 1], axis=1)
+        if np.ptp(scale) > 0:
+            columns["test_scale"] = scale[:, None] - 1
+        return columns
 
     @property
     def alone(self) -> Ensemble:
@@ -370,17 +391,21 @@ def _points(
 
 def _materials(solution: Solution, count: int, seed: list[int], sampling: Sampling) -> list[EnergyDraw]:
     """Return so many draws of a posterior as materials."""
+    from scipy.special import ndtri
+
     model = solution.model
     points, factor, probability = _points(solution, count, seed, sampling)
     values, _ = values_of(model, points, model.symbols)
     values = values * np.where(np.isin(model.symbols, model.column_symbols), factor[:, None], 1.0)
     energies = _energies(model, points, factor) if model.energy_symbols else [None] * count
     draws = []
+    beyond_scores = ndtri(probability)
     for number, (row, energy) in enumerate(zip(values, energies, strict=True)):
         parameters = dict(zip(model.symbols, map(float, row), strict=True))
         extra_term = model.discrepancy.material_part(parameters)
         base_term = model.material, tuple(parameters[symbol] for symbol in model.material_symbols)
-        draws.append(EnergyDraw(number, (base_term, extra_term) if extra_term else (base_term,), energy))
+        parts = (base_term, extra_term) if extra_term else (base_term,)
+        draws.append(EnergyDraw(number, parts, energy, None, float(beyond_scores[number]), float(factor[number])))
     return _continued(model, draws, points.member, scores(probability)) if points.member is not None else draws
 
 

@@ -19,6 +19,7 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.ensemble_figures import band_over_time, ensemble_figures, write_fields
 from tissuq.report.result import MAX_NUMBERS, Block, Number, Picture, Preformatted, Result, Section, Table
+from tissuq.report.simulation_figures import LABELS, OF_SOURCES, shares_in
 from tissuq.report.tables import significant
 from tissuq.studies.ensemble import EnsembleStudy
 from tissuq.studies.ensemble_files import DRAWS
@@ -101,11 +102,12 @@ def _numbers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> tuple[Num
             Number(f"{name} at the end", row["mean"], row["low"], row["high"], interval_is=f"{percent} band")
         )
     row = _last(next(iter(tables.values())))
-    shares = {name: row[name] for name in ("parameters", "discrepancy") if study.result.is_shared}
+    first = next(iter(tables.values()))
+    shares = {name: row[name] for name in shares_in(first, is_shared=study.result.is_shared)}
     if shares and all(np.isfinite(share) for share in shares.values()):
         largest = max(shares, key=lambda name: shares[name])
         share = f"{100 * shares[largest]:.0f} ± {100 * row[f'{largest}_error']:.0f} % of the variance"
-        numbers.append(Number("uncertain mostly by", largest, remark=share))
+        numbers.append(Number("uncertain mostly by", LABELS[largest], remark=share))
     return tuple(numbers)
 
 
@@ -207,13 +209,14 @@ def _plain(row: dict[str, Any]) -> dict[str, Any]:
 
 def _headers(study: EnsembleStudy, tables: dict[str, pd.DataFrame]) -> list[str]:
     percent = f"{100 * band_probability(max(int(table['draws'].max()) for table in tables.values())):.0f} %"
-    return ["time", "draws", "mean", "sd", percent, *["parameters", "discrepancy"] * study.result.is_shared]
+    shares = shares_in(next(iter(tables.values())), is_shared=study.result.is_shared)
+    return ["time", "draws", "mean", "sd", percent, *(LABELS[name] for name in shares)]
 
 
 def _row(study: EnsembleStudy, row: dict[str, Any]) -> list[str]:
     cells = [f"{row['time']:.4g}", str(int(row["draws"])), significant(row["mean"]), significant(row["sd"])]
     cells.append(f"{significant(row['low'])} to {significant(row['high'])}")
-    for name in ["parameters", "discrepancy"] * study.result.is_shared:
+    for name in shares_in(row, is_shared=study.result.is_shared):
         share, error = row[name], row[f"{name}_error"]
         cells.append("" if np.isnan(share) else f"{100 * share:.0f} ± {100 * error:.0f} %")
     return cells
@@ -233,8 +236,9 @@ def _sections(
     sections = [
         Section(f"{name} over time", _quantity(study, name, table, headers, figures)) for name, table in tables.items()
     ]
-    if result.is_shared:
-        sections.append(Section("Sources of uncertainty", (SHARES,)))
+    if shares_in(next(iter(tables.values())), is_shared=result.is_shared):
+        sentences = (*[SHARES] * result.is_shared, *[OF_SOURCES] * bool(result.sources))
+        sections.append(Section("Sources of uncertainty", sentences))
     materials = [
         [name, ensemble.model.experiment.name, ensemble.model.material.name, ensemble.model.discrepancy.name,
          f"{ensemble.most[0]:.3g}", f"{ensemble.most[1]:.3g}"]
@@ -273,7 +277,8 @@ def _quantity(
     study: EnsembleStudy, name: str, table: pd.DataFrame, headers: list[str], figures: Callable[[], dict[str, Figure]]
 ) -> tuple[Block, ...]:
     """Return definition, figure and some times of a quantity."""
-    full, is_shared = table[table["draws"] > 1], study.result.is_shared
+    full = table[table["draws"] > 1]
+    is_shared = bool(shares_in(table, is_shared=study.result.is_shared))
     picked = full.iloc[np.unique(np.linspace(0, len(full) - 1, ROWS).round().astype(int))]
     rows = [_row(study, {str(key): value for key, value in row.items()}) for row in picked.to_dict("records")]
     text = next(quantity.text for quantity in study.prepared.quantities if quantity.name == name)

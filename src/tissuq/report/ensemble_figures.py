@@ -16,7 +16,7 @@ from tissuq.drawing import pieces
 from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.simulation_figures import SHARES as ALL_SHARES
-from tissuq.report.simulation_figures import draw_shares
+from tissuq.report.simulation_figures import draw_shares, shares_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,9 +67,9 @@ def _quantity(ensemble: ModelEnsemble, name: str) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.6, 3.7))
-    has_shares = ensemble.is_shared and len(ensemble.times[name]) > 1
-    axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
     table = ensemble.table(name)
+    has_shares = bool(shares_in(table, is_shared=ensemble.is_shared)) and len(ensemble.times[name]) > 1
+    axes = figure.subplots(1, 3 if has_shares else 2, width_ratios=(1.5, 1, 1)[: 3 if has_shares else 2])
     table = table[table["draws"] > 1]
     _draw_band(axes[0], table, name)
     last = ensemble.last_values(name)

@@ -15,12 +15,15 @@ from tissuq.finite_elements.simulation import COMPLETE, FAMILIES, MATERIAL_ONLY,
 from tissuq.finite_elements.spread import band_probability
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.simulation_figures import (
+    LABELS,
+    OF_SOURCES,
     SHARES,
     force_figure,
     handy_unit,
     is_mesh_free,
     mesh_ratio,
     prefix_of,
+    shares_in,
     simulation_figures,
     write_collection,
     write_vtu,
@@ -118,7 +121,7 @@ def _numbers(study: SimulationStudy, table: pd.DataFrame) -> tuple[Number, ...]:
     if len(shares) > 1:
         largest = max(shares, key=lambda name: shares[name])
         share = f"{_percent(shares[largest], last[f'{largest}_error'])} of the variance"
-        numbers.append(Number("uncertain mostly by", largest, remark=share))
+        numbers.append(Number("uncertain mostly by", LABELS[largest], remark=share))
     beyond = _last_mean(simulation.energy_beyond)
     if beyond is not None:
         numbers.append(Number("energy strained beyond the measurements", f"{100 * beyond:.0f} %"))
@@ -136,10 +139,11 @@ def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]
     simulation, table = study.simulation, study.simulation.table()
     unit, factor = handy_unit(table, simulation.case.response_unit)
     percent = f"{100 * band_probability(int(table['draws'].max())):.0f} %"
-    is_compared, is_shared = WITHOUT in simulation.forces, MATERIAL_ONLY in simulation.forces
+    is_compared = WITHOUT in simulation.forces
+    shares = [*shares_in(table, is_shared=MATERIAL_ONLY in simulation.forces), "noise"]
     case = simulation.case
     headers = [f"{case.travel_name}, {case.travel_unit}", "draws", f"{case.response}, {unit}", "sd", percent]
-    headers += ["parameters", "discrepancy"] * is_shared + ["noise"]
+    headers += [LABELS[name] for name in shares]
     headers += ["without discrepancy", percent] * is_compared
     prefix = prefix_of(table)
     headers += ["on this mesh"] * bool(prefix)
@@ -147,8 +151,7 @@ def readable_forces(study: SimulationStudy) -> tuple[list[str], list[list[str]]]
     for row in table.to_dict("records"):
         numbers = {str(key): value for key, value in row.items()}
         cells = [f"{row[case.travel_column]:.3g}", str(row["draws"]), *_band(numbers, factor, prefix)]
-        for name in (["parameters", "discrepancy"] if is_shared else []) + ["noise"]:
-            cells.append(_percent(numbers[name], numbers[f"{name}_error"]))
+        cells += [_percent(numbers[name], numbers[f"{name}_error"]) for name in shares]
         if is_compared:
             mean, _, ends = _band(numbers, factor * mesh_ratio(numbers), "without_")
             cells += [mean, ends]
@@ -275,6 +278,7 @@ def _sections(study: SimulationStudy, table: pd.DataFrame) -> tuple[Section, ...
             f"Q is the {case.response} of a draw with its discrepancy, Q0 that of the same draw with its material "
             "parameters alone. **Parameters** is Cov(Q, Q0), **discrepancy** Cov(Q, Q − Q0), **noise** the variance of "
             f"the noise of a new measurement (sd {noise}{said}). They add up to 100 % of Var Q + noise.",
+            *[OF_SOURCES] * bool(simulation.ensembles[COMPLETE].sources),
             "A share below zero or above 100 % is possible because parameters and discrepancy are correlated in the "
             "posterior. A negative share means that more information on this part alone would not narrow the band.",
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.drawing import pieces
-from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, STYLE, TRUTH, new_figure
+from tissuq.drawing.style import ANSWER_WIDTH, BAND, BASE, INK, SERIES, STYLE, TRUTH, new_figure
 from tissuq.finite_elements.case import ACROSS, AXIAL, Mesh
 from tissuq.finite_elements.simulation import MATERIAL_ONLY, WITHOUT, Simulation
 from tissuq.finite_elements.spread import band_probability
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "LABELS",
+    "OF_SOURCES",
     "SHARES",
     "draw_shares",
     "force_figure",
@@ -29,6 +31,7 @@ __all__ = [
     "is_mesh_free",
     "mesh_ratio",
     "prefix_of",
+    "shares_in",
     "simulation_figures",
     "write_collection",
     "write_vtu",
@@ -37,7 +40,14 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 
 UNITS = {"N": (("N", 1.0), ("mN", 1e3), ("µN", 1e6)), "mm": (("mm", 1.0), ("µm", 1e3))}
-SHARES = {"parameters": BAND, "discrepancy": TRUTH, "noise": BASE}
+SHARES = {"parameters": BAND, "discrepancy": TRUTH, "extrapolation": SERIES[2], "test_scale": SERIES[3], "noise": BASE}
+"""Colours of what a variance is due to."""
+LABELS = {name: name for name in SHARES} | {"test_scale": "scale of tests"}
+OF_SOURCES = (
+    "What draws differ by independently of these is taken out first: **extrapolation**, how they go on beyond the "
+    "measured range, and the **scale of tests**, the factor that all tests have in common (area, load cell; of a "
+    "tissue the difference between specimens, too)."
+)
 MIN_STRAIN, MARGIN = 0.04, 0.5
 """Section shown: cells with this fraction of the largest strain or more, and a margin in fractions of their extent."""
 
@@ -61,6 +71,12 @@ def prefix_of(table: pd.DataFrame) -> str:
 def mesh_ratio(row: Mapping[str, Any]) -> float:
     """Return what a force on the mesh is multiplied with for cells without size; 1 where that is not known."""
     return float(row["mesh_free_mean"] / row["mean"]) if "mesh_free_mean" in row else 1.0
+
+
+def shares_in(table: Collection[str] | pd.DataFrame, *, is_shared: bool) -> list[str]:
+    """Return the sources of variance that a table, or a row of one, has shares of, where there are several."""
+    sources = [name for name in SHARES if name in table and name != "noise"]
+    return sources if is_shared or len(sources) > 2 else []
 
 
 def simulation_figures(simulation: Simulation, table: pd.DataFrame) -> dict[str, Figure]:
@@ -172,9 +188,11 @@ def draw_shares(axis: Axes, along: Any, table: pd.DataFrame, colors: Mapping[str
     """Draw the shares of a variance, ± their standard errors, over time or travel."""
     axis.axhline(0, color=INK, lw=0.8)
     for name, color in colors.items():
+        if name not in table:
+            continue
         share, error = (100 * table[key].to_numpy() for key in (name, f"{name}_error"))
         pieces.band(axis, along, share - error, share + error, color=color, strength=0.2)
-        pieces.line(axis, along, share, color=color, label=name, marker="o", ms=3.5)
+        pieces.line(axis, along, share, color=color, label=LABELS[name], marker="o", ms=3.5)
     axis.set_title("Share of the variance [%]")
     axis.legend(fontsize=9)
 

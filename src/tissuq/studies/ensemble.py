@@ -240,7 +240,7 @@ def run_ensemble(
             )
         results = run_tasks(unique, carried_out, folder, pool=pool, limit=limit, step=step)
     by_key = {task.key: {**result, "folder": task.folder.name} for task, result in zip(unique, results, strict=True)}
-    return EnsembleStudy(prepared, gathered(tasks, [by_key[task.key] for task in tasks]))
+    return EnsembleStudy(prepared, gathered(tasks, [by_key[task.key] for task in tasks], prepared.ensembles.values()))
 
 
 def _check_names(quantities: tuple[Quantity, ...], ensembles: Mapping[str, Ensemble]) -> None:
