@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
 from tissuq.errors import InputError
@@ -81,6 +81,17 @@ class AnsysDeck(DeckFormat):
             if lines
         ]
 
+    def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
+        """Return the components of nodes (``CMBLOCK``); in their lists a negative number ends a range."""
+        sets: dict[str, set[int]] = {}
+        for content in files:
+            lines = iter([line.text for line in lines_of(content)])
+            for line in lines:
+                words = [word.strip() for word in line.partition("!")[0].split(",")]
+                if words[0].upper() == "CMBLOCK" and _word(words, 2).upper().startswith("NODE"):
+                    sets[words[1].upper()] = _component(lines, int(words[3]))
+        return sets
+
     def fragment(self, material: DeckMaterial, block: str) -> str:
         return block
 
@@ -107,6 +118,23 @@ def _parameters(content: bytes, names: Collection[str]) -> list[tuple[str, str]]
         if key.strip().upper() in by_name and value.strip().isdecimal():
             values.append((by_name[key.strip().upper()], value.strip()))
     return values
+
+
+def _component(lines: Iterator[str], count: int) -> set[int]:
+    """Return the members of a component from the lines below its head: their format, and a number of entries."""
+    form = re.search(r"i(\d+)", next(lines, ""), re.IGNORECASE)
+    if form is None:
+        raise InputError("the deck has a CMBLOCK without the format of its numbers, as (8i10).")
+    width, entries = int(form[1]), list[int]()
+    while len(entries) < count:
+        line = next(lines, "").rstrip()
+        if not line:
+            raise InputError("the deck has a CMBLOCK that is cut short.")
+        entries += [int(line[start : start + width]) for start in range(0, len(line), width)]
+    members: set[int] = set()
+    for before, entry in zip([0, *entries], entries, strict=False):
+        members |= {entry} if entry > 0 else set(range(before, -entry + 1))
+    return members
 
 
 def _word(words: list[str], index: int) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tissuq.decks.abaqus import AbaqusDeck, node_sets
+from tissuq.decks.calculix_results import CalculiXResults
 from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
 from tissuq.decks.quantity import Component, Quantity, Results
@@ -133,7 +133,7 @@ def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
         When they are not understood.
     """
     is_needed = any(isinstance(quantity, Component) for quantity in quantities)
-    return node_sets(list(deck.files.values())) if is_needed and isinstance(deck.format, AbaqusDeck) else {}
+    return deck.format.node_sets(list(deck.files.values())) if is_needed else {}
 
 
 def _digest(*parts: object) -> str:
@@ -214,7 +214,7 @@ def _curves(task: ModelRun, results: Results) -> tuple[dict[str, Any], str]:
 def _saved_fields(task: ModelRun, results: Results) -> tuple[str, Any]:
     """Write the fields of a run that ended well; return why it cannot, and the share of elements beyond the data."""
     try:
-        frd = results.frd
+        frd = results.file.frd if isinstance(results.file, CalculiXResults) else None
     except InputError as error:
         return str(error), None
     fields = final_fields(frd) if frd is not None else None
