@@ -36,6 +36,7 @@ class EnsembleOptions(LawOfRun, Configured):
     retries: int = option(0, "Times that a failed run is made again, as for a licence.", ge=0)
     again: bool = option(False, "Make runs again that failed earlier.")
     keep: bool = option(True, "Keep the solver's files of every draw.")
+    abaqus: str = option("", "Program that opens .odb files, as its 'python' [first word of --command].")
     dry_run: bool = option(False, "Show what changes in the deck, and run nothing.")
     figures: bool = option(True, "Draw the figures.")
 
@@ -75,7 +76,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     with open_pool(how.max_jobs or os.cpu_count() or 1, how.scheduler) as pool:
         study = run_ensemble(
             prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
-            retries=how.retries, keep=how.keep, progress=call.campaign_in(folder),
+            retries=how.retries, keep=how.keep, abaqus=how.abaqus, progress=call.campaign_in(folder),
         )  # fmt: skip
     print_explanations(prepared.card_warnings)
     call.put_into(folder, ensemble_result(study, folder), figures=how.figures)

@@ -1,6 +1,7 @@
 """The user's model in an input deck: its material replaced, the solver run, and what it gives read."""
 
 from tissuq.decks.abaqus import AbaqusDeck
+from tissuq.decks.abaqus_results import AbaqusResults
 from tissuq.decks.ansys import AnsysDeck
 from tissuq.decks.ansys_results import AnsysResults
 from tissuq.decks.calculix_results import CalculiXResults
@@ -15,6 +16,7 @@ from tissuq.decks.solver import CalculiXSolver, CommandSolver, FEBioSolver, Solv
 
 __all__ = [
     "AbaqusDeck",
+    "AbaqusResults",
     "AnsysDeck",
     "AnsysResults",
     "CalculiXResults",

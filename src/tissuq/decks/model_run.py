@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -59,6 +60,8 @@ class ModelRun:
         Times that a run which failed is made again.
     keep : bool
         Keep the files of the solver.
+    abaqus : str
+        The program that opens .odb files; unless given, the first word of the solver's command.
     """
 
     family: str
@@ -74,6 +77,7 @@ class ModelRun:
     timeout: float | None = None
     retries: int = 0
     keep: bool = True
+    abaqus: str = ""
 
     @property
     def solver_key(self) -> str:
@@ -108,7 +112,9 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     deck = task.deck
     job_folder = task.folder / PurePosixPath(task.main).parent
     sets = sets_of(deck, task.quantities)
-    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets)
+    asked = tuple((quantity.kind, quantity.set_name) for quantity in task.quantities if isinstance(quantity, Component))
+    program = task.abaqus or shlex.quote(task.solver.words(deck.job, deck.main)[0])
+    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets, asked, program)
     curves, misread = _curves(task, results)
     beyond = None
     if not misread and not stored["problem"]:
