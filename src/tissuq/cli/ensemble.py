@@ -10,7 +10,7 @@ from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
 from tissuq.cli.named_again import check_named_again
-from tissuq.cli.running import Configured, LawOfRun
+from tissuq.cli.running import SCHEDULER, Configured, LawOfRun
 from tissuq.errors import InputError
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.option import argument, option
@@ -31,7 +31,7 @@ class EnsembleOptions(LawOfRun, Configured):
     run: Path | None = argument(None, "Run folder of tissuq fit.")
     out: Path | None = option(None, "Folder of the ensemble [runs/RUN-MODEL].")
     max_jobs: int | None = option(None, "Runs of the solver at a time, as many as licences [one a core].", ge=1)
-    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
+    scheduler: str | None = option(None, SCHEDULER)
     timeout: float | None = option(None, "Seconds after which a run is stopped [never].", unit="s", ge=0)
     retries: int = option(0, "Times that a failed run is made again, as for a licence.", ge=0)
     again: bool = option(False, "Make runs again that failed earlier.")
