@@ -84,14 +84,15 @@ def test_what_is_not_there_is_told_in_the_words_of_ansys(beam, text, words):
 
 
 def content_with_reactions():
-    """Two states of three nodes, of which two are held; the second state was given up; its components are in it."""
+    """Three states of three nodes, of which two are held; the first has no forces, the last was given up."""
     forces = np.array([5.0, -2.0, 7.0, 1e3]), np.array([30, 10, 30, 30]), np.array([1, 2, 1, 4])
     return SimpleNamespace(
         mesh=SimpleNamespace(nnum=np.array([10, 30, 20])),
         node_components={"Clamp": np.array([10, 30])},
-        time_values=np.array([1.0, 1.5]),
+        time_values=np.array([0.5, 1.0, 1.5]),
         available_results={"RF": True, "NSL": True, "ENS": False},
-        _resultheader={"ls_table": np.array([[1, 1, 1], [1, 999999, 2]])},
+        _resultheader={"ls_table": np.array([[1, 1, 1], [1, 2, 2], [1, 999999, 3]])},
+        _solution_header=lambda place: {"ptrRF": 100 * place, "ptrNSL": 50},
         nodal_reaction_forces=lambda place: forces,
         nodal_displacement=lambda place: (np.array([10, 20, 30]), np.array([[0, 0], [3.0, 4.0], [0, 0]])),
     )
@@ -109,9 +110,10 @@ def test_reactions_are_summed_by_node_and_direction_up_to_the_last_state_that_co
         "RF1@CLAMP": [12.0],
         "RF2@CLAMP": [-2.0],
         "RF@FREE": [0.0],
-        "U@FREE": [5.0],
+        "U@FREE": [5.0, 5.0],
     }
-    assert values["U@FREE"].times.tolist() == [1.0]
+    assert values["U@FREE"].times.tolist() == [0.5, 1.0]
+    assert values["RF1@CLAMP"].times.tolist() == [1.0]
 
 
 def test_without_the_library_its_extra_is_named(tmp_path, monkeypatch):

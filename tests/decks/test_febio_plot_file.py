@@ -8,7 +8,8 @@ import zlib
 import numpy as np
 import pytest
 
-from tissuq.decks import parse_quantity
+from tissuq.decks import CommandSolver, parse_quantity
+from tissuq.decks.model_run import ModelRun, carried_out
 from tissuq.decks.result_file import Results
 from tissuq.errors import InputError
 
@@ -280,3 +281,23 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path, content, words):
     (tmp_path / "job.xplt").write_bytes(content)
     with pytest.raises(InputError, match=words):
         read(tmp_path, "U1")
+
+
+def test_a_draw_in_a_deck_of_febio_gives_the_curve_of_its_plot_file(tmp_path):
+    """The solver is a stand-in that leaves the plot file; sets of the deck are those in it."""
+    written(tmp_path)
+    model = tmp_path / "model"
+    model.mkdir()
+    (model / "punch.feb").write_text(
+        '<febio_spec version="4.0"><Material><material id="1" name="Fat" type="neo-Hookean"><E>1</E><v>0.3</v>'
+        "</material></Material></febio_spec>"
+    )
+    card = '<material id="1" name="Fat" type="neo-Hookean">\n<E>2</E>\n<v>0.3</v>\n</material>\n'
+    task = ModelRun(
+        "complete", 0, model, "punch.feb", "febio", (("Fat", card),),
+        CommandSolver(f"cp {tmp_path}/job.xplt {{job}}.xplt"),
+        (parse_quantity("force", "RF1@Loaded"),), (), tmp_path / "draws" / "one",
+    )  # fmt: skip
+    result = carried_out(task)
+    assert (result["problem"], result["misread"]) == ("", "")
+    assert result["curves"]["force"] == [[0.0, 0.5, 1.0], [0.0, 2.0, 4.0]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -16,8 +17,8 @@ __all__ = ["AnsysResults"]
 
 FloatArray = NDArray[np.float64]
 
-WRITTEN = {"U": "NSL", "RF": "RF", "S": "ENS"}
-"""What the library calls a field that was written."""
+WRITTEN = {"U": ("NSL", "ptrNSL"), "RF": ("RF", "ptrRF"), "S": ("ENS", "ptrESL")}
+"""What the library calls a field that was written, and the place in a state where it begins, zero without it."""
 AS_TENSOR = [0, 1, 2, 3, 5, 4]
 """Places of 11, 22, 33, 12, 13, 23 in a tensor, which ANSYS writes as X, Y, Z, XY, YZ, XZ."""
 NOT_CONVERGED = 999999
@@ -76,13 +77,16 @@ class AnsysResults(ResultFile):
         ]
 
     def field(self, kind: str) -> Values | None:
-        if kind not in WRITTEN or not self._converged or not self.content.available_results[WRITTEN[kind]]:
+        if kind not in WRITTEN or not self.content.available_results[WRITTEN[kind][0]]:
+            return None
+        places = [place for place in self._converged if self.content._solution_header(place)[WRITTEN[kind][1]]]
+        if not places:
             return None
         read = {"U": self._displacements, "RF": self._reactions, "S": self._stresses}[kind]
-        return Values(
-            np.array([self.content.time_values[place] for place in self._converged], dtype=np.float64),
-            np.array([read(place) for place in self._converged]),
-        )
+        times = np.array([self.content.time_values[place] for place in places], dtype=np.float64)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the libraries that the reader uses
+            return Values(times, np.array([read(place) for place in places]))
 
     def of_set(self, kind: str, set_name: str, how: str) -> Values | None:
         """Return a field at the members of a set; of stresses, which are at corners alone, at those members."""

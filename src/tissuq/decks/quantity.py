@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.result_file import ALL, TENSOR, ResultFile, Results
+from tissuq.decks.result_file import ALL, TENSOR, Results, result_files
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import LAW, failures_of, run_file
-from tissuq.registry import variants
 
 __all__ = [
     "Component",
@@ -131,7 +130,7 @@ class Component(Quantity):
     def _read(self, results: Results) -> Curve:
         file = results.file
         if file is None:
-            known = ", ".join(suffix for kind in variants(ResultFile).values() for suffix in kind.suffixes)
+            known = ", ".join(suffix for kind in result_files() for suffix in kind.suffixes)
             raise InputError(
                 f"{self.text}: the run of '{results.job}' left no file that can be read ({known}); {OWN_FUNCTION}."
             )

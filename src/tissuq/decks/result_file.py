@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tissuq.errors import InputError
 from tissuq.registry import plugins, variants
 
-__all__ = ["ALL", "TENSOR", "ResultFile", "Results", "Values"]
+__all__ = ["ALL", "TENSOR", "ResultFile", "Results", "Values", "result_files"]
 
 FloatArray = NDArray[np.float64]
 
@@ -61,10 +61,9 @@ class Results:
     @cached_property
     def file(self) -> ResultFile | None:
         """The result file that is there; None where none is that can be read."""
-        plugins(ResultFile)
         found = [
             (place, kind, path)
-            for kind in variants(ResultFile).values()
+            for kind in result_files()
             for place, suffix in enumerate(kind.suffixes)
             if (path := self._with_suffix(suffix)) is not None
         ]
@@ -79,6 +78,11 @@ class Results:
             return self.folder / f"{self.job}{suffix}"
         written = [path for path in sorted(self.folder.glob(f"*{suffix}")) if not path.is_symlink()]
         return min(written, key=lambda path: len(path.name), default=None)
+
+
+def result_files() -> list[type[ResultFile]]:
+    """Return the classes of result files, those of other packages last."""
+    return list(dict.fromkeys([*variants(ResultFile).values(), *plugins(ResultFile)]))
 
 
 class ResultFile(ABC):
