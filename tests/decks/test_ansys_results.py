@@ -130,7 +130,12 @@ def test_a_file_that_is_none_is_refused(beam, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("below", "words"), [("         1\n", "without the format"), ("(8i10)\n         1\n\n", "is cut short")]
+    ("below", "words"),
+    [
+        ("         1\n", "lacks the format"),
+        ("(8i10)\n         1\n\n", "is cut short"),
+        ("(8i10)\n    a    b\n", "or damaged"),
+    ],
 )
 def test_a_component_that_is_damaged_is_refused(below, words):
     with pytest.raises(InputError, match=words):
