@@ -86,7 +86,7 @@ def root(nodal, domains, version=0x0032, compression=0):
 
 
 def mesh():
-    """WriteMeshSection of two hexahedra, each a domain, with a set of nodes and one of facets."""
+    """WriteMeshSection of two hexahedra, each a domain, and an empty one, with a set of nodes and one of facets."""
     coordinates = b"".join(struct.pack("<i3f", index, *point) for index, point in enumerate(POINTS))
     domains = [
         Branch(
@@ -102,6 +102,7 @@ def mesh():
         )
         for number, element in enumerate((FIRST, SECOND), start=1)
     ]
+    domains.append(Branch(0x01042100, Branch(0x01042101, integers(0x01032104, 0)), Branch(0x01042200)))  # is empty
     node_set = Branch(
         0x01044100,
         Branch(0x01044101, integers(0x01044102, 1), integers(0x01044104, 4), string(0x01044103, "Fixed")),

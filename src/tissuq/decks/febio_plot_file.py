@@ -178,7 +178,7 @@ def _variables(dictionary: memoryview) -> dict[str, tuple[int, int, int]]:
 def _mesh(mesh: memoryview, variables: Mapping[str, tuple[int, int, int]]) -> PlotFile:
     rows = np.frombuffer(child(mesh, NODE_SECTION, COORDINATES), dtype="<f4").reshape(-1, 4)
     domains = [
-        np.stack([_integers(element)[1:] for _, element in chunks(child(domain, ELEMENTS))])
+        np.array([_integers(element)[1:] for _, element in chunks(child(domain, ELEMENTS))], dtype=np.int64)
         for _, domain in chunks(child(mesh, DOMAINS))
     ]
     sets = {}
