@@ -92,7 +92,7 @@ def frame(value, load):
 
 ODB = {
     "sets": {"TOP": {"PART-1": [2], "PART-2": [1]}, "PUNCH": {"ASSEMBLY": [5]}, "BOTH": {"PART-1": [1, 2]}},
-    "instances": {"PART-1": {"Edge": [1]}, "PART-2": {"EDGE": [1]}},
+    "instances": {"PART-1": {"Edge": [1], "TOP": [1]}, "PART-2": {"EDGE": [1]}},
     "steps": [
         {"total": 0.0, "frames": [frame(0.0, 0.0), frame(0.5, 1.0), frame(1.0, 2.0)]},
         {"total": 1.0, "frames": [frame(0.0, 2.0), frame(1.0, 3.0)]},
@@ -161,7 +161,10 @@ def test_it_is_opened_once_for_all_that_is_asked_for(abaqus, tmp_path):
     [
         ("RF1@TOP", r"no number at some nodes of the set 'TOP'"),
         ("E11@TOP", r"E11@TOP:mean is not in 'job.odb': this program has none; give it by a function"),
-        ("U1@SIDE", r"no set of nodes 'SIDE'; its sets are BOTH, EDGE, PART-1.EDGE, PART-2.EDGE, PUNCH, TOP"),
+        (
+            "U1@SIDE",
+            r"no set of nodes 'SIDE'; its sets are BOTH, EDGE, PART-1.EDGE, PART-1.TOP, PART-2.EDGE, PUNCH, TOP",
+        ),
     ],
 )
 def test_what_is_not_there_is_told(abaqus, tmp_path, text, words):

@@ -21,13 +21,13 @@ def node_sets(odb):
     """Return the nodes of every set as pairs of instance and label, by its name in capitals."""
     found = {}
     assembly = odb.rootAssembly
-    for name in assembly.nodeSets.keys():
-        found[name.strip().upper()] = members_of(assembly.nodeSets[name])
     for instance in assembly.instances.values():
         for name in instance.nodeSets.keys():
             members = members_of(instance.nodeSets[name])
             found[(instance.name + "." + name).upper()] = members
             found.setdefault(name.upper(), set()).update(members)
+    for name in assembly.nodeSets.keys():  # which is meant, where parts have a set of its name
+        found[name.strip().upper()] = members_of(assembly.nodeSets[name])
     return found
 
 
