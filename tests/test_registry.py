@@ -10,6 +10,7 @@ import pytest
 
 import tissuq as tq
 from tissuq import registry
+from tissuq.decks.result_file import ResultFile, Results
 from tissuq.experiments.modes import loading_mode
 from tissuq.experiments.modes.one_control import Uniaxial
 from tissuq.experiments.reading import FileFormat
@@ -29,6 +30,7 @@ BASES = [
     tq.Prior,
     FileFormat,
     CardFormat,
+    ResultFile,
     Case,
 ]
 
@@ -77,6 +79,18 @@ def test_classes_of_other_packages_are_found_by_the_name_of_their_entry_point(pa
     assert type(card_format("plain")) is kinds["plain"]
     assert registry.find(Case, "case", "pulled", tq.InputError) is kinds["pulled"]
     assert [registry.plugins(base) for base in (tq.LoadingMode, Case)] == [[kinds["upright"]], [kinds["pulled"]]]
+
+
+def test_a_result_file_of_another_package_is_chosen_by_its_suffix(package, tmp_path):
+    methods = {
+        "suffixes": (".d3plot",),
+        "requests": {},
+        "nodes": property(lambda self: []),
+        "field": lambda self, kind: None,
+    }
+    vars(package)["shells"] = type("Shells", (ResultFile,), {"__module__": package.__name__, **methods})
+    (tmp_path / "job.d3plot").touch()
+    assert type(Results(tmp_path, "job").file) is vars(package)["shells"]
 
 
 def test_a_broken_entry_point_is_refused_with_its_name_and_package(package):

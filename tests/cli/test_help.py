@@ -160,6 +160,7 @@ def test_every_former_name_stands_for_an_option_of_today_and_is_none_itself():
 
 
 MEANINGS = {
+    "--abaqus": "the program that opens .odb files",
     "--config": "the file of settings",
     "--discrepancy": "a discrepancy: of a fit to come, or of a run that has several",
     "--draws": "a number of draws from the posterior",

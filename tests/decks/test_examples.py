@@ -45,8 +45,8 @@ def draws():
     data = tq.simulate("neo-hookean", {"C10": 0.0005}, stretch, noise_sd=2e-5, seed=1)
     like = tq.fit(data, discrepancy="none", noise_sd=2e-5).ensemble(1)
 
-    def draw(law):
-        energy = tq.EnergyDraw(0, ((material_named(law), tuple(LAWS[law])),), None)
+    def draw(law, scale=1.0):
+        energy = tq.EnergyDraw(0, ((material_named(law), tuple(scale * value for value in LAWS[law])),), None)
         return replace(like, draws=(energy,))
 
     return draw
@@ -69,7 +69,7 @@ def mesh_of(deck):
     """Return points, cells (hexahedra of 20 nodes) and sets of nodes of a deck, read here by themselves."""
     text = "".join(content.decode() for content in Deck.read(EXAMPLES / deck).files.values())
     nodes = re.search(r"\*NODE, NSET=ALL\n(.*?)(?=\n\*)", text, re.DOTALL)[1]
-    elements = re.search(r"\*ELEMENT, TYPE=C3D20R[^\n]*\n(.*?)(?=\n\*)", text, re.DOTALL)[1]
+    elements = "\n".join(re.findall(r"\*ELEMENT, TYPE=C3D20R[^\n]*\n(.*?)(?=\n\*)", text, re.DOTALL))
     points = np.array([[float(word) for word in line.split(",")[1:]] for line in nodes.splitlines()])
     numbers = np.array([int(word) for word in re.findall(r"\d+", elements)]).reshape(-1, 21)
     sets = {
@@ -211,6 +211,67 @@ def test_the_tube_opens_as_the_closed_form_says(draws, tmp_path):
     assert result["curves"]["opening"][1][-1] == pytest.approx(wanted, rel=2e-3)
     outside = np.sqrt(outer**2 + (inner + wanted) ** 2 - inner**2) - outer
     assert result["curves"]["outer"][1][-1] == pytest.approx(outside, rel=2e-3)
+
+
+def two_tissues_in_felupe(skin, fat, travel=1.0):
+    """Return the force on the punch, and the field, from FElupe with the same reduced elements of both materials."""
+    felupe = pytest.importorskip("felupe")
+    points, cells, sets = mesh_of("two-tissues.inp")
+    is_skin = points[cells, 1].min(axis=1) >= 8.0
+    assert is_skin.sum() == 14
+
+    def field_of(cells):
+        mesh = felupe.Mesh(points, cells, "hexahedron20")
+        region = felupe.RegionQuadraticHexahedron(mesh, quadrature=felupe.GaussLegendre(order=1, dim=3))
+        return felupe.FieldContainer([felupe.Field(region, dim=3)])
+
+    field = field_of(cells)
+    bodies = [felupe.SolidBody(skin, field_of(cells[is_skin])), felupe.SolidBody(fat, field_of(cells[~is_skin]))]
+    fixed = {"MIDDLE": 0, "BOTTOM": 1, "PLANE": 2, "PUNCH": 1}
+    bounds = {
+        name: felupe.Boundary(field[0], mask=sets[name], skip=[axis != own for axis in range(3)])
+        for name, own in fixed.items()
+    }
+    step = felupe.Step(bodies, ramp={bounds["PUNCH"]: np.linspace(0, -travel, 6)[1:]}, boundaries=bounds)
+    felupe.Job([step]).evaluate(x0=field, verbose=0, tol=1e-8)
+    total = sum(body.results.force.toarray() for body in bodies)
+    return 1e-3 * total.reshape(-1, 3)[sets["PUNCH"], 1].sum(), field
+
+
+def mixed_run(draws, folder, laws):
+    """Run the deck of two tissues with a law in each."""
+    formatting = card_format("calculix")
+    cards = {
+        name: formatting.cards(draws(law, scale), CardSettings(bulk_modulus=BULK)).blocks[0]
+        for name, (law, scale) in laws.items()
+    }
+    quantities = {"force": "RF2@PUNCH", "edge": "U2@SURFACE:max"}
+    task = ModelRun(
+        "complete", 0, EXAMPLES, "two-tissues.inp", "abaqus", tuple(cards.items()), CalculiXSolver(),
+        tuple(parse_quantity(name, text) for name, text in quantities.items()), (), folder,
+    )  # fmt: skip
+    result = carried_out(task)
+    assert (result["problem"], result["misread"]) == ("", "")
+    return {name: values[-1] for name, (_, values) in result["curves"].items()}
+
+
+SKIN_AND_FAT = {"SKIN": ("yeoh", 20.0), "FAT": ("ogden-2", 1.0)}
+
+
+def test_skin_on_fat_has_the_force_and_the_surface_that_felupe_finds_on_its_mesh(draws, tmp_path):
+    """With a card in each of the two materials; with the cards exchanged the force is another."""
+    found = mixed_run(draws, tmp_path / "draw", SKIN_AND_FAT)
+    skin, fat = (FElupeMaterial(draws(*law)[0], BULK, unit=1e-3) for law in SKIN_AND_FAT.values())
+    force, field = two_tissues_in_felupe(skin, fat)
+    assert found["force"] == pytest.approx(force, rel=1e-4)
+    assert found["edge"] == pytest.approx(field[0].values[mesh_of("two-tissues.inp")[2]["SURFACE"], 1].max(), abs=2e-5)
+    fields = final_fields(read_frd(tmp_path / "draw" / "two-tissues.frd"))
+    np.testing.assert_allclose(fields.displacement, field[0].values, atol=2e-5)
+    assert sorted(set(fields.materials)) == ["FAT", "SKIN"]
+    exchanged = mixed_run(
+        draws, tmp_path / "exchanged", dict(zip(SKIN_AND_FAT, [*SKIN_AND_FAT.values()][::-1], strict=True))
+    )
+    assert abs(exchanged["force"] / found["force"] - 1) > 0.5
 
 
 def test_from_data_to_the_band_of_a_force_with_the_fields(cli_in, tmp_path):

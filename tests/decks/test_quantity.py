@@ -7,7 +7,7 @@ import pytest
 
 from tissuq.decks import parse_quantity
 from tissuq.decks.abaqus import node_sets
-from tissuq.decks.calculix_results import Frd
+from tissuq.decks.calculix_results import CalculiXResults, Frd
 from tissuq.decks.quantity import Results
 from tissuq.errors import InputError
 
@@ -157,7 +157,9 @@ def test_nodes_without_a_number_are_told_with_their_set(tmp_path):
     values = np.array([1.0, np.nan])
     frd = Frd(np.array([1, 2]), np.zeros((2, 3)), {}, {}, {"DISP": [(1.0, {f"D{axis}": values for axis in (1, 2, 3)})]})
     results = Results(tmp_path, "job", node_sets={"ONE": {1}})
-    results.__dict__["frd"] = frd
+    file = CalculiXResults(tmp_path / "job.frd", results)
+    file.__dict__["frd"] = frd
+    results.__dict__["file"] = file
     with pytest.raises(InputError, match=r"U1@ALL:mean.*'ALL'"):
         parse_quantity("q", "U1@ALL").read(results)
     assert parse_quantity("q", "U1@ONE").read(results).values.tolist() == [1.0]

@@ -16,6 +16,7 @@ from threading import Lock, Timer
 import pytest
 
 from tissuq.errors import InputError
+from tissuq.studies.batch_jobs import QUEUES, _options
 from tissuq.studies.stream import RESULTS, open_pool, run_tasks
 from worker_tasks import Number, doubled
 
@@ -147,3 +148,65 @@ def test_no_more_tasks_are_at_work_than_the_limit(tmp_path, limit, together):
         results = run_tasks([Number(n) for n in range(8)], carry_out, tmp_path, pool=pool, limit=limit)
     assert [result["twice"] for result in results] == [2 * n for n in range(8)]
     assert most[0] == together
+
+
+@pytest.fixture
+def queue(tmp_path, monkeypatch):
+    """A stand-in for SLURM: every job begins at once on this machine; one of the account ``nobody`` is refused."""
+    programs = {
+        "sbatch": 'if grep -q "nobody" "$1"; then echo "sbatch: error: Invalid account" >&2; exit 1; fi\n'
+        'cp "$1" jobs-$$.txt; sh "$1" > jobs-$$.log 2>&1 &\necho "Submitted batch job $!"\n',
+        "scancel": 'echo "$@" >> cancelled.txt; kill "$@"\n',
+    }
+    for name, body in programs.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{body}")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(TESTS), *filter(None, sys.path)]))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_workers_are_jobs_of_slurm_and_end_with_the_campaign(queue):
+    """With the job script of dask-jobqueue, a stand-in for SLURM, and the work done in the jobs."""
+    pytest.importorskip("dask_jobqueue")
+    with open_pool(2, "slurm:memory=1GB,walltime=00:10:00,directive=--constraint=any") as pool:
+        results = run_tasks([Number(n) for n in (0, 2, 3)], partial(doubled, folder=queue, deaths=0), queue, pool=pool)
+        (process,) = {pool.submit(os.getpid).result() for _ in range(2)}
+        assert process != os.getpid()
+        assert is_running(process)
+    assert [result["twice"] for result in results] == [0, 4, 6]
+    scripts = [file.read_text() for file in queue.glob("jobs-*.txt")]
+    assert len(scripts) == 2
+    for line in ("#SBATCH -t 00:10:00", "#SBATCH --mem=954M", "#SBATCH --constraint=any", sys.executable):
+        assert all(line in script for script in scripts)
+    assert len((queue / "cancelled.txt").read_text().split()) == 2
+    wait_until(lambda: not is_running(process))
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "words"),
+    [
+        ("slurm:walltime=1", r"(?s)is not understood.*write slurm:cores=1,memory=4GB"),
+        ("slurm:memory", "'memory' is not NAME=VALUE"),
+        ("slurm:memory=1GB,colour=red", "is not understood"),
+        ("slurm:memory=1GB,account=nobody", "'sbatch' refused a job: sbatch: error: Invalid account"),
+        ("pbs:memory=1GB", "no program 'qsub' to submit jobs with"),
+    ],
+)
+def test_what_a_queue_does_not_take_is_one_message(queue, scheduler, words):
+    pytest.importorskip("dask_jobqueue")
+    with pytest.raises(InputError, match=words), open_pool(1, scheduler):
+        raise AssertionError("it was taken")
+
+
+@pytest.mark.parametrize("queue_name", QUEUES)
+def test_every_queue_has_a_job_with_its_time_and_memory(queue_name):
+    """As dask-jobqueue writes it; only SLURM's is run here."""
+    dask_jobqueue = pytest.importorskip("dask_jobqueue")
+    options = _options("cores=2,memory=4GB,walltime=02:00,directive=-x,directive=-y")
+    assert options["job_extra_directives"] == ["-x", "-y"]
+    with getattr(dask_jobqueue, QUEUES[queue_name])(**options, scheduler_options={"dashboard_address": None}) as jobs:
+        script = jobs.job_script()
+    assert "02:00" in script
+    assert "--memory-limit" in script or "--nthreads 2" in script

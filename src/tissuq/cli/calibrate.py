@@ -27,6 +27,7 @@ class CalibrateOptions(Written):
     timeout: float | None = option(None, "With --model: seconds after which a run is stopped [never].", unit="s", ge=0)
     retries: int = option(0, "With --model: times that a failed run is made again, as for a licence.", ge=0)
     keep: bool = option(False, "With --model: keep the solver's files of every run.")
+    abaqus: str = option("", "With --model: program that opens .odb files, as its 'python' [first word of --command].")
     runs_in: Path | None = option(
         None, "Folder of the runs of the model, which a repeated command reuses [OUT-forward-runs]."
     )
@@ -49,7 +50,7 @@ def calibrate(call: Call[CalibrationSettings, CalibrateOptions]) -> None:
     workers = how.workers
     if settings.model is not None:
         workers = how.max_jobs or os.cpu_count() or 1
-        running = {"timeout": how.timeout, "retries": how.retries, "keep": how.keep}
+        running = {"timeout": how.timeout, "retries": how.retries, "keep": how.keep, "abaqus": how.abaqus}
     with call.campaign_in(runs_in)(settings.runs + settings.refine) as step:
         study = run_calibration(settings, call.beside, runs_in=runs_in, workers=workers, step=step, **running)
     print(f"Forward runs: {runs_in}")

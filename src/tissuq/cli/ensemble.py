@@ -10,7 +10,7 @@ from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
 from tissuq.cli.named_again import check_named_again
-from tissuq.cli.running import Configured, LawOfRun
+from tissuq.cli.running import SCHEDULER, Configured, LawOfRun
 from tissuq.errors import InputError
 from tissuq.studies.ensemble_settings import EnsembleSettings
 from tissuq.studies.option import argument, option
@@ -31,11 +31,12 @@ class EnsembleOptions(LawOfRun, Configured):
     run: Path | None = argument(None, "Run folder of tissuq fit.")
     out: Path | None = option(None, "Folder of the ensemble [runs/RUN-MODEL].")
     max_jobs: int | None = option(None, "Runs of the solver at a time, as many as licences [one a core].", ge=1)
-    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
+    scheduler: str | None = option(None, SCHEDULER)
     timeout: float | None = option(None, "Seconds after which a run is stopped [never].", unit="s", ge=0)
     retries: int = option(0, "Times that a failed run is made again, as for a licence.", ge=0)
     again: bool = option(False, "Make runs again that failed earlier.")
     keep: bool = option(True, "Keep the solver's files of every draw.")
+    abaqus: str = option("", "Program that opens .odb files, as its 'python' [first word of --command].")
     dry_run: bool = option(False, "Show what changes in the deck, and run nothing.")
     figures: bool = option(True, "Draw the figures.")
 
@@ -75,7 +76,7 @@ def ensemble(call: Call[EnsembleSettings, EnsembleOptions]) -> None:
     with open_pool(how.max_jobs or os.cpu_count() or 1, how.scheduler) as pool:
         study = run_ensemble(
             prepared, folder, pool=pool, limit=how.max_jobs if how.scheduler else None, timeout=how.timeout,
-            retries=how.retries, keep=how.keep, progress=call.campaign_in(folder),
+            retries=how.retries, keep=how.keep, abaqus=how.abaqus, progress=call.campaign_in(folder),
         )  # fmt: skip
     print_explanations(prepared.card_warnings)
     call.put_into(folder, ensemble_result(study, folder), figures=how.figures)

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from tissuq.studies.option import Settings, option
 
-__all__ = ["Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Verbosity", "Written"]
+__all__ = ["SCHEDULER", "Campaign", "Configured", "LawOfRun", "OfRun", "Running", "Verbosity", "Written"]
+
+SCHEDULER = "Address of a Dask scheduler to use instead, or slurm:memory=4GB,walltime=02:00:00 for batch jobs."
 
 
 class Running(Settings):
@@ -52,4 +54,4 @@ class Campaign(Configured):
     config: Path | None = option(None, "TOML file of the campaign.")
     out: Path | None = option(None, "Folder of the campaign [runs/NAME].")
     workers: int = option(1, "Processes on this machine.", ge=1)
-    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
+    scheduler: str | None = option(None, SCHEDULER)

@@ -9,7 +9,7 @@ from pathlib import Path
 from tissuq.cli.call import Call
 from tissuq.cli.campaign import check_folder, write_campaign_recipe
 from tissuq.cli.command import command
-from tissuq.cli.running import Configured, LawOfRun
+from tissuq.cli.running import SCHEDULER, Configured, LawOfRun
 from tissuq.studies.option import option
 from tissuq.studies.simulation_settings import SimulationSettings
 
@@ -21,7 +21,7 @@ class StructureOptions(LawOfRun, Configured):
 
     out: Path | None = option(None, "Folder of the simulation [runs/RUN-CASE].")
     workers: int | None = option(None, "Processes on this machine [one a core].", ge=1)
-    scheduler: str | None = option(None, "Address of a Dask scheduler to use instead.")
+    scheduler: str | None = option(None, SCHEDULER)
     figures: bool = option(True, "Draw the figures.")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
@@ -101,6 +101,9 @@ class AbaqusDeck(DeckFormat):
     def fragment(self, material: DeckMaterial, block: str) -> str:
         return block.partition("\n")[2]
 
+    def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
+        return node_sets(files)
+
 
 def _material(head: Keyword, following: Sequence[Keyword]) -> DeckMaterial:
     spans, refused = [], ""
@@ -139,6 +142,9 @@ def node_sets(files: Sequence[bytes]) -> dict[str, set[int]]:
                 raise InputError(f"the numbers of the set of nodes '{name}' are not understood ({error}).") from error
             members |= numbers
             names |= others
+    gone = _of_instances(parts)
+    for name in gone:
+        del sets[name], parts[name]
     for name, others in parts.items():
         for unknown in sorted(others - set(sets)):
             raise InputError(f"the set of nodes '{name}' has '{unknown}', which no file of the deck defines.")
@@ -146,6 +152,16 @@ def node_sets(files: Sequence[bytes]) -> dict[str, set[int]]:
         for name, others in parts.items():
             sets[name].update(*(sets[part] for part in others))
     return sets
+
+
+def _of_instances(parts: Mapping[str, set[str]]) -> set[str]:
+    """Return the sets with sets of instances in them, as PART-1-1.TOP, whose numbers only a result file tells."""
+    found: set[str] = set()
+    while (
+        more := {name for name, others in parts.items() if any("." in part or part in found for part in others)} - found
+    ):
+        found |= more
+    return found
 
 
 def _members(keyword: Keyword) -> tuple[set[int], set[str]]:

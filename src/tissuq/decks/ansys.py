@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
-from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, lines_of
+from tissuq.decks.deck import DeckFormat, DeckMaterial, Line, decoded, lines_of
 from tissuq.errors import InputError
 
 __all__ = ["AnsysDeck"]
@@ -18,8 +18,13 @@ ELASTIC_CONSTANTS = {"EX", "EY", "EZ", "NUXY", "NUYZ", "NUXZ", "PRXY", "PRYZ", "
 REMARKS = ("/COM", "/TITLE", "/STITLE", "C***")
 """What the commands of lines begin with whose words are for readers."""
 DATA = ("TBDATA", "TBDAT", "TBPT", "TBTEMP", "TBTEM", "TBEO", "TBFIELD")
-
-
+COMPONENT = re.compile(
+    rb"^[ \t]*CMBLOCK[ \t]*,(?P<name>[^,\r\n]+),[ \t]*NODE[^,\r\n]*,[ \t]*(?P<count>\d+)[^\r\n]*\r?\n",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""The head of a component of nodes."""
+LONGEST = 24
+"""Bytes that a number in it may take, at most."""
 NOT_A_NUMBER = "a card needs its number in digits: write that in the place of the parameter."
 
 
@@ -81,6 +86,15 @@ class AnsysDeck(DeckFormat):
             if lines
         ]
 
+    def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
+        """Return the components of nodes (``CMBLOCK``); in their lists a negative number ends a range."""
+        sets: dict[str, set[int]] = {}
+        for content in files:
+            for head in COMPONENT.finditer(content):
+                name, count = decoded(head["name"]).strip().upper(), int(head["count"])
+                sets[name] = _component(name, content[head.end() : head.end() + 99 + LONGEST * count], count)
+        return sets
+
     def fragment(self, material: DeckMaterial, block: str) -> str:
         return block
 
@@ -107,6 +121,25 @@ def _parameters(content: bytes, names: Collection[str]) -> list[tuple[str, str]]
         if key.strip().upper() in by_name and value.strip().isdecimal():
             values.append((by_name[key.strip().upper()], value.strip()))
     return values
+
+
+def _component(name: str, below: bytes, count: int) -> set[int]:
+    """Return the members of a component from what stands below its head: their format, and a number of entries."""
+    lines = (line.text.rstrip() for line in lines_of(below))
+    form = re.search(r"i(\d+)", next(lines, ""), re.IGNORECASE)
+    if form is None:
+        raise InputError(f"the component '{name}' of the deck (CMBLOCK) lacks the format of its numbers, as (8i10).")
+    width, entries = int(form[1]), list[int]()
+    try:
+        while len(entries) < count:
+            line = next(lines)
+            entries += [int(line[start : start + width]) for start in range(0, len(line), width)]
+    except (StopIteration, ValueError) as error:
+        raise InputError(f"the component '{name}' of the deck (CMBLOCK) is cut short or damaged.") from error
+    members: set[int] = set()
+    for before, entry in zip([0, *entries], entries, strict=False):
+        members |= {entry} if entry > 0 else set(range(before, -entry + 1))
+    return members
 
 
 def _word(words: list[str], index: int) -> str:

@@ -5,15 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tissuq.decks.result_file import ResultFile, Values
 from tissuq.errors import InputError
 
-__all__ = ["CELL_TYPES", "Frd", "Table", "read_dat", "read_frd"]
+__all__ = ["CELL_TYPES", "CalculiXResults", "Frd", "Table", "read_dat", "read_frd", "tensor_of"]
 
 FloatArray = NDArray[np.float64]
 
@@ -34,6 +36,78 @@ ORDERS = {
 NUMBER = 12
 """Columns of a number, and of what stands before the first."""
 LEADING = 13
+
+
+AXES = (("x", "1"), ("y", "2"), ("z", "3"))
+"""Of a vector, as the names of columns end in ``.dat`` and in ``.frd``."""
+TABLES = {"U": ("displacements",), "RF": ("total force", "forces"), "S": ("stresses",), "E": ("strains",)}
+"""What the tables of a field are called in ``.dat``, and below its name in ``.frd``."""
+FIELDS = {"U": "DISP", "RF": "FORC", "S": "STRESS", "E": "TOSTRAIN"}
+
+
+class CalculiXResults(ResultFile):
+    """The tables of CalculiX's ``.dat``, else the fields of its ``.frd``."""
+
+    name = "calculix"
+    suffixes = (".frd", ".dat")
+    requests = {  # noqa: RUF012  (as in the base class)
+        "U": r"*NODE PRINT, NSET={set}\n U",
+        "RF": r"*NODE PRINT, NSET={set}, TOTALS=ONLY\n RF",
+        "S": r"*EL FILE\n S",
+        "E": r"*EL FILE\n E",
+    }
+
+    @property
+    def label(self) -> str:
+        return f"the results '{self.path.stem}.dat' and '{self.path.stem}.frd'"
+
+    @cached_property
+    def tables(self) -> Mapping[tuple[str, str], Table]:
+        """The tables of the ``.dat`` file; none where there is no such file."""
+        path = self.path.with_suffix(".dat")
+        try:
+            return read_dat(path) if path.is_file() else {}
+        except ValueError as error:
+            raise InputError(f"'{path.name}' cannot be read: a set has other rows at other times.") from error
+
+    @cached_property
+    def frd(self) -> Frd | None:
+        """Mesh and fields of the ``.frd`` file; None where there is no such file."""
+        path = self.path.with_suffix(".frd")
+        return read_frd(path, self.results.last_time) if path.is_file() else None
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        return self.frd.nodes if self.frd is not None else np.zeros(0, dtype=np.int64)
+
+    def field(self, kind: str) -> Values | None:
+        steps = self.frd.fields.get(FIELDS[kind], []) if self.frd is not None else []
+        if not steps:
+            return None
+        values = np.array([_components(fields, kind) for _, fields in steps])
+        return Values(np.array([time for time, _ in steps]), values)
+
+    def of_set(self, kind: str, set_name: str, how: str) -> Values | None:
+        for what in TABLES[kind]:
+            table = self.tables.get((what, set_name))
+            if table is not None and (how == "sum" or not what.startswith("total")):
+                columns = dict(zip(table.columns, np.moveaxis(table.values, -1, 0), strict=True))
+                return Values(table.times, _components(columns, kind))
+        return super().of_set(kind, set_name, how)
+
+
+def _components(columns: Mapping[str, FloatArray], kind: str) -> FloatArray:
+    """Return the components (..., 3) or (..., 6) of columns by their names."""
+    if kind in ("S", "E"):
+        return np.stack(tensor_of(columns), axis=-1)
+    by_axis = {name[-1]: values for name, values in columns.items()}
+    return np.stack([by_axis[axis] if axis in by_axis else by_axis[number] for axis, number in AXES], axis=-1)
+
+
+def tensor_of(columns: Mapping[str, FloatArray]) -> list[FloatArray]:
+    """Return the components 11, 22, 33, 12, 13, 23 of columns that end in the letters of their axes, such as SZX."""
+    by_axes = {"".join(sorted(name[-2:].lower())): values for name, values in columns.items()}
+    return [by_axes[axes] for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
 
 
 class Table(NamedTuple):

@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import unified_diff
 from pathlib import Path, PurePosixPath
@@ -102,6 +102,16 @@ class DeckFormat(ABC):
     @abstractmethod
     def fragment(self, material: DeckMaterial, block: str) -> str:
         """Return the text that replaces a material, from the block of a card with its number."""
+
+    def node_sets(self, files: Sequence[bytes]) -> dict[str, set[int]]:
+        """Return the sets of nodes that files define, by their names in capitals, where they are known.
+
+        Raises
+        ------
+        InputError
+            When they are not understood.
+        """
+        return {}
 
     def matches(self, material: DeckMaterial, wanted: str) -> bool:
         """Return whether a material is the one that is wanted: by its name, whatever its case, or its number."""

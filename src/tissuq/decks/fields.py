@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.calculix_results import Frd
-from tissuq.decks.quantity import Curve, tensor_of, von_mises
+from tissuq.decks.calculix_results import Frd, tensor_of
+from tissuq.decks.quantity import Curve, von_mises
 
 __all__ = ["FinalFields", "element_invariants", "final_fields", "share_beyond"]
 

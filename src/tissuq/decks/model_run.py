@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tissuq.decks.abaqus import AbaqusDeck, node_sets
+from tissuq.decks.calculix_results import CalculiXResults
 from tissuq.decks.deck import Deck
 from tissuq.decks.fields import final_fields, share_beyond
 from tissuq.decks.quantity import Component, Quantity, Results
@@ -59,6 +60,8 @@ class ModelRun:
         Times that a run which failed is made again.
     keep : bool
         Keep the files of the solver.
+    abaqus : str
+        The program that opens .odb files; unless given, the first word of the solver's command.
     """
 
     family: str
@@ -74,6 +77,7 @@ class ModelRun:
     timeout: float | None = None
     retries: int = 0
     keep: bool = True
+    abaqus: str = ""
 
     @property
     def solver_key(self) -> str:
@@ -108,7 +112,9 @@ def carried_out(task: ModelRun) -> dict[str, Any]:
     deck = task.deck
     job_folder = task.folder / PurePosixPath(task.main).parent
     sets = sets_of(deck, task.quantities)
-    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets)
+    asked = tuple((quantity.kind, quantity.set_name) for quantity in task.quantities if isinstance(quantity, Component))
+    program = task.abaqus or shlex.quote(task.solver.words(deck.job, deck.main)[0])
+    results = Results(job_folder, deck.job, stored["last_time"] or np.inf, sets, asked, program)
     curves, misread = _curves(task, results)
     beyond = None
     if not misread and not stored["problem"]:
@@ -133,7 +139,7 @@ def sets_of(deck: Deck, quantities: Iterable[Quantity]) -> dict[str, set[int]]:
         When they are not understood.
     """
     is_needed = any(isinstance(quantity, Component) for quantity in quantities)
-    return node_sets(list(deck.files.values())) if is_needed and isinstance(deck.format, AbaqusDeck) else {}
+    return deck.format.node_sets(list(deck.files.values())) if is_needed else {}
 
 
 def _digest(*parts: object) -> str:
@@ -214,7 +220,7 @@ def _curves(task: ModelRun, results: Results) -> tuple[dict[str, Any], str]:
 def _saved_fields(task: ModelRun, results: Results) -> tuple[str, Any]:
     """Write the fields of a run that ended well; return why it cannot, and the share of elements beyond the data."""
     try:
-        frd = results.frd
+        frd = results.file.frd if isinstance(results.file, CalculiXResults) else None
     except InputError as error:
         return str(error), None
     fields = final_fields(frd) if frd is not None else None

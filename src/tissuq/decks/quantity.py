@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tissuq.decks.calculix_results import Frd, Table, read_dat, read_frd
+from tissuq.decks.result_file import ALL, TENSOR, Results, result_files
 from tissuq.errors import InputError
 from tissuq.mechanics.user_law import LAW, failures_of, run_file
 
@@ -25,7 +24,6 @@ __all__ = [
     "Quantity",
     "Results",
     "parse_quantity",
-    "tensor_of",
     "von_mises",
 ]
 
@@ -33,16 +31,14 @@ FloatArray = NDArray[np.float64]
 
 SPECIFICATION = re.compile(r"(?P<component>[A-Za-z]+\d*)(@(?P<set>[^:]+))?(:(?P<how>\w+))?")
 HOW_TO_WRITE = "write NAME=RF3@SET, NAME=U2@SET:max, NAME=S11@SET, NAME=MISES@SET:max, or NAME=file.py:function"
-AXES = {"1": 0, "2": 1, "3": 2}
-TENSOR = ("11", "22", "33", "12", "13", "23")
+OWN_FUNCTION = "give it by a function of yours, NAME=file.py:function"
+AXES = ("1", "2", "3")
 REDUCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "sum": lambda values: values.sum(axis=1),
     "mean": lambda values: values.mean(axis=1),
     "min": lambda values: values.min(axis=1),
     "max": lambda values: values.max(axis=1),
 }
-ALL = "ALL"
-"""The set of all nodes, where none is named."""
 
 
 class Curve(NamedTuple):
@@ -50,42 +46,6 @@ class Curve(NamedTuple):
 
     times: FloatArray
     values: FloatArray
-
-
-@dataclass(frozen=True)
-class Results:
-    """What a solver left in a folder.
-
-    Attributes
-    ----------
-    folder : Path
-    job : str
-        Name of the deck without suffix.
-    last_time : float
-        Up to which it is converged.
-    node_sets : mapping of str to set of int
-        Of the deck, names in capitals.
-    """
-
-    folder: Path
-    job: str
-    last_time: float = np.inf
-    node_sets: Mapping[str, set[int]] = field(default_factory=dict)
-
-    @cached_property
-    def tables(self) -> Mapping[tuple[str, str], Table]:
-        """The tables of the ``.dat`` file; none where there is no such file."""
-        path = self.folder / f"{self.job}.dat"
-        try:
-            return read_dat(path) if path.is_file() else {}
-        except ValueError as error:
-            raise InputError(f"'{path.name}' cannot be read: a set has other rows at other times.") from error
-
-    @cached_property
-    def frd(self) -> Frd | None:
-        """Mesh and fields of the ``.frd`` file; None where there is no such file."""
-        path = self.folder / f"{self.job}.frd"
-        return read_frd(path, self.last_time) if path.is_file() else None
 
 
 class Quantity(ABC):
@@ -117,28 +77,19 @@ class Quantity(ABC):
         """Refuse what can be seen to be wrong before anything is run."""
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A field: what its tables in ``.dat`` are called, its name in ``.frd``, and how members of a set are joined."""
+class Kind(NamedTuple):
+    """A field: how members of a set are joined, unless that is said, and its components."""
 
-    tables: tuple[str, ...]
-    frd: str
-    request: str
     how: str = "mean"
-    components: tuple[str, ...] = ("1", "2", "3")
+    components: tuple[str, ...] = AXES
 
 
-KINDS = {
-    "U": Kind(("displacements",), "DISP", "*NODE PRINT, NSET={set}\\n U"),
-    "RF": Kind(("total force", "forces"), "FORC", "*NODE PRINT, NSET={set}, TOTALS=ONLY\\n RF", "sum"),
-    "S": Kind(("stresses",), "STRESS", "*EL FILE\\n S", "mean", TENSOR),
-    "E": Kind(("strains",), "TOSTRAIN", "*EL FILE\\n E", "mean", TENSOR),
-}
+KINDS = {"U": Kind(), "RF": Kind("sum"), "S": Kind(components=TENSOR), "E": Kind(components=TENSOR)}
 
 
 @dataclass(frozen=True)
 class Component(Quantity):
-    """A component of a field in CalculiX's result files, over a set.
+    """A component of a field in the result file of a program, over a set.
 
     Parameters
     ----------
@@ -177,53 +128,33 @@ class Component(Quantity):
         return curve
 
     def _read(self, results: Results) -> Curve:
-        for what in KINDS[self.kind].tables:
-            table = results.tables.get((what, self.set_name))
-            if table is not None and (self.how == "sum" or not what.startswith("total")):
-                names = [name if len(name) == 3 else str("xyz".index(name[-1]) + 1) for name in table.columns]
-                columns = dict(zip(names, np.moveaxis(table.values, -1, 0), strict=True))
-                return Curve(table.times, self._over_set(columns))
-        return self._from_frd(results)
-
-    def _from_frd(self, results: Results) -> Curve:
-        kind = KINDS[self.kind]
-        steps = results.frd.fields.get(kind.frd, []) if results.frd is not None else []
-        if results.frd is None or not steps:
-            request = kind.request.format(set=self.set_name)
+        file = results.file
+        if file is None:
+            known = ", ".join(suffix for kind in result_files() for suffix in kind.suffixes)
             raise InputError(
-                f"{self.text} is not in the results '{results.job}.dat' and '{results.job}.frd': ask for it in the "
-                f"deck, as by '{request}'."
+                f"{self.text}: the run of '{results.job}' left no file that can be read ({known}); {OWN_FUNCTION}."
             )
-        nodes = results.frd.nodes
-        members = results.node_sets.get(self.set_name)
-        if members is None and self.set_name != ALL:
-            known = ", ".join(sorted(results.node_sets)) or "none"
-            raise InputError(f"{self.text}: the deck has no set of nodes '{self.set_name}'; its sets are {known}.")
-        rows = np.isin(nodes, sorted(members)) if members is not None else np.ones(len(nodes), dtype=bool)
-        if not rows.any():
-            raise InputError(f"{self.text}: no node of the set is in '{results.job}.frd'.")
-        names = [name if len(name) == 3 else name[-1] for name in steps[0][1]]
-        values = [np.array([fields[key][rows] for _, fields in steps]) for key in steps[0][1]]
-        return Curve(np.array([time for time, _ in steps]), self._over_set(dict(zip(names, values, strict=True))))
+        try:
+            found = file.of_set(self.kind, self.set_name, self.how)
+        except InputError as error:
+            raise InputError(f"{self.text}: {error}") from error
+        if found is not None:
+            return Curve(found.times, self._over_set(found.values))
+        request = file.requests.get(self.kind, "").format(set=self.set_name)
+        advice = f"ask for it in the deck, as by '{request}'" if request else f"this program has none; {OWN_FUNCTION}"
+        raise InputError(f"{self.text} is not in {file.label}: {advice}.")
 
-    def _over_set(self, columns: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the quantity (t,) from components (t, rows)."""
+    def _over_set(self, values: FloatArray) -> FloatArray:
+        """Return the quantity (t,) from components (t, rows, c)."""
         reduce = REDUCTIONS[self.how]
-        if self.kind in ("U", "RF"):
-            vector = [columns[axis] for axis in AXES]
-            if self.component:
-                return reduce(vector[AXES[self.component]])
-            parts = [reduce(values) for values in vector] if self.how == "sum" else vector
-            size = np.sqrt(sum(values**2 for values in parts))
-            return np.asarray(size if self.how == "sum" else reduce(size))
-        tensor = dict(zip(TENSOR, tensor_of(columns), strict=True))
-        return reduce(tensor[self.component] if self.component else von_mises(*tensor.values()))
-
-
-def tensor_of(columns: Mapping[str, FloatArray]) -> list[FloatArray]:
-    """Return the components 11, 22, 33, 12, 13, 23 of columns that end in the letters of their axes, such as SZX."""
-    by_axes = {"".join(sorted(name[-2:].lower())): values for name, values in columns.items()}
-    return [by_axes[axes] for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
+        columns = np.moveaxis(values, -1, 0)
+        if self.component:
+            return reduce(columns[KINDS[self.kind].components.index(self.component)])
+        if self.kind == "S":
+            return reduce(von_mises(*columns))
+        if self.how == "sum":
+            return np.asarray(np.linalg.norm(values.sum(axis=1), axis=1))
+        return reduce(np.linalg.norm(values, axis=2))
 
 
 def von_mises(*components: FloatArray) -> FloatArray:

@@ -74,6 +74,8 @@ class DeckForward(Forward):
         Keep the solver's files of every run.
     folder : Path, optional
         Where it is run; `prepared_in` sets it.
+    abaqus : str
+        The program that opens .odb files; unless given, the first word of the command.
 
     Examples
     --------
@@ -102,6 +104,7 @@ class DeckForward(Forward):
     retries: int = 0
     keep: bool = False
     folder: Path | None = None
+    abaqus: str = ""
 
     @cached_property
     def read_deck(self) -> Deck:
@@ -191,6 +194,7 @@ class DeckForward(Forward):
         task = ModelRun(
             "run", 0, self.folder / MODEL, deck.main, deck.format.name, ((self.replaced, block),), self.program,
             self.quantities, (), self.folder / SOLVED / f"run-{place}", self.timeout, self.retries,
+            abaqus=self.abaqus,
         )  # fmt: skip
         result = carried_out(task)
         if result["misread"] and not result["problem"]:

@@ -101,7 +101,7 @@ def run_calibration(
     step : callable
         Told of every run that is done.
     **running
-        How a finite-element model is run: ``timeout``, ``retries``, ``keep``.
+        How a finite-element model is run: ``timeout``, ``retries``, ``keep``, ``abaqus``.
 
     Raises
     ------

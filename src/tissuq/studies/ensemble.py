@@ -65,7 +65,7 @@ class PreparedEnsemble:
         return self.deck.diff(self.deck.with_materials(self.blocks(COMPLETE, number)))
 
     def tasks(
-        self, folder: Path, *, timeout: float | None = None, retries: int = 0, keep: bool = True
+        self, folder: Path, *, timeout: float | None = None, retries: int = 0, keep: bool = True, abaqus: str = ""
     ) -> list[ModelRun]:
         """Return the runs: the complete draws first."""
         limits = tuple(
@@ -76,7 +76,7 @@ class PreparedEnsemble:
             ModelRun(
                 family, number, folder / MODEL, self.deck.main, self.deck.format.name,
                 tuple(self.blocks(family, number).items()), self.solver, self.quantities, limits,
-                folder / DRAWS / f"{family}-{number + 1:0{width}d}", timeout, retries, keep,
+                folder / DRAWS / f"{family}-{number + 1:0{width}d}", timeout, retries, keep, abaqus,
             )
             for family in self.cards
             for number in range(self.settings.draws)
@@ -197,6 +197,7 @@ def run_ensemble(
     timeout: float | None = None,
     retries: int = 0,
     keep: bool = True,
+    abaqus: str = "",
     progress: Callable[[int], AbstractContextManager[Step]] = lambda total: nullcontext(silent),
 ) -> EnsembleStudy:
     """Run the solver for every draw, those in ``folder`` not again, and gather what they give.
@@ -218,6 +219,8 @@ def run_ensemble(
         Times that a run which failed is made again.
     keep : bool
         Keep the files of the solver.
+    abaqus : str
+        The program that opens .odb files; unless given, the first word of the solver's command.
     progress : callable
         Gives, for a number of tasks, a context with the function that is told of each.
 
@@ -227,7 +230,7 @@ def run_ensemble(
         When a quantity cannot be read, or hardly any draw gets anywhere.
     """
     clear_unfinished(folder / DRAWS)
-    tasks = prepared.tasks(folder.absolute(), timeout=timeout, retries=retries, keep=keep)
+    tasks = prepared.tasks(folder.absolute(), timeout=timeout, retries=retries, keep=keep, abaqus=abaqus)
     unique = list({task.key: task for task in tasks}.values())
     with progress(len(unique)) as step:
         if unique[0].key not in read_results(folder / RESULTS):

@@ -11,11 +11,13 @@ from importlib import metadata
 __all__ = ["DEVELOPER_EXTRAS", "EXTRAS", "PROGRAMS", "Extra", "Package", "Program", "extras", "needed", "programs"]
 
 EXTRAS = {
+    "ansys": "reads result files of ANSYS (tissuq ensemble and calibrate --model with .rst)",
     "app": "opens the local page in the browser (tissuq app)",
     "cluster": "spreads campaigns and finite elements over a Dask cluster (--scheduler)",
     "excel": "reads workbooks (.xlsx, .xls, .xlsb, .ods)",
     "fe": "computes indentations and bars (tissuq structure), and materials for FElupe",
     "parquet": "reads Parquet files and data frames of Polars",
+    "slurm": "starts the workers of a Dask cluster as batch jobs (--scheduler slurm)",
     "umbridge": "calibrates models behind an UM-Bridge server (tissuq calibrate --umbridge)",
 }
 """What each extra is for."""

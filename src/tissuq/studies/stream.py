@@ -28,6 +28,7 @@ from threading import Thread
 from typing import Any, Generic, ParamSpec, Protocol, TypeVar
 
 from tissuq.errors import InputError
+from tissuq.studies.batch_jobs import is_queue, workers_in_queue
 
 __all__ = ["RESULTS", "Campaign", "Step", "WorkerProcesses", "open_pool", "read_results", "run_tasks", "silent"]
 
@@ -41,14 +42,24 @@ SPAWN = get_context("spawn")
 def open_pool(workers: int = 1, scheduler: str | None = None) -> Iterator[Executor | None]:
     """Give the workers of a campaign: processes on this machine, or those of a Dask scheduler; None for no other.
 
+    Parameters
+    ----------
+    workers : int
+        Processes, or batch jobs.
+    scheduler : str, optional
+        Address of a Dask scheduler, or a queue in which batch jobs are to be put (`workers_in_queue`).
+
     Raises
     ------
     InputError
         When the scheduler cannot be reached, or is lost.
     """
-    if scheduler is not None:
-        with _dask_pool(scheduler) as cluster:
-            yield cluster
+    if scheduler is not None and is_queue(scheduler):
+        with workers_in_queue(scheduler, workers) as cluster, _dask_pool(cluster.scheduler_address) as pool:
+            yield pool
+    elif scheduler is not None:
+        with _dask_pool(scheduler) as pool:
+            yield pool
     elif workers == 1:
         yield None
     else:
