@@ -137,7 +137,10 @@ def with_column(name, values):
         (with_column("n", [1, 2, "three", 4, 5, 6]), "specimen 's2', 'n': 'three' is no number, as others"),
         (with_column("sex", ["f"] * 6), "'sex': all specimens have the same value, 'f': leave it out"),
         (with_column("n", [2.0] * 6), "'n': all specimens have the same value, 2"),
-        (with_column("birth", [2000 - age for age in AGES]), "'birth': the covariates before it determine it"),
+        (
+            with_column("birth", [2000 - age for age in AGES]),
+            "'birth': the covariates before it \\('age \\[year\\]'\\) determine it",
+        ),
         (with_column("site", "abcadb"), "have 4 effects on every parameter, and 6 specimens allow 3"),
         ({name: {} for name in NAMES}, "there is no covariate"),
         ([1, 2], "must be a table with a row for each specimen"),

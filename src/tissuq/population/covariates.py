@@ -199,7 +199,7 @@ def covariates_of(given: Any, specimens: Sequence[str], place: Place | None = No
 
     Parameters
     ----------
-    given : pandas.DataFrame, or mapping of str to mapping
+    given : pandas.DataFrame, mapping of str to mapping, or Covariates
         Values by the names of covariates, for every specimen (the index of a table). Numbers may be texts. A name may
         end in a unit in brackets, such as ``age [year]``. None: no covariates.
     specimens : sequence of str
@@ -212,6 +212,8 @@ def covariates_of(given: Any, specimens: Sequence[str], place: Place | None = No
         When specimens or values are missing or unknown, or a column is constant, or determined by others, or they are
         too many.
     """
+    if isinstance(given, Covariates):
+        return given
     if given is None:
         return Covariates((), np.zeros((len(specimens), 0)))
     place, values = place or _in_python, _by_specimen(given)
@@ -235,7 +237,7 @@ def covariates_of(given: Any, specimens: Sequence[str], place: Place | None = No
             f"{place('', '')}: the covariates ({', '.join(names)}) have {design.shape[1]} effects on every parameter, "
             f"and {len(specimens)} specimens allow {allowed}: leave some out, or join levels."
         )
-    _check_independent(design, [c for c in found for _ in c.effects], names[0], place)
+    _check_independent(design, [n for n, c in zip(names, found, strict=True) for _ in c.effects], place)
     return Covariates(tuple(found), design)
 
 
@@ -265,16 +267,17 @@ def _covariate(name: str, values: Mapping[str, Any], place: Place) -> Covariate:
     return LevelCovariate(name, tuple(levels))
 
 
-def _check_independent(design: FloatArray, of_columns: Sequence[Covariate], first: str, place: Place) -> None:
+def _check_independent(design: FloatArray, of_columns: Sequence[str], place: Place) -> None:
     """Refuse a column that those before it determine, together with a constant."""
     known = np.ones((len(design), 1)) / np.sqrt(len(design))
-    for covariate, column in zip(of_columns, design.T, strict=True):
+    for name, column in zip(of_columns, design.T, strict=True):
+        before = list(dict.fromkeys(of_columns[: known.shape[1] - 1]))
         left = column - known @ (known.T @ column)
         left -= known @ (known.T @ left)
         if np.linalg.norm(left) < DEPENDENT * np.linalg.norm(column):
             raise InputError(
-                f"{place('', covariate.name)}: the covariates before it determine it in these specimens (such as "
-                f"'{first}'), so that their effects cannot be told apart: leave one of them out."
+                f"{place('', name)}: the covariates before it ({_listed(before)}) determine it in these specimens, so "
+                "that their effects cannot be told apart: leave one of them out."
             )
         known = np.column_stack([known, left / np.linalg.norm(left)])
 

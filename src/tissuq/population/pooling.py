@@ -16,7 +16,7 @@ from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
 from tissuq.model.tolerances import AS_TESTED
 from tissuq.parameters.priors import Prior
-from tissuq.population.covariates import Place, covariates_of
+from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population
 from tissuq.posterior.fitting import fit_many
@@ -43,7 +43,6 @@ def fit_population(
     priors: Mapping[str, Prior] | None = None,
     method: Method = "auto",
     seed: int = 0,
-    place: Place | None = None,
 ) -> Population:
     """Identify the parameters of several specimens and of the population that they come from.
 
@@ -63,15 +62,13 @@ def fit_population(
     spread : float
         Sd of the half-normal prior of the spreads: of the logarithm; for parameters of either sign, in units of their
         typical size. One lets specimens differ by factors of ten.
-    covariates : pandas.DataFrame, or mapping of str to mapping, optional
+    covariates : pandas.DataFrame, mapping of str to mapping, or Covariates, optional
         What is known of every specimen (the index of a table) by the names of covariates: numbers such as an age, words
         such as a sex. The middle of the population then depends on them linearly: the logarithm of a positive
         parameter. A name may end in a unit in brackets, such as ``age [year]``.
     discrepancy, material, noise_sd, noise, priors, method, seed
         As for `tissuq.fit`, for every separate fit. Priors of pooled parameters only serve that step: they are
         divided out, and must be wide.
-    place : callable, optional
-        Says in messages where a covariate stands, by specimen and name.
 
     Raises
     ------
@@ -108,7 +105,7 @@ def fit_population(
     symbols = _pooled_symbols(parameters, pooled_material)
     if not (np.isfinite(spread) and spread > 0):
         raise InputError(f"spread must be a positive number, not {spread!r}.")
-    known = covariates_of(covariates, list(specimens), place)
+    known = covariates_of(covariates, list(specimens))
     *single, complete = fit_many(
         [
             *(_one_specimen(name, tests) for name, tests in specimens.items()),

@@ -18,6 +18,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.picture import height_of, numbers_of
+from tissuq.report.covariates import copy_of_covariates, effects_of_covariates, patient_in_words
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT, law_files
 from tissuq.report.tables import Row, interval, significant, with_named_units
@@ -145,11 +146,13 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     """
     population, unit, settings = study.population, study.unit, study.settings
     sources, names = _copies(study, beside)
+    of_covariates, relocated = copy_of_covariates(study, beside)
     law, laws = law_files(settings.material)
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
     tables = {name: _in_units(study, table) for name, table in summaries.items()}
+    tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
     bands, not_predicted = _bands(study)
     if bands:
@@ -168,11 +171,14 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         picture=Picture(
             "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
         ),
-        tables=(Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),),
+        tables=(
+            Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),
+            *effects_of_covariates(study),
+        ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),
-        files=files | sources | laws | posterior_files({PATIENT: population.patient}),
-        recipe=settings.model_copy(update={"files": names, "material": law}),
+        files=files | sources | of_covariates | laws | posterior_files({PATIENT: population.patient}),
+        recipe=settings.model_copy(update={"files": names, "material": law, **relocated}),
     )  # fmt: skip
 
 
@@ -204,7 +210,7 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
 
     spread = "spread between specimens" + (" (sd of the logarithm)" if is_log else "")
     return (
-        number(f"{words} of a new patient", "new patient", factor / times, unit),
+        number(f"{words} of a new patient{patient_in_words(study)}", "new patient", factor / times, unit),
         number(f"{words}, median of the population", "median", factor / times, unit),
         number(spread, "spread", 1.0 if is_log else factor / times, "" if is_log else unit),
     )
@@ -363,7 +369,7 @@ def _lead(study: PopulationStudy) -> str:
         for name in ("new patient", "complete pooling")
     )
     return (
-        f"The median of {symbol} in the population is {middle} {unit}; for a patient who has not been measured it is "
-        f"{new} {unit} (95 %). Taking all measurements for those of one specimen would say {complete} {unit}, which is "
-        "no range of patients."
+        f"The median of {symbol} in the population is {middle} {unit}; for a patient who has not been measured"
+        f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
+        f"say {complete} {unit}, which is no range of patients."
     )
