@@ -236,7 +236,16 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     """The table lies among the specimens, of which it is none; a run is repeated with its copy."""
     write_all(here)
     write_covariates(here / "specimens")
-    options = ["--covariates", "specimens/covariates.csv", "--new-patient", "age=80", *OPTIONS, "--no-figures"]
+    options = [
+        "--covariates",
+        "specimens/covariates.csv",
+        "--new-patient",
+        "age=80",
+        "--aim",
+        "8%",
+        *OPTIONS,
+        "--no-figures",
+    ]
     said = cli("population", "specimens", *options, "--out", "run")
     assert said.status == 0, said.err
     row, share = table(here / "run" / "covariates.csv")
@@ -248,6 +257,11 @@ def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
     assert "new patient (age 80 year)" in text
     assert "beyond the specimens: age 80 year (theirs: 30 to 70)" in text
     assert f"{float(row['median']):.4g} per year" in text
+    needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
+    assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
+    assert needed["new patient"]["specimens"] == ""
+    assert "Specimens like these for ± 8%" in text
+    assert "not reached: patients differ more" in text
     patient = next(row for row in table(here / "run" / "population.csv") if row["quantity"] == "new patient")
     assert float(patient["median"]) == pytest.approx(
         np.exp(np.polyval(np.polyfit(AGES, np.log(MODULI_KPA), 1), 80)), 0.1
@@ -313,6 +327,8 @@ def test_covariates_that_cannot_be_used_end_with_one_message(cli, here, rows, op
         (["specimens", "--specimen", "who"], "--specimen-column names a column of a single file"),
         (["specimens", "--covariate", "age"], "for several files give a table of the covariates"),
         (["specimens", "--new-patient", "age=60"], "it was fitted without covariates"),
+        (["specimens", "--aim", "little"], "--aim needs a share such as 10% or 0.1, not 'little'"),
+        (["specimens", "--aim", "0"], "aim"),
         (["specimens", "--parameter", "C99"], "found: C99"),
         (["specimens", "--spread", "-1"], "spread"),
         (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),

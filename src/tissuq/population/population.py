@@ -22,6 +22,8 @@ from tissuq.population.intervals import INTERVAL_COLUMNS, check_probability, int
 from tissuq.population.likelihoods import Coordinates
 from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
+from tissuq.population.sample_size import needed_table
+from tissuq.population.warnings import MIN_EFFECTIVE_SHARE, warnings_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
 
@@ -35,11 +37,6 @@ if TYPE_CHECKING:
 __all__ = ["Population"]
 
 FloatArray = NDArray[np.float64]
-
-MIN_EFFECTIVE_SHARE = 0.5
-"""Smallest share of draws that must remain effective when they are corrected."""
-MIN_SPECIMENS_FOR_SPREAD = 5
-"""Smallest number of specimens for which the prior of the spread has little influence."""
 
 
 class Population:
@@ -162,32 +159,7 @@ class Population:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Warnings that the user must read, in sentences."""
-        sentences = []
-        if not self.diagnostics.converged:
-            sentences.append(self.diagnostics.verdict)
-        if self.hierarchy.effective <= MIN_EFFECTIVE_SHARE:
-            sentences.append(
-                f"only {self.hierarchy.effective:.0%} of the draws remain effective when they are corrected for the "
-                "approximation of the specimens' posteriors by a few Gaussians: the approximation is too poor."
-            )
-        failed = [name for name, fit in self.posteriors.items() if fit.solution.is_approximate]
-        if failed:
-            sentences.append(
-                f"sampling has not converged for the separate fit of {', '.join(failed)}, on which the population "
-                "depends."
-            )
-        columns = len(self.covariates.effects)
-        if len(self.names) - columns < MIN_SPECIMENS_FOR_SPREAD:
-            beside = f" beside {columns} effects of covariates" * bool(columns)
-            sentences.append(
-                f"{len(self.names)} specimens determine the spread poorly{beside}: its prior, half-normal with sd "
-                f"{self.spread_prior:g} of the logarithm, influences the interval of a new patient, too."
-            )
-        if beyond := self.covariates.beyond(self.patient_covariates):
-            sentences.append(
-                f"the new patient is beyond the specimens: {', '.join(beyond)}. That effects go on so is assumed."
-            )
-        return tuple(sentences)
+        return warnings_of(self)
 
     def unit(self, name: str | None = None) -> StressUnit:
         """Return the unit of stress of that name, or that of the measurements; MPa where theirs differ."""
@@ -282,6 +254,27 @@ class Population:
         """
         check_probability(prob)
         return effect_table(self, prob, self.unit(unit))
+
+    def specimens_needed(self, aim: float, prob: float = 0.95, assurance: float = 0.8) -> pd.DataFrame:
+        """Return how many specimens like these it takes until intervals are as narrow as is aimed at.
+
+        Parameters
+        ----------
+        aim : float
+            Half the width of the interval over the median: 0.1 for 10 %.
+        prob : float
+            Probability inside the interval.
+        assurance : float
+            Probability that so many specimens reach the aim, whatever they will be.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter and quantity (``median``, ``new patient``). Half the width over the median ``now``, and
+            its ``floor`` with any number of specimens; how many ``specimens`` it takes in all, and how many ``more``:
+            nan where the floor is above the aim, or more than a thousand are needed.
+        """
+        return needed_table(self, aim, prob, assurance)
 
     def new_patient(
         self,

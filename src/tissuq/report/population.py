@@ -21,6 +21,7 @@ from tissuq.population.picture import height_of, numbers_of
 from tissuq.report.covariates import copy_of_covariates, effects_of_covariates, patient_in_words
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT, law_files
+from tissuq.report.sample_size import needed_of, needed_table_of
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
@@ -153,6 +154,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
     tables = {name: _in_units(study, table) for name, table in summaries.items()}
     tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
+    tables |= {"specimens_needed": needed} if (needed := needed_of(study)) is not None else {}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
     bands, not_predicted = _bands(study)
     if bands:
@@ -174,6 +176,7 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         tables=(
             Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),
             *effects_of_covariates(study),
+            *needed_table_of(study, needed),
         ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),

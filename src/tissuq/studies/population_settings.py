@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import FittedSettings, ReadingSettings
 from tissuq.studies.option import argument, option
-from tissuq.studies.option_texts import pairs_of
+from tissuq.studies.option_texts import pairs_of, share
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.covariates import CovariateTable
@@ -64,6 +64,15 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         help="What is known of the new patient, such as age=60,sex=f [mean of numbers, most frequent word].",
         parse=known_of_patient,
         group=COVARIATES,
+    )
+    aim: float | None = option(
+        None,
+        "Also say how many specimens like these it takes until half the 95 % interval of the population's median, and "
+        "that of a new patient, is this share of the median, such as 10%.",
+        takes=str,
+        parse=share("--aim"),
+        gt=0,
+        lt=inf,
     )
     discrepancy: str = option("auto", "Discrepancy of every specimen.")
     mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
