@@ -9,7 +9,7 @@ from scipy.stats import t
 import tissuq as tq
 from tissuq.population.sample_size import _known_then, _Specimens
 
-from .test_population import MODULI, neo_hookean, specimens_of
+from .test_population import MODULI, STRETCH, neo_hookean, specimens_of
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +47,30 @@ def test_what_is_known_now_is_what_was_sampled_and_more_specimens_for_a_narrower
             found.specimens_needed(aim)
 
 
+def test_with_so_many_specimens_four_of_five_futures_reach_the_aim_by_students_t():
+    """Futures of well measured specimens from 4000 draws of m and tau, under flat priors: 80 % within 7.
+
+    The number comes from 200 futures, which know the 80 % to 3 %, and priors make intervals a little narrower.
+    """
+    noise, aim, generator = 0.01, 0.3, np.random.default_rng(0)
+    first = specimens_of(MODULI, noise)
+    found = neo_hookean(first, noise)
+    count = int(found.specimens_needed(aim).loc[("C10", "median"), "specimens"])
+    basis = 2 * (STRETCH - STRETCH**-2)
+    y = np.log([basis @ each.stress / (basis @ basis) for each in first.values()]) - found.coordinates.centre[0]
+    mean, tau = found.hierarchy.mean[..., 0].reshape(-1, 1), found.hierarchy.tau[..., 0].reshape(-1, 1)
+    more = mean + tau * generator.standard_normal((4000, count - 6))
+    sd = np.hstack([np.broadcast_to(y, (4000, 6)), more]).std(axis=1)
+    half_width = t.ppf(0.975, count - 2) * sd / np.sqrt(count - 2)
+    assert (np.sinh(half_width) <= aim).mean() == pytest.approx(0.8, abs=0.07)
+
+
 @pytest.mark.slow
 @pytest.mark.statistical
 def test_populations_of_so_many_specimens_reach_the_width_as_often_as_they_should():
     """Ten specimens, and futures from draws of what they say of the population, each fitted as any population.
 
-    Of 40 futures 80 % should reach the aim: 25 to 38 do with probability 0.995.
+    Of 20 futures 80 % should reach the aim: 11 or more do with probability 0.997.
     """
     noise, generator = 0.02, np.random.default_rng(3)
     first = specimens_of(0.5 * np.exp(0.25 * generator.standard_normal(10)), noise, seed=500)
@@ -60,7 +78,7 @@ def test_populations_of_so_many_specimens_reach_the_width_as_often_as_they_shoul
     aim, reached = 0.2, 0
     count = int(found.specimens_needed(aim).loc[("C10", "median"), "specimens"])
     assert 12 < count < 100
-    for future in range(40):
+    for future in range(20):
         chain, draw = generator.integers(4), generator.integers(1000)
         middle, spread = found.hierarchy.mean[chain, draw, 0], found.hierarchy.tau[chain, draw, 0]
         line = middle + found.coordinates.centre[0] + spread * generator.standard_normal(count - 10)
@@ -68,4 +86,4 @@ def test_populations_of_so_many_specimens_reach_the_width_as_often_as_they_shoul
         then = neo_hookean(first | {f"more {name}": each for name, each in more.items()}, noise)
         low, high = np.log(np.quantile(then.median, [0.025, 0.975]))
         reached += np.sinh((high - low) / 2) <= aim
-    assert 25 <= reached <= 38
+    assert reached >= 11
