@@ -14,7 +14,7 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
-from tissuq.model.tolerances import AS_TESTED
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances
 from tissuq.parameters.priors import Prior
 from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
@@ -41,6 +41,7 @@ def fit_population(
     noise_sd: float | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
+    tolerances: Tolerances | str | None = None,
     method: Method = "auto",
     seed: int = 0,
 ) -> Population:
@@ -69,6 +70,11 @@ def fit_population(
     discrepancy, material, noise_sd, noise, priors, method, seed
         As for `tissuq.fit`, for every separate fit. Priors of pooled parameters only serve that step: they are
         divided out, and must be wide.
+
+    tolerances : Tolerances or str, optional
+        Errors of every specimen's own tests, as for `tissuq.fit`: ``"as-tested"`` (the default), ``"specimen"`` or
+        sizes. They are independent between specimens, so that the spread is what specimens differ beyond them; the
+        tests of a specimen are then not joined, each has its own. Complete pooling is as tested.
 
     Raises
     ------
@@ -106,20 +112,28 @@ def fit_population(
     if not (np.isfinite(spread) and spread > 0):
         raise InputError(f"spread must be a positive number, not {spread!r}.")
     known = covariates_of(covariates, list(specimens))
-    *single, complete = fit_many(
-        [
-            *(_one_specimen(name, tests) for name, tests in specimens.items()),
-            _one_specimen(ALL_SPECIMENS, [test for tests in specimens.values() for test in tests]),
-        ],
-        discrepancy=discrepancy,
-        material=pooled_material,
-        noise_sd=noise_sd,
-        noise=noise,
-        priors=priors,
-        tolerances=AS_TESTED,
-        method=method,
-        seed=seed,
+    of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
+    if of_tests.estimand == TISSUE:
+        raise InputError(
+            f"the errors of the estimand '{TISSUE}' hold how much specimens differ, which a population finds itself: "
+            f"take '{SPECIMEN}'."
+        )
+    options: dict[str, Any] = {
+        "discrepancy": discrepancy,
+        "material": pooled_material,
+        "noise_sd": noise_sd,
+        "noise": noise,
+        "priors": priors,
+        "method": method,
+        "seed": seed,
+    }
+    single = fit_many(
+        [_one_specimen(name, tests, apart=bool(of_tests)) for name, tests in specimens.items()],
+        tolerances=of_tests,
+        **options,
     )
+    all_tests = [test for tests in specimens.values() for test in tests]
+    (complete,) = fit_many([_one_specimen(ALL_SPECIMENS, all_tests)], tolerances=AS_TESTED, **options)
     coordinates = coordinates_of(single, symbols)
     mixtures, reference = mixtures_of(single, coordinates)
     hierarchy = sample_hierarchy(mixtures, reference, symbols, known, spread, seed)
@@ -146,8 +160,10 @@ def _by_specimen(
     return tests_of
 
 
-def _one_specimen(name: str, tests: Sequence[Experiment]) -> Experiment:
-    """Return tests as those of one specimen: joined in each mode, without errors of one test against another."""
+def _one_specimen(name: str, tests: Sequence[Experiment], *, apart: bool = False) -> Experiment:
+    """Return tests as those of one specimen: joined in each mode, unless they are to stay apart."""
+    if apart:
+        return Experiment.of([test.labelled(name=name, specimen=name) for test in tests])
     modes: dict[LoadingMode, list[Experiment]] = {}
     for test in tests:
         modes.setdefault(test.mode, []).append(test)

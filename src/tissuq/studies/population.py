@@ -93,6 +93,7 @@ def run_population(
         material=law or material_named(settings.material),
         discrepancy=settings.discrepancy,
         noise=settings.noise_in(_unit(tests)),
+        tolerances=settings.tolerances_in(_unit(tests)),
         method=cast("Method", settings.method),
         seed=settings.seed,
     ).given(settings.new_patient)

@@ -12,6 +12,7 @@ from tissuq.errors import InputError
 from tissuq.studies.measured_file import FittedSettings, ReadingSettings
 from tissuq.studies.option import argument, option
 from tissuq.studies.option_texts import pairs_of, share
+from tissuq.studies.tolerance_settings import ToleranceSettings
 
 if TYPE_CHECKING:
     from tissuq.experiments.reading.covariates import CovariateTable
@@ -29,7 +30,7 @@ def known_of_patient(texts: Sequence[str]) -> dict[str, str]:
     return pairs([part for text in texts for part in text.split(",")])
 
 
-class PopulationSettings(FittedSettings, ReadingSettings):
+class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
     """Everything that a population depends on; the noise in the files' unit of stress.
 
     Without a mode every test says its own, as for `tissuq.read_experiment`. Of a file of several tests each is of a
@@ -73,6 +74,11 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         parse=share("--aim"),
         gt=0,
         lt=inf,
+    )
+    estimand: str | None = option(
+        None,
+        "Errors of every specimen's own tests: those of the specimen as-tested (none), or of the specimen (of a "
+        "careful laboratory) [as-tested].",
     )
     discrepancy: str = option("auto", "Discrepancy of every specimen.")
     mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
