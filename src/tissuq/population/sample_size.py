@@ -80,10 +80,9 @@ def needed_table(population: Population, aim: float, prob: float, assurance: flo
         floors = _relative(population, j, _score(prob) * population.hierarchy.tau[..., j].ravel())
         for quantity, of_quantity in zip(("median", "new patient"), widths, strict=True):
             likely = np.quantile(of_quantity, assurance, axis=0)
-            is_patient = quantity == "new patient"
-            is_possible = not is_patient or np.quantile(floors, assurance) < aim
-            needed = _first_below(aim, sizes, likely) if is_possible else np.nan
-            rows[symbol, quantity] = [likely[0], np.median(floors) if is_patient else 0.0, needed, needed - count]
+            floor = float(np.quantile(floors, assurance)) if quantity == "new patient" else 0.0
+            needed = _first_below(aim, sizes, likely) if floor < aim else np.nan
+            rows[symbol, quantity] = [likely[0], floor, needed, needed - count]
     index = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
     return pd.DataFrame(list(rows.values()), index, ["now", "floor", "specimens", "more"])
 

@@ -250,14 +250,18 @@ def _sections(
     gaussian = [f"The logarithm{'s' * (len(logs) > 1)} of {', '.join(logs)}"] * bool(logs)
     gaussian += [f"{', '.join(linear)} {'itself' if len(linear) == 1 else 'themselves'}"] * bool(linear)
     sizes = " (in units of the typical size, for parameters of either sign)" if linear else ""
-    computed = (
+    computed: tuple[str, ...] = (
         "Every specimen was fitted separately, with its own discrepancy and noise and wide priors, which are then "
         "divided out (Lunn et al. 2013).",
         f"{' and '.join(gaussian)} {'is' if is_one else 'are'} Gaussian between specimens. The prior of every spread "
-        f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2).",
+        f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2)"
+        f"{'; of effects, normal with sd 1' * bool(population.covariates)}.",
         f"The specimens are integrated in closed form. {diagnostics.verdict} Effective share of the draws after "
         f"importance correction: {population.hierarchy.effective:.1%}. {study.seconds:.0f} s.",
     )
+    if tolerances := next(iter(population.posteriors.values())).model.tolerances:
+        sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
+        computed += (f"Errors of the specimens' own tests are included (of the first one: {sizes}).",)
     return (*sections, Section("How to read it", (HOW_TO_READ,)), Section("How it was computed", (computed,)))
 
 
