@@ -221,6 +221,103 @@ def test_warnings_about_files_are_shown_with_their_specimens(cli, here):
     assert UNITS_ASSUMED in " ".join(said.out.split())
 
 
+AGES = [30, 41, 50, 62, 70, 44]
+
+
+def write_covariates(folder, rows=(), name="covariates.csv"):
+    """Write the ages of the specimens of `write_all`, of files and of names, with other rows at their places."""
+    lines = ["specimen;age [year]", *(f"S{k}{'.csv' if k < 2 else ''};{age}" for k, age in enumerate(AGES))]
+    for place, row in rows:
+        lines[place : place + 1] = [row] if row else []
+    (folder / name).write_text("\n".join(lines) + "\n")
+
+
+def test_a_population_follows_covariates_and_a_new_patient_has_them(cli, here):
+    """The table lies among the specimens, of which it is none; a run is repeated with its copy."""
+    write_all(here)
+    write_covariates(here / "specimens")
+    options = [
+        "--covariates",
+        "specimens/covariates.csv",
+        "--new-patient",
+        "age=80",
+        "--aim",
+        "8%",
+        *OPTIONS,
+        "--no-figures",
+    ]
+    said = cli("population", "specimens", *options, "--out", "run")
+    assert said.status == 0, said.err
+    row, share = table(here / "run" / "covariates.csv")
+    slope = np.polyfit(AGES, np.log(MODULI_KPA), 1)[0]
+    assert (row["kind"], row["per"], share["covariate"]) == ("factor", "per year", "all covariates")
+    assert float(row["hdi_low"]) < np.exp(slope) < float(row["hdi_high"])
+    assert float(row["positive"]) > 0.9
+    text = " ".join(said.out.split())
+    assert "new patient (age 80 year)" in text
+    assert "beyond the specimens: age 80 year (theirs: 30 to 70)" in text
+    assert f"{float(row['median']):.4g} per year" in text
+    needed = {row["quantity"]: row for row in table(here / "run" / "specimens_needed.csv")}
+    assert float(needed["median"]["specimens"]) == 6 + float(needed["median"]["more"]) > 6
+    assert needed["new patient"]["specimens"] == ""
+    assert "Specimens like these for ± 8%" in text
+    assert "not reached: patients differ more" in text
+    patient = next(row for row in table(here / "run" / "population.csv") if row["quantity"] == "new patient")
+    assert float(patient["median"]) == pytest.approx(
+        np.exp(np.polyval(np.polyfit(AGES, np.log(MODULI_KPA), 1), 80)), 0.1
+    )
+    loaded = tq.load(here / "run")
+    assert float(loaded.summary().loc["C10", "median"]) == pytest.approx(float(patient["median"]), rel=0.02)
+    assert "the patient: age 80 year" in loaded.how
+    recipe = tomllib.loads((here / "run" / "run.toml").read_text())
+    assert (here / "run" / recipe["covariates"]).read_bytes() == (here / "specimens/covariates.csv").read_bytes()
+    again = PopulationSettings.model_validate(recipe)
+    assert list(again.sources(here / "run")) == [f"S{k}" for k in range(6)]
+    assert again.covariate_table(("S0",), here / "run").values()["S5"] == {"age [year]": "44"}
+
+
+def test_covariates_may_stand_in_the_file_of_the_specimens(here):
+    write_all(here)
+    lines = (here / "all.csv").read_text().splitlines()
+    aged = [f"{line},{AGES[int(line[1])]}" if place else f"{line},age" for place, line in enumerate(lines)]
+    (here / "all.csv").write_text("\n".join(aged) + "\n")
+    settings = PopulationSettings(files=("all.csv",), specimen="specimen", covariate=("age",))
+    found = settings.covariate_table([])
+    assert found.values() == {f"S{k}": {"age": str(age)} for k, age in enumerate(AGES)}
+    assert list(settings.readings()) == list(found.values())
+    (here / "all.csv").write_text("\n".join([*aged[:3], aged[3][:-2] + "31", *aged[4:]]) + "\n")
+    with pytest.raises(
+        tq.InputError, match=r"all\.csv, line 4, column 'age': '31' for specimen 'S0', which has '30' in"
+    ):
+        settings.covariate_table([]).values()
+
+
+@pytest.mark.parametrize(
+    ("rows", "options", "words"),
+    [
+        ([(1, "X;3")], [], "covariates.csv, line 2, column 'specimen': there is no specimen 'X'"),
+        ([(3, "")], [], "covariates.csv: the covariates of specimen 'S2' are missing"),
+        ([(3, "S2;")], [], "covariates.csv, line 4, column 'age [year]': the value of 'age [year]' is missing"),
+        ([(3, "S1;20")], [], "covariates.csv, line 4, column 'specimen': specimen 'S1' has several rows"),
+        ([(3, "S2;old")], [], "covariates.csv, line 4, column 'age [year]': 'old' is no number"),
+        ([(3, "S2;5;6")], [], "covariates.csv, line 4: more cells than the 2 columns"),
+        ([(0, "specimen;")], [], "covariates.csv, line 1: every column needs a name"),
+        ([(k + 1, f"S{k};5") for k in range(6)], [], "column 'age [year]': all specimens have the same value"),
+        ([], ["--new-patient", "sex=f"], "there is no covariate 'sex' in this population: the covariates are age"),
+        ([], ["--new-patient", "age"], "'age' is not something known of a patient (--new-patient)"),
+        ([], ["--covariate", "age"], "give --covariates TABLE, or --covariate for columns of the one FILE"),
+    ],
+)
+def test_covariates_that_cannot_be_used_end_with_one_message(cli, here, rows, options, words):
+    write_all(here)
+    write_covariates(here, rows)
+    said = cli("population", "specimens", "--covariates", "covariates.csv", *OPTIONS, *options)
+    assert said.status == 2
+    assert words in " ".join(said.err.split())
+    assert "Traceback" not in said.err
+    assert not (here / "runs").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -228,6 +325,12 @@ def test_warnings_about_files_are_shown_with_their_specimens(cli, here):
         (["nowhere.csv"], "there is no such file"),
         (["specimens/S0.csv", "specimens/S1.csv"], "needs 3 specimens or more; there are 2 (S0, S1)"),
         (["specimens", "--specimen", "who"], "--specimen-column names a column of a single file"),
+        (["specimens", "--covariate", "age"], "for several files give a table of the covariates"),
+        (["specimens", "--new-patient", "age=60"], "it was fitted without covariates"),
+        (["specimens", "--aim", "little"], "--aim needs a share such as 10% or 0.1, not 'little'"),
+        (["specimens", "--aim", "0"], "aim"),
+        (["specimens", "--estimand", "tissue"], "which a population finds itself"),
+        (["specimens", "--tolerance", "stress=much"], "is not a tolerance"),
         (["specimens", "--parameter", "C99"], "found: C99"),
         (["specimens", "--spread", "-1"], "spread"),
         (["specimens", "--noise-sd", "much"], "--noise-sd needs a number"),

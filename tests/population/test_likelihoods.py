@@ -172,25 +172,27 @@ def test_a_new_specimen_has_the_covariance_of_the_population():
     assert (np.abs(np.cov(drawn.T) - covariance) < 5 * error).all()
 
 
-def test_correlations_have_the_prior_of_lewandowski_kurowicka_and_joe():
+def test_correlations_have_the_prior_of_lewandowski_kurowicka_and_joe_and_effects_a_normal_one():
     """Its density is det(Omega)^(2 - 1) over the correlations, here brought to the partial ones by their Jacobian."""
     generator, spread = np.random.default_rng(4), 0.7
     flat = {name: np.zeros(shape) for name, shape in
-            (("log_factor", (1, 1)), ("pull", (1, 1, 3)), ("precision", (1, 1, 3, 3)))}  # fmt: skip
+            (("log_factor", (1, 1)), ("pull", (1, 1, 3)), ("precision", (1, 1, 3, 3)), ("design", (1, 2)))}  # fmt: skip
     lower = np.tril_indices(3, -1)
 
     def correlations(point):
         root = np.asarray(_population(jnp.asarray(point))[1]) / point[3:6, None]
         return root @ root.T
 
-    def expected(point):
+    def expected(whole):
+        point, effects = whole[:9], whole[9:]
         steps = 1e-5 * np.eye(9)[6:]
         jacobian = [(correlations(point + step) - correlations(point - step))[lower] / 2e-5 for step in steps]
         of_correlations = np.linalg.slogdet(correlations(point))[1] + np.linalg.slogdet(jacobian)[1]
-        return of_correlations + norm.logpdf(point[:3], 0, 5).sum() + norm.logpdf(point[3:6], 0, spread).sum()
+        of_scales = norm.logpdf(point[:3], 0, 5).sum() + norm.logpdf(point[3:6], 0, spread).sum()
+        return of_correlations + of_scales + norm.logpdf(effects, 0, 1).sum()
 
     points = np.column_stack([generator.normal(size=(6, 3)), generator.random((6, 3)) + 0.1,
-                              generator.uniform(-0.9, 0.9, (6, 3))])  # fmt: skip
+                              generator.uniform(-0.9, 0.9, (6, 3)), generator.normal(size=(6, 6))])  # fmt: skip
     found = [float(_log_posterior(jnp.asarray(point), flat | {"spread": spread})) for point in points]
     wanted = [expected(point) for point in points]
     assert np.diff(found) == pytest.approx(np.diff(wanted), abs=1e-6)

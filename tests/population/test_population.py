@@ -287,6 +287,28 @@ def test_a_new_patient_under_an_energy_is_predicted_in_every_mode():
         found.new_patient([[1.1, 1.1]], mode="biaxial")
 
 
+def test_errors_of_the_specimens_tests_are_no_spread_between_them():
+    """Well measured but for 10 % of the stress as a whole, against a sum over m and tau for Gaussians."""
+    moduli = np.array([0.4, 0.5, 0.6, 0.45, 0.55, 0.48])
+    found = neo_hookean(specimens_of(moduli, 0.002), 0.002, tolerances=tq.Tolerances(stress=0.1))
+    y = np.log(moduli)
+    m, tau = np.median(y) + np.linspace(-1, 1, 401)[:, None], np.geomspace(1e-3, 5, 400)
+    log_post = norm.logpdf(tau) + np.log(tau)
+    for each in y:
+        log_post = log_post + norm.logpdf(each, m, np.hypot(tau, 0.1))
+    weights = np.exp(log_post - log_post.max())
+    weights /= weights.sum()
+    line = found.coordinates.centre[0]
+    for draws, grid in ((found.hierarchy.mean[..., 0] + line, m), (found.hierarchy.tau[..., 0], tau)):
+        mean = (weights * grid).sum()
+        scale = np.sqrt((weights * (grid - mean) ** 2).sum())
+        assert abs(draws.mean() - mean) < 4 * scale / np.sqrt(1000)
+        assert abs(draws.std() / scale - 1) < 0.15
+    own = found.posteriors["s0"].marginals["C10"]
+    assert own.sd / own.mean == pytest.approx(0.1, rel=0.02)
+    assert not found.complete.model.tolerances
+
+
 def test_few_specimens_are_warned_about(found):
     few = dict(list(found.posteriors.items())[:4])
     rest = found.complete, found.coordinates, found.hierarchy, found.spread_prior, found.seed
@@ -303,6 +325,8 @@ def test_few_specimens_are_warned_about(found):
         (lambda s: s | {"empty": []}, {}, "there is no experiment to fit"),
         (lambda s: s, {"parameters": ["C01"]}, "must be a list of C10; found: C01"),
         (lambda s: s, {"parameters": "C10"}, "must be a list of C10"),
+        (lambda s: s, {"tolerances": "tissue"}, "which a population finds itself: take 'specimen'"),
+        (lambda s: s, {"tolerances": "nobody"}, "there is no estimand 'nobody'"),
         (lambda s: s, {"spread": 0}, "spread must be a positive number, not 0"),
     ],
 )

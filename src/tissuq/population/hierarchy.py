@@ -2,11 +2,14 @@
 
 In the coordinates of `likelihoods`, with d pooled parameters and the likelihood of each specimen i,
 
-    theta_i ~ N(m, S),   S = diag(tau) Omega diag(tau),
-    m ~ N(0, 5²),   tau ~ half-normal(spread),   Omega ~ LKJ(2).
+    theta_i ~ N(m + B x_i, S),   S = diag(tau) Omega diag(tau),
+    m ~ N(0, 5²),   B ~ N(0, 1),   tau ~ half-normal(spread),   Omega ~ LKJ(2),
 
-A Gaussian of a likelihood times N(m, S) integrates in closed form, so that only m, tau and Omega are sampled: no
-funnel, and as many dimensions for fifty specimens as for three. Each theta_i is then drawn exactly, given these.
+where x_i are the columns of the specimen's covariates, if there are any (`covariates`).
+
+A Gaussian of a likelihood times N(m + B x_i, S) integrates in closed form, so that only m, B, tau and Omega are
+sampled: no funnel, and as many dimensions for fifty specimens as for three. Each theta_i is then drawn exactly, given
+these.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from numpy.typing import NDArray
 from tissuq.inference.enumerators.nuts import NutsDraws, NutsSettings, sample_nuts
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.quasi_monte_carlo import systematic
+from tissuq.population.covariates import Covariates
 from tissuq.population.likelihoods import Coordinates, likelihoods_of
 from tissuq.posterior.posterior import Posterior
 
@@ -34,9 +38,13 @@ if TYPE_CHECKING:
 __all__ = ["Hierarchy", "labelled", "sample_hierarchy"]
 
 FloatArray = NDArray[np.float64]
+NO_COLUMNS: FloatArray = np.zeros(0)
 
 MEAN_PRIOR_SD = 5.0
 """Sd of the prior of the mean; of a logarithm it is a factor of 150 either way from the median specimen."""
+EFFECT_PRIOR_SD = 1.0
+"""Sd of the prior of an effect on the line: of a logarithm it is a factor of 2.7 either way for one sd of a number, or
+between a level and the reference."""
 LKJ_CONCENTRATION = 2.0
 """Concentration of the LKJ prior of the correlations; one would be uniform."""
 DRAWS_PER_CHAIN = 1000
@@ -60,7 +68,7 @@ class Hierarchy:
         Lower triangle A of the covariance A A' between specimens.
     specimens : (chains, draws, I, d) array
     sampled : NutsDraws
-        Draws of m, tau and Omega, with their diagnostics.
+        Draws of m, tau, Omega and B, with their diagnostics.
     effective : float
         Share of the draws that remain effective after their correction.
     """
@@ -82,6 +90,14 @@ class Hierarchy:
         rows = self.root / self.tau[..., None]
         return np.asarray(rows @ rows.swapaxes(2, 3))
 
+    @property
+    def effects(self) -> FloatArray:
+        """Effects B (chains, draws, k, d) of the columns of the covariates."""
+        chains, draws, size = self.mean.shape
+        start = size * (size + 3) // 2
+        count = (self.sampled.values.shape[2] - start) // size
+        return np.asarray(self.sampled.values[..., start:].reshape(chains, draws, count, size))
+
     @cached_property
     def diagnostics(self) -> NutsDraws:
         """The run with the parameters of every specimen among its quantities."""
@@ -90,14 +106,23 @@ class Hierarchy:
         values = np.concatenate([self.sampled.values, self.specimens.reshape(chains, draws, -1)], axis=2)
         return self.sampled.of(values, (*self.sampled.names, *names))
 
-    def new(self, generator: np.random.Generator) -> FloatArray:
-        """Return a new specimen (chains, draws, d) for every draw of the population."""
+    def middle(self, columns: FloatArray) -> FloatArray:
+        """Return m + B x (chains, draws, d) for columns x (k,) of covariates."""
+        return np.asarray(self.mean + np.einsum("k,cdki->cdi", columns, self.effects)) if len(columns) else self.mean
+
+    def new(self, generator: np.random.Generator, columns: FloatArray = NO_COLUMNS) -> FloatArray:
+        """Return a new specimen (chains, draws, d), with columns (k,) of its covariates, for every draw."""
         score = generator.standard_normal(self.mean.shape)
-        return np.asarray(self.mean + np.einsum("cdij,cdj->cdi", self.root, score))
+        return np.asarray(self.middle(columns) + np.einsum("cdij,cdj->cdi", self.root, score))
 
 
 def sample_hierarchy(
-    mixtures: Sequence[GaussianMixture], reference: FloatArray, symbols: Sequence[str], spread: float, seed: int
+    mixtures: Sequence[GaussianMixture],
+    reference: FloatArray,
+    symbols: Sequence[str],
+    covariates: Covariates,
+    spread: float,
+    seed: int,
 ) -> Hierarchy:
     """Return draws of the population that specimens come from.
 
@@ -110,6 +135,8 @@ def sample_hierarchy(
         From `tissuq.population.likelihoods.mixtures_of`.
     symbols : sequence of str
         The pooled parameters.
+    covariates : Covariates
+        Of the specimens.
     spread : float
         Sd of the half-normal prior of every spread on the line.
     seed : int
@@ -120,24 +147,28 @@ def sample_hierarchy(
     pairs = [(i, j) for i in range(size) for j in range(i)]
     names = [f"{quantity} of {symbol}" for quantity in ("mean", "spread") for symbol in symbols]
     names += [f"partial correlation of {symbols[i]} and {symbols[j]}" for i, j in pairs]
-    lower = np.r_[np.full(size, -np.inf), np.zeros(size), -np.ones(len(pairs))]
-    upper = np.r_[np.full(2 * size, np.inf), np.ones(len(pairs))]
-    start = np.r_[np.zeros(size), np.full(size, 0.3 * spread), np.zeros(len(pairs))]
-    data = coarse | {"spread": jnp.asarray(spread)}
+    effects = [f"effect of {column} on {symbol}" for column, _ in covariates.effects for symbol in symbols]
+    unbounded = np.full(len(effects), np.inf)
+    lower = np.r_[np.full(size, -np.inf), np.zeros(size), -np.ones(len(pairs)), -unbounded]
+    upper = np.r_[np.full(2 * size, np.inf), np.ones(len(pairs)), unbounded]
+    start = np.r_[np.zeros(size), np.full(size, 0.3 * spread), np.zeros(len(pairs)), np.zeros(len(effects))]
+    design = jnp.asarray(covariates.design)
+    data = coarse | {"spread": jnp.asarray(spread), "design": design}
     for thinning in THINNINGS:
         settings = NutsSettings(draws=DRAWS_PER_CHAIN, thinning=thinning, seed=seed)
-        sampled = sample_nuts(_log_posterior, lower, upper, start, settings, names, data)
-        hierarchy = _corrected(sampled, coarse, fine, seed + 1)
+        sampled = sample_nuts(_log_posterior, lower, upper, start, settings, [*names, *effects], data)
+        hierarchy = _corrected(sampled, coarse, fine, design, seed + 1)
         if hierarchy.diagnostics.converged:
             break
     return hierarchy
 
 
-def _corrected(sampled: NutsDraws, coarse: Any, fine: Any, seed: int) -> Hierarchy:
+def _corrected(sampled: NutsDraws, coarse: Any, fine: Any, design: Any, seed: int) -> Hierarchy:
     """Return draws resampled by the likelihood of the many Gaussians, over that of the few that were sampled from."""
     points = jnp.asarray(sampled.values.reshape(-1, len(sampled.names)))
     keys = jax.random.split(jax.random.key(seed), len(points))
-    mean, root, specimens, gain = (np.asarray(array) for array in _corrected_draws(points, keys, coarse, fine))
+    found = _corrected_draws(points, keys, coarse, fine, design)
+    mean, root, specimens, gain = (np.asarray(array) for array in found)
     weights = np.exp(gain - gain.max())
     shape = sampled.values.shape[:2]
     rows = systematic(weights.reshape(shape), DRAWS_PER_CHAIN) + DRAWS_PER_CHAIN * np.arange(shape[0])[:, None]
@@ -164,6 +195,14 @@ def _population(position: Any) -> tuple[Any, Any]:
     return mean, tau[:, None] * jnp.stack(rows)
 
 
+def _parted(position: Any, columns: int) -> tuple[Any, Any]:
+    """Return m, tau and partial correlations of a point, and the effects (k, d) of columns of covariates."""
+    length, offset = int(position.shape[0]), 3 + 2 * columns
+    size = (isqrt(offset**2 + 8 * length) - offset) // 2
+    start = length - columns * size
+    return position[:start], position[start:].reshape(columns, size)
+
+
 def _size(position: Any) -> int:
     """Return how many parameters have a mean, a spread and a correlation with each other in a point."""
     return (isqrt(9 + 8 * int(position.shape[0])) - 3) // 2
@@ -171,30 +210,49 @@ def _size(position: Any) -> int:
 
 def _log_posterior(position: Any, data: Any) -> Any:
     """Return the log density of a population."""
+    position, effects = _parted(position, data["design"].shape[1])
     size = _size(position)
     tau, partial = position[size : 2 * size], position[2 * size :]
     level = jnp.array([j + 1 for i in range(size) for j in range(i)])
     power = LKJ_CONCENTRATION - 1 + 0.5 * (size - 1 - level)
     prior = -0.5 * (position[:size] ** 2).sum() / MEAN_PRIOR_SD**2 - 0.5 * (tau**2).sum() / data["spread"] ** 2
     prior += (power * jnp.log1p(-(partial**2))).sum()
+    prior += -0.5 * (effects**2).sum() / EFFECT_PRIOR_SD**2 if effects.size else 0.0
     mean, root = _population(position)
-    terms, _, _ = _terms(mean, root, data["log_factor"], data["pull"], data["precision"])
+    terms, _, _ = _terms(mean, root, *_around(_offset(data["design"], effects), data))
     return prior + jax.scipy.special.logsumexp(terms, axis=1).sum()
 
 
 @jax.jit
-def _corrected_draws(points: Any, keys: Any, coarse: Any, fine: Any) -> Any:
+def _corrected_draws(points: Any, keys: Any, coarse: Any, fine: Any, design: Any) -> Any:
     """Return mean, root, specimens (I, d) and what many Gaussians add to the log likelihood, for points (N, k)."""
 
     def complete(point_and_key: Any) -> Any:
         point, key = point_and_key
-        mean, root = _population(point)
-        coarse_terms, _, _ = _terms(mean, root, **coarse)
-        terms, triangle, half = _terms(mean, root, **fine)
+        position, effects = _parted(point, design.shape[1])
+        mean, root = _population(position)
+        offset = _offset(design, effects)
+        coarse_terms, _, _ = _terms(mean, root, *_around(offset, coarse))
+        terms, triangle, half = _terms(mean, root, *_around(offset, fine))
         gain = (jax.nn.logsumexp(terms, axis=1) - jax.nn.logsumexp(coarse_terms, axis=1)).sum()
-        return mean, root, _specimen_draws(key, mean, root, terms, triangle, half), gain
+        specimens = _specimen_draws(key, mean, root, terms, triangle, half)
+        return mean, root, specimens if offset is None else specimens + offset, gain
 
     return jax.lax.map(complete, (points, keys), batch_size=CORRECTION_BATCH)
+
+
+def _offset(design: Any, effects: Any) -> Any:
+    """Return B x (I, d) of all specimens; None without covariates."""
+    return design @ effects if effects.size else None
+
+
+def _around(offset: Any, likelihoods: Any) -> tuple[Any, Any, Any]:
+    """Return log factor, pull and precision of likelihoods of what remains of theta without an offset (I, d)."""
+    log_factor, pull, precision = (likelihoods[name] for name in ("log_factor", "pull", "precision"))
+    if offset is None:
+        return log_factor, pull, precision
+    drop = jnp.einsum("ikab,ib->ika", precision, offset)
+    return log_factor + ((pull - 0.5 * drop) * offset[:, None]).sum(axis=-1), pull - drop, precision
 
 
 def _terms(mean: Any, root: Any, log_factor: Any, pull: Any, precision: Any) -> tuple[Any, list[list[Any]], list[Any]]:
@@ -241,6 +299,7 @@ def labelled(
     hierarchy: Hierarchy,
     new: FloatArray,
     labels: Mapping[str, str | float],
+    covariates: Covariates,
 ) -> xr.DataTree:
     """Return draws and data of a population with the names of specimens and parameters.
 
@@ -250,6 +309,7 @@ def labelled(
         As in `Population`.
     labels : mapping of str to str or float
         Further attributes of the tree.
+    covariates : Covariates
     """
     import xarray as xr
 
@@ -289,6 +349,14 @@ def labelled(
             }
         ),
     }
+    if covariates:
+        effects = hierarchy.effects / covariates.sizes[:, None] * coordinates.scale
+        columns = {"covariate": [name for name, _ in covariates.effects]}
+        groups["posterior"] = groups["posterior"].assign_coords(columns)
+        groups["posterior"]["effect"] = (("chain", "draw", "covariate", "parameter"), effects)
+        groups["covariates"] = xr.Dataset(
+            {"design": (("specimen", "covariate"), covariates.design)}, columns | specimen
+        )
     tree = xr.DataTree.from_dict(groups)
     model = complete.model
     tree.attrs.update(

@@ -169,7 +169,18 @@ def _on_line(solution: Solution, coordinates: Coordinates) -> GaussianMixture:
         pieces.append(_split(reduced(mixture[~is_narrow & ~is_point], MAX_WIDE_COMPONENTS), coordinates))
     if is_point.any():
         pieces.append(_smoothed(mixture[is_point], coordinates))
-    return GaussianMixture.of_all(pieces)
+    return _with_common_error(GaussianMixture.of_all(pieces), solution, coordinates)
+
+
+def _with_common_error(mixture: GaussianMixture, solution: Solution, coordinates: Coordinates) -> GaussianMixture:
+    """Return Gaussians on the line with the error that all stresses of a specimen share, to first order."""
+    error, columns = solution.model.common_error, solution.model.column_symbols
+    if not error:
+        return mixture
+    along = np.where(coordinates.is_log, 1.0, mixture.mean + coordinates.centre)
+    along = error * along * np.isin(coordinates.symbols, columns)
+    covariance = mixture.covariance + along[:, :, None] * along[:, None, :]
+    return GaussianMixture.of_covariances(mixture.weights, mixture.mean, covariance)
 
 
 def _mapped(mixture: GaussianMixture, coordinates: Coordinates) -> GaussianMixture:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tissuq.assessment.stability import calibrated_range
+from tissuq.errors import InputError
 from tissuq.experiments.modes import LoadingMode, loading_mode
 from tissuq.inference.gaussian_mixture import GaussianMixture
 from tissuq.inference.marginal import marginal_of_points
@@ -24,7 +25,7 @@ from tissuq.prediction.moments import drawn_curves, values_of
 if TYPE_CHECKING:
     from tissuq.population.hierarchy import Hierarchy
 
-__all__ = ["matching_draws", "patient_curves", "patient_posterior"]
+__all__ = ["matching_draws", "patient_band", "patient_curves", "patient_posterior"]
 
 FloatArray = NDArray[np.float64]
 
@@ -54,6 +55,7 @@ def patient_posterior(
     coordinates: Coordinates,
     hierarchy: Hierarchy,
     new: FloatArray,
+    covariates: str = "",
 ) -> Posterior:
     """Return the posterior of the material of a patient who has not been measured, without discrepancy.
 
@@ -70,6 +72,8 @@ def patient_posterior(
     hierarchy : Hierarchy
     new : (chains, draws, d) array
         The pooled parameters of new patients.
+    covariates : str
+        Those of the patient, in words.
     """
     full = complete.model
     used = {p.symbol for p in (*full.material.parameters, *full.noise.parameters)}
@@ -91,6 +95,7 @@ def patient_posterior(
     mixture = GaussianMixture.of_points(weights, settings, linear)
     support = {parameter.symbol: parameter.support for parameter in model.parameters}
     names = f"{count} specimens, pooled in {', '.join(coordinates.symbols)}"
+    names += f" (the patient: {covariates})" * bool(covariates)
     is_exact = full.discrepancy.name == NoDiscrepancy.name
     left_out = "" if is_exact else f", and their model error ({full.discrepancy.name}) is left out"
     solution = Solution(
@@ -104,6 +109,59 @@ def patient_posterior(
         is_of_data=False,
     )
     return Posterior(solution, complete.solver)
+
+
+def patient_band(
+    posteriors: Sequence[Posterior],
+    coordinates: Coordinates,
+    hierarchy: Hierarchy,
+    new: FloatArray,
+    loading: LoadingMode,
+    points: FloatArray,
+    prob: float,
+    **options: Any,
+) -> FloatArray:
+    """Return low, median and high (3, g) of the stress of a new patient, whose model error is a random specimen's.
+
+    Parameters
+    ----------
+    posteriors, coordinates, hierarchy, new
+        As of `patient_posterior`.
+    loading : LoadingMode
+        With one control.
+    points : (g,) array
+        Where.
+    prob : float
+        Between low and high.
+    **options
+        As of `patient_curves`.
+
+    Raises
+    ------
+    InputError
+        When the loading mode has several controls, or no specimen was measured at a point.
+    """
+    if len(loading.controls) > 1:
+        names = ", ".join(control.name for control in loading.controls)
+        raise InputError(
+            f"the stress of a new patient is predicted in loading modes with one control, and '{loading.name}' has "
+            f"{names}."
+        )
+    chains, draws, count, size = hierarchy.specimens.shape
+    line_values, patients = hierarchy.specimens.reshape(-1, count, size), new.reshape(-1, size)
+    curves = []
+    for i, posterior in enumerate(posteriors):
+        rows = np.arange(i, chains * draws, count)
+        matching = matching_draws(posterior, coordinates, line_values[rows, i])
+        curves.append(patient_curves(posterior, coordinates, matching, patients[rows], points, mode=loading, **options))
+    stresses = np.concatenate(curves)
+    unseen = np.isnan(stresses).all(axis=0)
+    if unseen.any():
+        raise InputError(
+            f"no specimen was measured at {loading.controls[0].name} {points[unseen][0]:g}, so that the model "
+            "error there is unknown: predict nearer to the data, or with discrepancy=False."
+        )
+    return np.asarray(np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0))
 
 
 def patient_curves(

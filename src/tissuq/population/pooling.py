@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.mechanics import Material, material_named
 from tissuq.model.discrepancy import Discrepancy
 from tissuq.model.noise import Noise
-from tissuq.model.tolerances import AS_TESTED
+from tissuq.model.tolerances import AS_TESTED, SPECIMEN, TISSUE, Tolerances
 from tissuq.parameters.priors import Prior
+from tissuq.population.covariates import covariates_of
 from tissuq.population.likelihoods import coordinates_of, mixtures_of
 from tissuq.population.population import Population
 from tissuq.posterior.fitting import fit_many
@@ -34,11 +35,13 @@ def fit_population(
     *,
     parameters: Sequence[str] | None = None,
     spread: float = 1.0,
+    covariates: Any = None,
     discrepancy: str | Discrepancy = "auto",
     material: str | Material = "neo-hookean",
     noise_sd: float | Literal["unknown"] | None = None,
     noise: str | Noise | None = None,
     priors: Mapping[str, Prior] | None = None,
+    tolerances: Tolerances | str | None = None,
     method: Method = "auto",
     seed: int = 0,
 ) -> Population:
@@ -60,14 +63,24 @@ def fit_population(
     spread : float
         Sd of the half-normal prior of the spreads: of the logarithm; for parameters of either sign, in units of their
         typical size. One lets specimens differ by factors of ten.
+    covariates : pandas.DataFrame, mapping of str to mapping, or Covariates, optional
+        What is known of every specimen (the index of a table) by the names of covariates: numbers such as an age, words
+        such as a sex. The middle of the population then depends on them linearly: the logarithm of a positive
+        parameter. A name may end in a unit in brackets, such as ``age [year]``.
     discrepancy, material, noise_sd, noise, priors, method, seed
         As for `tissuq.fit`, for every separate fit. Priors of pooled parameters only serve that step: they are
         divided out, and must be wide.
 
+    tolerances : Tolerances or str, optional
+        Errors of every specimen's own tests, as for `tissuq.fit`: ``"as-tested"`` (the default), ``"specimen"`` or
+        sizes. They are independent between specimens, so that the spread is what specimens differ beyond them; the
+        tests of a specimen are then not joined, each has its own. Complete pooling is as tested.
+
     Raises
     ------
     InputError
-        When there are fewer than three specimens, a test is no experiment, or there is no such parameter.
+        When there are fewer than three specimens, a test is no experiment, there is no such parameter, or covariates
+        cannot be used: missing, constant, determined by others, or too many.
     ModelError, ConvergenceError
         When a specimen cannot be fitted.
 
@@ -98,24 +111,33 @@ def fit_population(
     symbols = _pooled_symbols(parameters, pooled_material)
     if not (np.isfinite(spread) and spread > 0):
         raise InputError(f"spread must be a positive number, not {spread!r}.")
-    *single, complete = fit_many(
-        [
-            *(_one_specimen(name, tests) for name, tests in specimens.items()),
-            _one_specimen(ALL_SPECIMENS, [test for tests in specimens.values() for test in tests]),
-        ],
-        discrepancy=discrepancy,
-        material=pooled_material,
-        noise_sd=noise_sd,
-        noise=noise,
-        priors=priors,
-        tolerances=AS_TESTED,
-        method=method,
-        seed=seed,
+    known = covariates_of(covariates, list(specimens))
+    of_tests = Tolerances(tolerances or AS_TESTED) if isinstance(tolerances, str | None) else tolerances
+    if of_tests.estimand == TISSUE:
+        raise InputError(
+            f"the errors of the estimand '{TISSUE}' hold how much specimens differ, which a population finds itself: "
+            f"take '{SPECIMEN}'."
+        )
+    options: dict[str, Any] = {
+        "discrepancy": discrepancy,
+        "material": pooled_material,
+        "noise_sd": noise_sd,
+        "noise": noise,
+        "priors": priors,
+        "method": method,
+        "seed": seed,
+    }
+    single = fit_many(
+        [_one_specimen(name, tests, apart=bool(of_tests)) for name, tests in specimens.items()],
+        tolerances=of_tests,
+        **options,
     )
+    all_tests = [test for tests in specimens.values() for test in tests]
+    (complete,) = fit_many([_one_specimen(ALL_SPECIMENS, all_tests)], tolerances=AS_TESTED, **options)
     coordinates = coordinates_of(single, symbols)
     mixtures, reference = mixtures_of(single, coordinates)
-    hierarchy = sample_hierarchy(mixtures, reference, symbols, spread, seed)
-    return Population(dict(zip(specimens, single, strict=True)), complete, coordinates, hierarchy, spread, seed)
+    hierarchy = sample_hierarchy(mixtures, reference, symbols, known, spread, seed)
+    return Population(dict(zip(specimens, single, strict=True)), complete, coordinates, hierarchy, spread, seed, known)
 
 
 def _by_specimen(
@@ -138,8 +160,10 @@ def _by_specimen(
     return tests_of
 
 
-def _one_specimen(name: str, tests: Sequence[Experiment]) -> Experiment:
-    """Return tests as those of one specimen: joined in each mode, without errors of one test against another."""
+def _one_specimen(name: str, tests: Sequence[Experiment], *, apart: bool = False) -> Experiment:
+    """Return tests as those of one specimen: joined in each mode, unless they are to stay apart."""
+    if apart:
+        return Experiment.of([test.labelled(name=name, specimen=name) for test in tests])
     modes: dict[LoadingMode, list[Experiment]] = {}
     for test in tests:
         modes.setdefault(test.mode, []).append(test)

@@ -6,19 +6,24 @@ from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tissuq.drawing.panels import Panels, panels
-from tissuq.errors import InputError
 from tissuq.experiments.headed_tables import headed, in_unit
 from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit, stress_unit
+from tissuq.population.covariates import Covariates, covariates_of
+from tissuq.population.effects import effect_table
+from tissuq.population.intervals import INTERVAL_COLUMNS, check_probability, interval
 from tissuq.population.likelihoods import Coordinates
-from tissuq.population.patient import matching_draws, patient_curves, patient_posterior
+from tissuq.population.patient import patient_band, patient_posterior
 from tissuq.population.picture import draw_specimens, height_of
+from tissuq.population.sample_size import needed_table
+from tissuq.population.warnings import MIN_EFFECTIVE_SHARE, warnings_of
 from tissuq.posterior.posterior import Posterior
 from tissuq.prediction.bands import asked_for
 
@@ -32,12 +37,6 @@ if TYPE_CHECKING:
 __all__ = ["Population"]
 
 FloatArray = NDArray[np.float64]
-
-MIN_EFFECTIVE_SHARE = 0.5
-"""Smallest share of draws that must remain effective when they are corrected."""
-MIN_SPECIMENS_FOR_SPREAD = 5
-"""Smallest number of specimens for which the prior of the spread has little influence."""
-INTERVAL_COLUMNS = ["median", "hdi_low", "hdi_high"]
 
 
 class Population:
@@ -56,6 +55,11 @@ class Population:
     spread_prior : float
         Sd of the half-normal prior of the spreads on the line.
     seed : int
+    covariates : Covariates
+        What is known of the specimens beside their tests.
+    patient_covariates : dict of str to object
+        What is known of the new patient; the other covariates are at the mean of the specimens (numbers) or at the
+        reference level (words), as they are for the median of the population.
     """
 
     def __init__(
@@ -66,10 +70,14 @@ class Population:
         hierarchy: Hierarchy,
         spread_prior: float,
         seed: int,
+        covariates: Covariates | None = None,
+        patient_covariates: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.posteriors, self.complete = dict(posteriors), complete
         self.coordinates, self.hierarchy = coordinates, hierarchy
         self.spread_prior, self.seed = spread_prior, seed
+        self.covariates = covariates or covariates_of(None, tuple(posteriors))
+        self.patient_covariates = dict(patient_covariates)
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -99,7 +107,20 @@ class Population:
     @cached_property
     def new(self) -> FloatArray:
         """Draws (chains, draws, d) of a new patient's parameters."""
-        return self.coordinates.from_line(self.hierarchy.new(np.random.default_rng([self.seed, 5])))
+        columns = self.covariates.row(self.patient_covariates)
+        return self.coordinates.from_line(self.hierarchy.new(np.random.default_rng([self.seed, 5]), columns))
+
+    def given(self, covariates: Mapping[str, Any]) -> Population:
+        """Return the same population with a new patient of whom covariates are known, such as ``{"age": 60}``.
+
+        Raises
+        ------
+        InputError
+            When there is no such covariate, or no such level of it.
+        """
+        self.covariates.row(covariates)
+        parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.spread_prior, self.seed
+        return Population(*parts, self.covariates, covariates)
 
     @cached_property
     def patient(self) -> Posterior:
@@ -120,7 +141,8 @@ class Population:
         20
         """
         posteriors = tuple(self.posteriors.values())
-        return patient_posterior(posteriors, self.complete, self.coordinates, self.hierarchy, self.new)
+        whose = self.covariates.described(self.patient_covariates)
+        return patient_posterior(posteriors, self.complete, self.coordinates, self.hierarchy, self.new, whose)
 
     @cached_property
     def diagnostics(self) -> NutsDraws:
@@ -137,26 +159,7 @@ class Population:
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Warnings that the user must read, in sentences."""
-        sentences = []
-        if not self.diagnostics.converged:
-            sentences.append(self.diagnostics.verdict)
-        if self.hierarchy.effective <= MIN_EFFECTIVE_SHARE:
-            sentences.append(
-                f"only {self.hierarchy.effective:.0%} of the draws remain effective when they are corrected for the "
-                "approximation of the specimens' posteriors by a few Gaussians: the approximation is too poor."
-            )
-        failed = [name for name, fit in self.posteriors.items() if fit.solution.is_approximate]
-        if failed:
-            sentences.append(
-                f"sampling has not converged for the separate fit of {', '.join(failed)}, on which the population "
-                "depends."
-            )
-        if len(self.names) < MIN_SPECIMENS_FOR_SPREAD:
-            sentences.append(
-                f"{len(self.names)} specimens determine the spread poorly: its prior, half-normal with sd "
-                f"{self.spread_prior:g} of the logarithm, influences the interval of a new patient, too."
-            )
-        return tuple(sentences)
+        return warnings_of(self)
 
     def unit(self, name: str | None = None) -> StressUnit:
         """Return the unit of stress of that name, or that of the measurements; MPa where theirs differ."""
@@ -188,13 +191,13 @@ class Population:
         """
         import pandas as pd
 
-        _check_probability(prob)
+        check_probability(prob)
         rows = {}
         for index, (symbol, is_log) in enumerate(zip(self.symbols, self.coordinates.is_log, strict=True)):
             factor = self.unit_of(symbol, self.unit(unit)).to_mpa
             for name, draws in (("median", self.median), ("spread", self.spread), ("new patient", self.new)):
                 is_ratio = name == "spread" and is_log
-                rows[symbol, name] = np.array(_interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
+                rows[symbol, name] = np.array(interval(draws[..., index], prob)) / (1.0 if is_ratio else factor)
             marginal = self.complete.marginals[symbol]
             rows[symbol, "complete pooling"] = np.array([marginal.quantile(0.5), *marginal.hdi(prob)]) / factor
         index_of_rows = pd.MultiIndex.from_tuples(rows, names=["parameter", "quantity"])
@@ -213,14 +216,14 @@ class Population:
         """
         import pandas as pd
 
-        _check_probability(prob)
+        check_probability(prob)
         rows, draws = {}, self.specimens
         for i, (name, posterior) in enumerate(self.posteriors.items()):
             for column, symbol in enumerate(self.symbols):
                 marginal = posterior.marginals[symbol]
                 single = float(marginal.quantile(0.5)), *marginal.hdi(prob)
                 factor = self.unit_of(symbol, self.unit(unit)).to_mpa
-                rows[name, symbol] = np.array([*_interval(draws[..., i, column], prob), *single]) / factor
+                rows[name, symbol] = np.array([*interval(draws[..., i, column], prob), *single]) / factor
         index = pd.MultiIndex.from_tuples(rows, names=["specimen", "parameter"])
         columns = [*INTERVAL_COLUMNS, *(f"alone_{end}" for end in INTERVAL_COLUMNS)]
         return headed(pd.DataFrame(list(rows.values()), index, columns), self.unit(unit))
@@ -229,12 +232,50 @@ class Population:
         """Return the correlation between specimens of every pair of parameters, on the line of `coordinates`."""
         import pandas as pd
 
-        _check_probability(prob)
+        check_probability(prob)
         correlation, count = self.hierarchy.correlation, len(self.symbols)
         pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
         names = [f"{self.symbols[i]}, {self.symbols[j]}" for i, j in pairs]
-        rows = [_interval(correlation[..., i, j], prob) for i, j in pairs]
+        rows = [interval(correlation[..., i, j], prob) for i, j in pairs]
         return pd.DataFrame(np.reshape(rows, (len(rows), 3)), pd.Index(names, name="parameters"), INTERVAL_COLUMNS)
+
+    def effects(self, prob: float = 0.95, unit: str | None = None) -> pd.DataFrame:
+        """Return the effect of every covariate on every parameter, and the share of the spread that they explain.
+
+        The parameters are those of `summary`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter and covariate (of a word with its level). Column ``kind`` says what the numbers are:
+            ``factor`` of a positive parameter, ``difference`` of another; both as ``per`` says (a unit of the number,
+            or against the reference level); ``share``, of the variance between specimens that the covariates explain
+            together. Median, hdi_low and hdi_high, and the probability that the effect is ``positive``.
+        """
+        check_probability(prob)
+        return effect_table(self, prob, self.unit(unit))
+
+    def specimens_needed(self, aim: float, prob: float = 0.95, assurance: float = 0.8) -> pd.DataFrame:
+        """Return how many specimens like these it takes until intervals are as narrow as is aimed at.
+
+        Parameters
+        ----------
+        aim : float
+            Half the width of the interval over the median: 0.1 for 10 %.
+        prob : float
+            Probability inside the interval.
+        assurance : float
+            Probability that so many specimens reach the aim, whatever they will be.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by parameter and quantity (``median``, ``new patient``). Half the width over the median ``now``, and
+            its ``floor`` with any number of specimens (it is lower with probability ``assurance``); how many
+            ``specimens`` it takes in all, and how many ``more``: nan where the floor is above the aim, or more than a
+            thousand are needed.
+        """
+        return needed_table(self, aim, prob, assurance)
 
     def new_patient(
         self,
@@ -243,6 +284,7 @@ class Population:
         mode: str | LoadingMode | None = None,
         channel: int = 0,
         discrepancy: bool = True,
+        covariates: Mapping[str, Any] | None = None,
         prob: float = 0.95,
         unit: str | None = None,
     ) -> pd.DataFrame:
@@ -262,6 +304,8 @@ class Population:
             Which of the mode's stresses, from 0, where it has several.
         discrepancy : bool
             Add the model error to the material's stress.
+        covariates : mapping of str to object, optional
+            What is known of the patient instead of `patient_covariates`; as of `given`.
         prob : float
             Probability between low and high, equal tails.
         unit : str, optional
@@ -274,30 +318,13 @@ class Population:
         """
         import pandas as pd
 
+        if covariates is not None:
+            of_patient: dict[str, Any] = {"mode": mode, "channel": channel, "discrepancy": discrepancy, "prob": prob}
+            return self.given(covariates).new_patient(stretch, **of_patient, unit=unit)
         options: dict[str, Any] = {"discrepancy": discrepancy, "mode": mode, "channel": channel}
         loading, points = asked_for([self.complete.solution], stretch, prob=prob, **options)
-        if len(loading.controls) > 1:
-            names = ", ".join(control.name for control in loading.controls)
-            raise InputError(
-                f"the stress of a new patient is predicted in loading modes with one control, and '{loading.name}' has "
-                f"{names}."
-            )
-        chains, draws, count, size = self.hierarchy.specimens.shape
-        line_values, new = self.hierarchy.specimens.reshape(-1, count, size), self.new.reshape(-1, size)
-        curves = []
-        for i, posterior in enumerate(self.posteriors.values()):
-            rows = np.arange(i, chains * draws, count)
-            matching = matching_draws(posterior, self.coordinates, line_values[rows, i])
-            arguments = posterior, self.coordinates, matching, new[rows], points
-            curves.append(patient_curves(*arguments, mode=loading, channel=channel, discrepancy=discrepancy))
-        stresses = np.concatenate(curves)
-        unseen = np.isnan(stresses).all(axis=0)
-        if unseen.any():
-            raise InputError(
-                f"no specimen was measured at {loading.controls[0].name} {points[unseen][0]:g}, so that the model "
-                "error there is unknown: predict nearer to the data, or with discrepancy=False."
-            )
-        low, median, high = np.nanquantile(stresses, [0.5 - prob / 2, 0.5, 0.5 + prob / 2], axis=0)
+        arguments = tuple(self.posteriors.values()), self.coordinates, self.hierarchy, self.new, loading, points, prob
+        low, median, high = patient_band(*arguments, channel=channel, discrepancy=discrepancy)
         table = pd.DataFrame({"stretch": points, "median": median, "low": low, "high": high})
         return in_unit(table, ["median", "low", "high"], self.unit(unit).name)
 
@@ -345,7 +372,8 @@ class Population:
             "seed": self.seed,
             "converged": str(self.converged),
         }
-        return labelled(self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new, labels)
+        parts = self.posteriors, self.complete, self.coordinates, self.hierarchy, self.new
+        return labelled(*parts, labels, self.covariates)
 
     def save(self, path: str | Path) -> None:
         """Write `data` as NetCDF, which ArviZ and xarray open."""
@@ -354,16 +382,3 @@ class Population:
     def __repr__(self) -> str:
         material = self.complete.model.material.name
         return f"<Population of {', '.join(self.symbols)}: {len(self.names)} specimens, {material}>"
-
-
-def _interval(draws: FloatArray, prob: float) -> tuple[float, float, float]:
-    """Return the median of draws and the ends of the shortest interval that holds a share of them."""
-    values = np.sort(draws, axis=None)
-    count = round(prob * len(values))
-    start = int((values[count:] - values[: len(values) - count]).argmin())
-    return float(np.median(values)), float(values[start]), float(values[start + count])
-
-
-def _check_probability(prob: float) -> None:
-    if not 0 < prob < 1:
-        raise InputError(f"prob must be between 0 and 1, not {prob}.")

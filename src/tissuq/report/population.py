@@ -18,8 +18,10 @@ from tissuq.experiments.modes import LoadingMode
 from tissuq.experiments.units import StressUnit
 from tissuq.mechanics import initial_shear_modulus
 from tissuq.population.picture import height_of, numbers_of
+from tissuq.report.covariates import copy_of_covariates, effects_of_covariates, patient_in_words
 from tissuq.report.result import Number, Picture, Result, Section, Table
 from tissuq.report.run_folder import INPUT, law_files
+from tissuq.report.sample_size import needed_of, needed_table_of
 from tissuq.report.tables import Row, interval, significant, with_named_units
 from tissuq.report.writer import posterior_files
 from tissuq.studies.population import PopulationStudy
@@ -145,11 +147,14 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
     """
     population, unit, settings = study.population, study.unit, study.settings
     sources, names = _copies(study, beside)
+    of_covariates, relocated = copy_of_covariates(study, beside)
     law, laws = law_files(settings.material)
     several = len(study.modes) > 1
     files: dict[str, Any] = {"data.csv": with_named_units(_data_rows(study, several), ["stress"], unit)}
     summaries = {"population": population.summary(unit="MPa"), "specimens": population.specimen_summary(unit="MPa")}
     tables = {name: _in_units(study, table) for name, table in summaries.items()}
+    tables |= {"covariates": population.effects(unit=unit.name)} if population.covariates else {}
+    tables |= {"specimens_needed": needed} if (needed := needed_of(study)) is not None else {}
     tables |= {"correlations": population.correlations()} if len(population.symbols) > 1 else {}
     bands, not_predicted = _bands(study)
     if bands:
@@ -168,11 +173,15 @@ def population_result(study: PopulationStudy, beside: Path = Path()) -> Result:
         picture=Picture(
             "answer", lambda: _first_parameter(population, unit), "The first parameter of every specimen", SPECIMENS
         ),
-        tables=(Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),),
+        tables=(
+            Table(HEADERS, readable_population(study), f"A population of {count} specimens", (1, 2), NO_RANGE),
+            *effects_of_covariates(study),
+            *needed_table_of(study, needed),
+        ),
         sections=_sections(study, bands, not_predicted),
         warnings=tuple(study.warnings),
-        files=files | sources | laws | posterior_files({PATIENT: population.patient}),
-        recipe=settings.model_copy(update={"files": names, "material": law}),
+        files=files | sources | of_covariates | laws | posterior_files({PATIENT: population.patient}),
+        recipe=settings.model_copy(update={"files": names, "material": law, **relocated}),
     )  # fmt: skip
 
 
@@ -204,7 +213,7 @@ def _numbers(study: PopulationStudy) -> tuple[Number, ...]:
 
     spread = "spread between specimens" + (" (sd of the logarithm)" if is_log else "")
     return (
-        number(f"{words} of a new patient", "new patient", factor / times, unit),
+        number(f"{words} of a new patient{patient_in_words(study)}", "new patient", factor / times, unit),
         number(f"{words}, median of the population", "median", factor / times, unit),
         number(spread, "spread", 1.0 if is_log else factor / times, "" if is_log else unit),
     )
@@ -241,14 +250,18 @@ def _sections(
     gaussian = [f"The logarithm{'s' * (len(logs) > 1)} of {', '.join(logs)}"] * bool(logs)
     gaussian += [f"{', '.join(linear)} {'itself' if len(linear) == 1 else 'themselves'}"] * bool(linear)
     sizes = " (in units of the typical size, for parameters of either sign)" if linear else ""
-    computed = (
+    computed: tuple[str, ...] = (
         "Every specimen was fitted separately, with its own discrepancy and noise and wide priors, which are then "
         "divided out (Lunn et al. 2013).",
         f"{' and '.join(gaussian)} {'is' if is_one else 'are'} Gaussian between specimens. The prior of every spread "
-        f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2).",
+        f"is half-normal with sd {settings.spread:.3g}{sizes}; of the mean, wide; of correlations, LKJ(2)"
+        f"{'; of effects, normal with sd 1' * bool(population.covariates)}.",
         f"The specimens are integrated in closed form. {diagnostics.verdict} Effective share of the draws after "
         f"importance correction: {population.hierarchy.effective:.1%}. {study.seconds:.0f} s.",
     )
+    if tolerances := next(iter(population.posteriors.values())).model.tolerances:
+        sizes = ", ".join(f"{name} {size:.3g}" for name, size in tolerances.sizes.items())
+        computed += (f"Errors of the specimens' own tests are included (of the first one: {sizes}).",)
     return (*sections, Section("How to read it", (HOW_TO_READ,)), Section("How it was computed", (computed,)))
 
 
@@ -363,7 +376,7 @@ def _lead(study: PopulationStudy) -> str:
         for name in ("new patient", "complete pooling")
     )
     return (
-        f"The median of {symbol} in the population is {middle} {unit}; for a patient who has not been measured it is "
-        f"{new} {unit} (95 %). Taking all measurements for those of one specimen would say {complete} {unit}, which is "
-        "no range of patients."
+        f"The median of {symbol} in the population is {middle} {unit}; for a patient who has not been measured"
+        f"{patient_in_words(study)} it is {new} {unit} (95 %). Taking all measurements for those of one specimen would "
+        f"say {complete} {unit}, which is no range of patients."
     )

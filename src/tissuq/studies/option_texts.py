@@ -11,7 +11,7 @@ from tissuq.errors import InputError
 
 __all__ = [
     "column", "noises", "number_or_text", "once_each", "one_noise", "pairs_of", "priors", "range_of", "sd_or_unknown",
-    "tolerances",
+    "share", "tolerances",
 ]  # fmt: skip
 
 
@@ -91,6 +91,19 @@ def one_noise(text: str) -> float | str:
     if len(values) > 1:
         raise InputError(f"--noise-sd is given {len(values)} times for a population; give it once for all specimens.")
     return values[0]
+
+
+def share(option: str) -> Callable[[str], float]:
+    """Return what makes a number of a text like 10% or 0.1."""
+
+    def parse(text: str) -> float:
+        scale = 0.01 if text.strip().endswith("%") else 1.0
+        try:
+            return scale * float(text.strip().removesuffix("%"))
+        except ValueError as error:
+            raise InputError(f"{option} needs a share such as 10% or 0.1, not '{text}'.") from error
+
+    return parse
 
 
 def range_of(option: str, example: str) -> Callable[[str], tuple[float, float]]:

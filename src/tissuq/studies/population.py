@@ -17,6 +17,7 @@ from tissuq.experiments.reading.notes import each_once
 from tissuq.experiments.units import StressUnit, stress_unit
 from tissuq.mechanics import Material, material_named
 from tissuq.population import Population, fit_population
+from tissuq.population.covariates import covariates_of
 from tissuq.studies.population_settings import PopulationSettings
 
 if TYPE_CHECKING:
@@ -79,18 +80,23 @@ def run_population(
             f"the files give stresses in different units ({', '.join(sorted(units))}), so the unit of the "
             "noise is ambiguous: leave --noise-sd out, or convert the files."
         )
+    known = settings.covariate_table(tests, folder)
+    covariates = covariates_of(known.values() if known else None, list(tests), known.place if known else None)
+    covariates.row(settings.new_patient)  # raises where there is no such patient, before specimens are fitted
     step(f"{len(tests)} specimens")
     start = perf_counter()
     population = fit_population(
         tests,
         parameters=settings.parameters,
         spread=settings.spread,
+        covariates=covariates,
         material=law or material_named(settings.material),
         discrepancy=settings.discrepancy,
         noise=settings.noise_in(_unit(tests)),
+        tolerances=settings.tolerances_in(_unit(tests)),
         method=cast("Method", settings.method),
         seed=settings.seed,
-    )
+    ).given(settings.new_patient)
     return PopulationStudy(settings, tests, population, perf_counter() - start, _data_warnings(readings))
 
 

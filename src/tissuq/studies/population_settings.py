@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -10,14 +11,26 @@ from typing import TYPE_CHECKING
 from tissuq.errors import InputError
 from tissuq.studies.measured_file import FittedSettings, ReadingSettings
 from tissuq.studies.option import argument, option
+from tissuq.studies.option_texts import pairs_of, share
+from tissuq.studies.tolerance_settings import ToleranceSettings
 
 if TYPE_CHECKING:
+    from tissuq.experiments.reading.covariates import CovariateTable
     from tissuq.experiments.reading.experiment_file import Reading
 
 __all__ = ["PopulationSettings"]
 
 
-class PopulationSettings(FittedSettings, ReadingSettings):
+COVARIATES = "Covariates"
+
+
+def known_of_patient(texts: Sequence[str]) -> dict[str, str]:
+    """Return the covariates of a new patient from texts such as ``age=60,sex=f``."""
+    pairs = pairs_of("--new-patient", "something known of a patient", "COVARIATE=VALUE, as in age=60,sex=f")
+    return pairs([part for text in texts for part in text.split(",")])
+
+
+class PopulationSettings(ToleranceSettings, FittedSettings, ReadingSettings):
     """Everything that a population depends on; the noise in the files' unit of stress.
 
     Without a mode every test says its own, as for `tissuq.read_experiment`. Of a file of several tests each is of a
@@ -36,6 +49,37 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         None, "Parameter to pool; repeat for more [all of the material].", name="parameter"
     )
     spread: float = option(1.0, "Sd of the half-normal prior of the spread of the logarithms.", gt=0, lt=inf)
+    covariates: str | None = option(
+        None,
+        "Table of what is known of the specimens: their names in the first column, then one each for age, sex and the "
+        "like, with names; 'age [year]' states a unit.",
+        takes=Path,
+        parse=str,
+        group=COVARIATES,
+    )
+    covariate: tuple[str, ...] = option(
+        (), "Instead, with --specimen-column: a column of that file that is one; repeat for more.", group=COVARIATES
+    )
+    new_patient: dict[str, str] = option(
+        default_factory=dict,
+        help="What is known of the new patient, such as age=60,sex=f [mean of numbers, most frequent word].",
+        parse=known_of_patient,
+        group=COVARIATES,
+    )
+    aim: float | None = option(
+        None,
+        "Also say how many specimens like these it takes until half the 95 % interval of the population's median, and "
+        "that of a new patient, is this share of the median, such as 10%.",
+        takes=str,
+        parse=share("--aim"),
+        gt=0,
+        lt=inf,
+    )
+    estimand: str | None = option(
+        None,
+        "Errors of every specimen's own tests: those of the specimen as-tested (none), or of the specimen (of a "
+        "careful laboratory) [as-tested].",
+    )
     discrepancy: str = option("auto", "Discrepancy of every specimen.")
     mode: str | None = option(None, "Loading mode of all files [as they or their names say, or uniaxial].")
 
@@ -44,12 +88,29 @@ class PopulationSettings(FittedSettings, ReadingSettings):
         from tissuq.experiments.reading.several_files import find_tests
 
         if self.specimen is None:
-            return find_tests([folder / file for file in self.files])
+            return find_tests([folder / file for file in self.files], but=self.covariates and folder / self.covariates)
         if len(self.files) > 1 or (folder / self.files[0]).is_dir():
             raise InputError(
                 "--specimen-column names a column of a single file: give one FILE, or leave --specimen-column out."
             )
         return {Path(self.files[0]).stem: [folder / self.files[0]]}
+
+    def covariate_table(self, specimens: Collection[str], folder: Path = Path()) -> CovariateTable | None:
+        """Read the covariates of specimens, if there are any; relative files lie in ``folder``."""
+        from tissuq.experiments.reading.covariates import covariate_columns, read_covariates
+
+        if self.covariates is not None and self.covariate:
+            raise InputError("give --covariates TABLE, or --covariate for columns of the one FILE, not both.")
+        if self.covariates is not None:
+            return read_covariates(folder / self.covariates, specimens)
+        if not self.covariate:
+            return None
+        if self.specimen is None:
+            raise InputError(
+                "--covariate names a column of the single FILE whose specimens --specimen-column names; for several "
+                "files give a table of the covariates, --covariates TABLE."
+            )
+        return covariate_columns(folder / self.files[0], self.specimen, self.covariate, **self.reading_options)
 
     def readings(self, folder: Path = Path()) -> dict[str, list[Reading]]:
         """Read the tests of every specimen; relative files lie in ``folder``."""

@@ -12,8 +12,9 @@ from pydantic import Field, field_validator, model_validator
 
 from tissuq.studies.measured_file import FittedSettings, MeasuredFile, MeasuredTest, ReadingSettings
 from tissuq.studies.option import argument, option
-from tissuq.studies.option_texts import noises, priors, tolerances
-from tissuq.studies.settings import SizesOfErrors, looked_up
+from tissuq.studies.option_texts import noises, priors
+from tissuq.studies.settings import looked_up
+from tissuq.studies.tolerance_settings import ToleranceSettings
 
 if TYPE_CHECKING:
     from tissuq.experiments.experiment import Experiment
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from tissuq.experiments.units import StressUnit
     from tissuq.mechanics import Material
     from tissuq.model.noise import Noise
-    from tissuq.model.tolerances import Tolerances
 
 __all__ = ["ALL", "LawSettings", "SpecimenSettings"]
 
@@ -29,7 +29,7 @@ ALL = "all"
 """In place of discrepancies: the paper's and the average of energies, where they apply; in place of laws: all."""
 
 
-class SpecimenSettings(FittedSettings, MeasuredFile):
+class SpecimenSettings(ToleranceSettings, FittedSettings, MeasuredFile):
     """Everything that a fit depends on; stresses (noise, priors) in the unit of stress of the file, or the first one.
 
     It is of one ``file``, or of several ``tests`` together.
@@ -73,20 +73,6 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         name="prior",
         parse=priors,
     )
-    estimand: str | None = option(
-        None,
-        "What intervals are of: the specimen as-tested (no errors of the test), the specimen (errors of a careful "
-        "laboratory), or the tissue (another specimen) [specimen; tissue for files of several specimens].",
-    )
-    tolerances: SizesOfErrors = option(
-        None,
-        "Error of a whole test (standard deviation) instead of that of the estimand: stress=10%, test=10%, length=2%, "
-        "slack=0.01 (of stretch), smooth=2% (along the curve), zero=0.1 (in the stress unit), or of every single "
-        "stretch=0.001 or stress, resolution=0.2% (of the largest); or none; repeat.",
-        name="tolerance",
-        takes=list[str],
-        parse=tolerances,
-    )
     mode: str | None = option(
         None, "Loading mode [uniaxial]; once for each of several files [as they or their names say].", takes=list[str]
     )
@@ -113,15 +99,6 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
 
         looked_up(modes_named, names)
         return names
-
-    @field_validator("estimand")
-    @classmethod
-    def _estimand_there_is(cls, name: str | None) -> str | None:
-        from tissuq.model.tolerances import Tolerances
-
-        if name is not None:
-            looked_up(Tolerances, name)
-        return name
 
     @model_validator(mode="after")
     def _measured(self) -> Self:
@@ -155,17 +132,6 @@ class SpecimenSettings(FittedSettings, MeasuredFile):
         from tissuq.experiments.experiment import Experiment
 
         return Experiment.of([reading.experiment for reading in self.readings(folder)])
-
-    def tolerances_in(self, unit: StressUnit) -> Tolerances | None:
-        """Return the tolerances, those of stresses converted from a unit to MPa; None for those of `tissuq.fit`."""
-        from tissuq.model.tolerances import Tolerances
-
-        if self.tolerances is None and self.estimand is None:
-            return None
-        sizes = self.tolerances or {}
-        is_stress = {error.name for error, _ in Tolerances(**sizes) if error.is_stress}
-        scale = {name: unit.to_mpa if name in is_stress else 1.0 for name in sizes}
-        return Tolerances(self.estimand or "", **{name: size * scale[name] for name, size in sizes.items()})
 
     def noise_in(self, unit: StressUnit) -> Noise:
         """Return the noise, known standard deviations converted from a unit to MPa."""

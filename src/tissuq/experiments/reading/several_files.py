@@ -21,8 +21,10 @@ SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx", ".xls", ".xlsb", ".ods", ".
 """Of files in a folder that may hold measurements."""
 
 
-def find_tests(paths: Sequence[str | os.PathLike[str]]) -> dict[str, list[Path]]:
-    """Return the files of every specimen.
+def find_tests(
+    paths: Sequence[str | os.PathLike[str]], but: str | os.PathLike[str] | None = None
+) -> dict[str, list[Path]]:
+    """Return the files of every specimen, but for a file that is none.
 
     A file is a specimen of its name. In a folder, every file is, and every folder is one specimen with a file for each
     test.
@@ -33,8 +35,11 @@ def find_tests(paths: Sequence[str | os.PathLike[str]]) -> dict[str, list[Path]]
         When there is no file in a folder, or two specimens have one name.
     """
     specimens: dict[str, list[Path]] = {}
+    left_out = None if but is None else Path(but).resolve()
     for path in map(Path, paths):
         for source, files in (_in_folder(path) if path.is_dir() else {path: [path]}).items():
+            if source.resolve() == left_out:
+                continue
             name = source.name if source.is_dir() else source.stem
             if name in specimens:
                 raise InputError(

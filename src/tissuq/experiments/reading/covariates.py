@@ -1,0 +1,123 @@
+"""Covariates of specimens: a table of its own with a row for each, or columns of a table of measurements."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Unpack
+
+from tissuq.errors import InputError
+from tissuq.experiments.reading.columns import find_column
+from tissuq.experiments.reading.experiment_file import table_of
+from tissuq.experiments.reading.file_format import SEPARATOR_OF_CELLS, file_format
+from tissuq.experiments.reading.layout import WHITESPACE, is_comment, split
+from tissuq.experiments.reading.options import ReadingOptions
+from tissuq.experiments.reading.several_files import SUFFIXES
+from tissuq.experiments.reading.several_specimens import only_rows, row_names
+from tissuq.experiments.reading.table import Table
+from tissuq.experiments.reading.text_file import read_lines
+
+__all__ = ["CovariateTable", "covariate_columns", "read_covariates"]
+
+
+@dataclass(frozen=True, eq=False)
+class CovariateTable:
+    """A table with the covariates of specimens as text.
+
+    Attributes
+    ----------
+    table : Table
+    specimens : list of str
+        The specimen that each row is of.
+    column : int
+        The column that names them.
+    columns : dict of str to int
+        Those of the covariates.
+    """
+
+    table: Table
+    specimens: list[str]
+    column: int
+    columns: dict[str, int]
+
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        """The first row of every specimen."""
+        return {name: self.specimens.index(name) for name in dict.fromkeys(self.specimens)}
+
+    def values(self) -> dict[str, dict[str, str]]:
+        """Return the values of every specimen.
+
+        Raises
+        ------
+        InputError
+            When rows of one specimen differ.
+        """
+        found: dict[str, dict[str, str]] = {specimen: {} for specimen in self._rows}
+        for name, column in self.columns.items():
+            for row, (specimen, cell) in enumerate(zip(self.specimens, self.table.texts(column), strict=True)):
+                if found[specimen].setdefault(name, cell) != cell:
+                    raise InputError(
+                        f"{self.table.place(column, row)}: '{cell}' for specimen '{specimen}', which has "
+                        f"'{found[specimen][name]}' in {self.table.counted} {self.table.lines[self._rows[specimen]]}. "
+                        "A covariate is the same in all rows of a specimen."
+                    )
+        return found
+
+    def place(self, specimen: str, covariate: str) -> str:
+        """Return where the value of a specimen, and of a covariate, stands."""
+        row = self._rows.get(specimen)
+        column = self.columns.get(covariate, self.column if row is not None else None)
+        return self.table.file if column is None else self.table.place(column, row)
+
+
+def covariate_columns(
+    path: str | os.PathLike[str], specimen: str, names: Sequence[str], **options: Unpack[ReadingOptions]
+) -> CovariateTable:
+    """Return columns of a file of measurements that say something of the specimens, which another column names."""
+    table = only_rows(table_of(path, options), options.get("only"))
+    column = find_column(table, "specimen", specimen)
+    columns = {name: find_column(table, "covariate", name) for name in names}
+    return CovariateTable(table, row_names(table, column), column, columns)
+
+
+def read_covariates(path: str | os.PathLike[str], specimens: Collection[str]) -> CovariateTable:
+    """Return a table of covariates: its first column names the specimens, perhaps as files, and the others have names.
+
+    Raises
+    ------
+    InputError
+        When there is no such table in the file.
+    """
+    workbook = file_format(path)
+    lines = next(iter(workbook.sheets(os.fspath(path)).values()), []) if workbook else read_lines(path)
+    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not is_comment(line)]
+    if len(numbered) < 2:
+        raise InputError(
+            f"{path} holds no covariates. Write the names of the columns into the first line, such as "
+            "'specimen,age,sex', and a line for each specimen."
+        )
+    header = numbered[0][1]
+    separator = SEPARATOR_OF_CELLS if workbook else next((mark for mark in "\t;," if mark in header), WHITESPACE)
+    names = split(header, separator)
+    rows = [line for _, line in numbered[1:]]
+    table = Table(str(path), tuple(names), ("",) * len(names), separator, rows, [n for n, _ in numbered[1:]])
+    for row, line in enumerate(rows):
+        if len(split(line, separator)) > len(names):
+            raise InputError(
+                f"{path}, line {table.lines[row]}: more cells than the {len(names)} columns that line {numbered[0][0]} "
+                "names. Write numbers with a decimal point, or quote a text that holds the separator."
+            )
+    if "" in names or len(set(names)) < len(names):
+        raise InputError(f"{path}, line {numbered[0][0]}: every column needs a name of its own; they are: {header!r}.")
+    labels = [
+        Path(cell).stem if cell not in specimens and cell.lower().endswith(SUFFIXES) else cell
+        for cell in table.texts(0)
+    ]
+    if twice := [name for name in dict.fromkeys(labels) if labels.count(name) > 1]:
+        row = len(labels) - 1 - labels[::-1].index(twice[0])
+        raise InputError(f"{table.place(0, row)}: specimen '{twice[0]}' has several rows; give one for each specimen.")
+    return CovariateTable(table, labels, 0, {name: column for column, name in enumerate(names) if column})
