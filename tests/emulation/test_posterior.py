@@ -345,3 +345,13 @@ def test_an_emulator_of_other_controls_or_parameters_is_refused():
         tq.calibrate(2 * DEPTH, data, neo_hooke, {"C10": tq.Uniform(0.2, 5.0)}, emulator=emulator)
     with pytest.raises(InputError, match="emulator is one of C10"):
         tq.calibrate(DEPTH, data, ogden, OGDEN, emulator=emulator)
+
+
+@pytest.mark.parametrize("prior", [tq.HalfNormal(2.0), tq.Normal(1.0, 2.0), tq.LogNormal(1.0, 0.5), tq.Uniform(0, 3)])
+def test_scores_of_heavy_tails_are_finite_parameters(prior):
+    """A half-normal prior once gave infinite ones, and a marginal that could not be drawn."""
+    problem = pose(np.ones(2), np.ones(2), {"a": prior}, noise_sd=0.1)
+    values = problem.values_of(np.array([[-60.0], [-9.0], [0.0], [9.0], [60.0]]))[:, 0]
+    assert np.isfinite(values).all()
+    assert (np.diff(values) >= 0).all()
+    assert values[2] == pytest.approx(prior.quantile(0.5))

@@ -31,6 +31,8 @@ DISCREPANCIES: dict[str, type[Discrepancy]] = {
     kind.name: kind for kind in (NoDiscrepancy, GaussianProcess, PinnedProcess)
 }
 """Discrepancies that need no material."""
+PROBABILITIES = 1e-300, 1 - 2 * np.finfo(float).epsneg
+"""The least and the largest probability at which a prior's quantile is finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +81,17 @@ class Problem:
         return tuple(self.forward_priors)
 
     def values_of(self, scores: FloatArray) -> FloatArray:
-        """Return parameters (N, D) whose joint prior is that of independent standard normal scores (N, D)."""
+        """Return parameters (N, D) whose joint prior is that of independent standard normal scores (N, D).
+
+        They are finite, also where proposals with heavy tails have scores of probability zero or one.
+        """
         from scipy.special import ndtr
 
         if self.correlation is not None:
             count = len(self.forward_priors)
             scores = np.hstack([self.correlation.scores(scores[:, :count]), scores[:, count:]])
         pairs = zip(self.priors.values(), scores.T, strict=True)
-        return np.column_stack([prior.quantile(ndtr(column)) for prior, column in pairs])
+        return np.column_stack([prior.quantile(np.clip(ndtr(column), *PROBABILITIES)) for prior, column in pairs])
 
 
 def pose(
